@@ -42,8 +42,9 @@ set_up() {
 }
 
 set_up_here() {
-  mkdir -p "$build" 2>/dev/null && : 2>/dev/null >>"$build/lock" || die "cannot write to $build"
+  if ! mkdir -p "$build" 2>/dev/null || [[ ! -w $build ]]; then die "cannot write to $build"; fi
   local stamp=
+  find "$build" -maxdepth 1 -name 'job_*' -mmin +60 -delete
   [[ -z $(rank_in_job) ]] || stamp=$(job_stamp)
   # The subshell holds the lock, so that neither the study nor what it starts inherits it.
   if (
@@ -88,12 +89,12 @@ choose_python() {
   python=
   tried=()
   for candidate in ${PYTHON:+"$PYTHON"} python3 /usr/bin/python3; do
-    path=$(command -v "$candidate") || { tried+=("$candidate"); continue; }
-    tried+=("$path")
-    if can_import_dolfinx "$path"; then
+    tried+=("$candidate")
+    if path=$(command -v "$candidate") && can_import_dolfinx "$path"; then
       python=$path
       return
     fi
+    [[ $candidate != "${PYTHON:-}" ]] || say "PYTHON=$PYTHON cannot import dolfinx; looking further"
   done
 }
 
@@ -150,7 +151,7 @@ build_release() {
   fi
   # One line is said when there is something to compile, none when there is not.
   (set -o pipefail; cmake --build "$build" 2>&1 | tee "$log" |
-    awk '/^\[/ && !said { print "'"$program"': building (a few minutes the first time)"; fflush(); said = 1 }' >&2) ||
+    awk '/Building|Linking/ && !said { print "'"$program"': building (a few minutes the first time)"; fflush(); said = 1 }' >&2) ||
     die_with_log "the build failed"
 }
 
