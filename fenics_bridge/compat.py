@@ -1,0 +1,168 @@
+"""What differs between the versions of DOLFINx that the bridge works with: 0.5, 0.9 and 0.10.
+
+Every choice is made by looking at what the installed DOLFINx offers, never by its version string. The rest of
+the bridge calls these functions and otherwise keeps to the part of the interface that all of them share.
+Tested with 0.5.2; the branches for 0.9 and 0.10 follow their documentation.
+"""
+
+from __future__ import annotations
+
+import inspect
+
+import dolfinx
+import numpy as np
+import ufl
+from dolfinx import cpp, fem, geometry, graph, io, la, mesh
+from dolfinx.mesh import GhostMode
+
+try:  # 0.7 and later
+    import basix.ufl as basix_ufl
+except ModuleNotFoundError:  # 0.5
+    basix_ufl = None
+
+SHAPE = {2: "triangle", 3: "tetrahedron"}
+
+
+def create_mesh(comm, points, cells, dim):
+    """Mesh of linear simplices, partitioned afresh, each rank keeping the neighbours of its cells as ghosts.
+
+    points: (n, dim) this rank's share of the nodes [m]; nodes are numbered through in order of rank
+    cells: (m, dim + 1) int64, this rank's share of the cells, by those numbers
+    Collective.
+    """
+    cells = np.ascontiguousarray(cells, dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if basix_ufl is not None:
+        element = ufl.Mesh(basix_ufl.element("Lagrange", SHAPE[dim], 1, shape=(dim,)))
+        partitioner = mesh.create_cell_partitioner(GhostMode.shared_facet)
+        return mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
+    cell = ufl.Cell(SHAPE[dim], geometric_dimension=dim)
+    element = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
+    return mesh.create_mesh(comm, cells, points, element, ghost_mode=GhostMode.shared_facet)
+
+
+def tags_from_nodes(domain, dim, entities, values):
+    """Mesh tags on the entities of dimension `dim` that have the given nodes, wherever these entities live.
+
+    entities: (k, dim + 1) int64, node numbers as they were given to `create_mesh`, on any rank
+    values: (k,) int32
+    Collective. Ghost entities receive their tag too.
+    """
+    entities = np.ascontiguousarray(entities, dtype=np.int64).reshape(-1, dim + 1)
+    values = np.ascontiguousarray(values, dtype=np.int32)
+    owner = domain if hasattr(domain, "_cpp_object") else domain._mesh  # a Python function since 0.8
+    local, local_values = io.distribute_entity_data(owner, dim, entities, values)
+    tdim = domain.topology.dim
+    domain.topology.create_connectivity(dim, 0)
+    domain.topology.create_connectivity(dim, tdim)
+    if hasattr(graph, "adjacencylist"):
+        adjacency = graph.adjacencylist(local)
+    else:
+        adjacency = cpp.graph.AdjacencyList_int32(local)
+    return mesh.meshtags_from_entities(domain, dim, adjacency, np.asarray(local_values, dtype=np.int32))
+
+
+def cell_nodes(domain):
+    """Geometry nodes of each cell on this rank, ghosts last: (m, D + 1) int32."""
+    nodes = domain.geometry.dofmap
+    return nodes if isinstance(nodes, np.ndarray) else nodes.array.reshape(-1, domain.topology.dim + 1)
+
+
+def facet_nodes(domain, facets):
+    """Geometry nodes of the given facets: (k, D) int32."""
+    dim = domain.topology.dim
+    domain.topology.create_connectivity(dim - 1, dim)
+    domain.topology.create_connectivity(dim, dim - 1)
+    domain.topology.create_connectivity(dim - 1, 0)
+    facets = np.asarray(facets, dtype=np.int32)
+    if hasattr(mesh, "entities_to_geometry"):
+        nodes = mesh.entities_to_geometry(domain, dim - 1, facets)
+    else:
+        nodes = cpp.mesh.entities_to_geometry(domain._mesh, dim - 1, facets, False)
+    return np.asarray(nodes, dtype=np.int32).reshape(-1, dim)
+
+
+def add_shared(vector):
+    """Sum a vector's ghost entries into their owners, then give the owners' sums to the ghosts. Collective."""
+    mode = la.InsertMode.add if hasattr(la, "InsertMode") else la.ScatterMode.add
+    vector.scatter_reverse(mode)
+    vector.scatter_forward()
+
+
+def forward(vector):
+    """Give the owners' values to the ghosts. Collective."""
+    vector.scatter_forward()
+
+
+def function_space(domain, family, degree, size=None):
+    """Lagrange space, continuous ("Lagrange") or not ("DG"), with `size` components per node (None: scalar)."""
+    if hasattr(fem, "functionspace"):
+        element = (family, degree) if size is None else (family, degree, (size,))
+        return fem.functionspace(domain, element)
+    if size is None:
+        return fem.FunctionSpace(domain, (family, degree))
+    return fem.VectorFunctionSpace(domain, (family, degree), dim=size)
+
+
+def quadrature_space(domain, degree, size):
+    """Space whose values live at the points of the quadrature rule of the given degree, `size` of them per point."""
+    if basix_ufl is not None:
+        element = basix_ufl.quadrature_element(domain.basix_cell(), value_shape=(size,), scheme="default", degree=degree)
+        return fem.functionspace(domain, element)
+    element = ufl.VectorElement("Quadrature", domain.ufl_cell(), degree, dim=size, quad_scheme="default")
+    return fem.FunctionSpace(domain, element)
+
+
+def quadrature_points(domain, degree):
+    """Points of that rule in the reference cell: (q, D)."""
+    if basix_ufl is not None:
+        import basix
+
+        return basix.make_quadrature(domain.basix_cell(), degree)[0]
+    from ffcx.element_interface import create_quadrature
+
+    return create_quadrature(domain.topology.cell_name(), degree, "default")[0]
+
+
+def interpolation_points(space):
+    """Points of the reference cell where a space wants the values that it interpolates: (q, D)."""
+    points = space.element.interpolation_points
+    return points() if callable(points) else points
+
+
+def cell_dofs(space):
+    """Blocked degrees of freedom of each cell on this rank, ghosts last: (m, k) int32."""
+    dofs = space.dofmap.list
+    if isinstance(dofs, np.ndarray):
+        return dofs
+    n_cells = dofs.num_nodes
+    return dofs.array.reshape(n_cells, -1) if n_cells else dofs.array.reshape(0, 1)
+
+
+def expression_values(expression, domain, cells):
+    """Values of a compiled expression in the given cells: (number of cells, points times components)."""
+    cells = np.asarray(cells, dtype=np.int32)
+    if "mesh" in inspect.signature(expression.eval).parameters:
+        return expression.eval(domain, cells).reshape(len(cells), -1)
+    return expression.eval(cells)
+
+
+def candidate_cells(domain, cells, points, padding):
+    """Cells whose bounding boxes hold the points: (offsets (n + 1,), cells) as in a compressed row format.
+
+    points: (n, 3) [m]; padding: by how much the boxes are widened [m]
+    """
+    dim = domain.topology.dim
+    cells = np.asarray(cells, dtype=np.int32)
+    if hasattr(geometry, "bb_tree"):
+        tree = geometry.bb_tree(domain, dim, entities=cells, padding=padding)
+        found = geometry.compute_collisions_points(tree, points)
+    else:
+        tree = geometry.BoundingBoxTree(domain, dim, cells, padding)
+        found = geometry.compute_collisions(tree, points)
+    return found.offsets, found.array
+
+
+def version():
+    """Version of the installed DOLFINx, for reports."""
+    return dolfinx.__version__

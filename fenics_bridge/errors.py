@@ -1,0 +1,30 @@
+"""Errors at the border of the bridge, raised on every rank alike."""
+
+from __future__ import annotations
+
+from mpm_core import InputError
+
+__all__ = ["InputError", "agree", "on_root"]
+
+
+def agree(comm, message):
+    """Raise `InputError` on every rank when any rank brings a message (None: all is well).
+
+    The message of the lowest rank that has one is raised. Collective: call it before communication that would
+    hang or crash if one rank had left.
+    """
+    first = next((text for text in comm.allgather(message) if text is not None), None)
+    if first is not None:
+        raise InputError(first)
+
+
+def on_root(comm, task):
+    """Result of `task()` on rank 0 and None elsewhere; its `InputError` reaches every rank. Collective."""
+    result, message = None, None
+    if comm.rank == 0:
+        try:
+            result = task()
+        except InputError as error:
+            message = str(error)
+    agree(comm, message)
+    return result

@@ -1,0 +1,67 @@
+"""Strain and stress as vectors of components, in the order of `mpm_core`.
+
+Two dimensions (plane strain): xx yy zz xy; three: xx yy zz xy yz xz; engineering shear; tension positive.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+
+from fenics_bridge import compat
+
+N_STRESS = {2: 4, 3: 6}
+"""Number of components by dimension."""
+
+
+def strain(u):
+    """Strain components of a displacement as a UFL vector."""
+    e = ufl.sym(ufl.grad(u))
+    if u.ufl_shape[0] == 2:
+        return ufl.as_vector([e[0, 0], e[1, 1], 0, 2 * e[0, 1]])
+    return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
+
+
+def elastic_stress(strain_components, young, poisson):
+    """Stress components of an isotropic elastic body as a UFL vector; plane strain keeps its stress zz."""
+    shear = young / (2 * (1 + poisson))
+    lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    e = strain_components
+    volumetric = lame * (e[0] + e[1] + e[2])
+    normal = [volumetric + 2 * shear * e[i] for i in range(3)]
+    return ufl.as_vector(normal + [shear * e[i] for i in range(3, e.ufl_shape[0])])
+
+
+def cell_function(domain, expression, degree, name):
+    """Function that is polynomial in each cell, from a UFL vector expression evaluated there."""
+    space = compat.function_space(domain, "DG", degree, expression.ufl_shape[0])
+    function = fem.Function(space, name=name)
+    function.interpolate(fem.Expression(expression, compat.interpolation_points(space)))
+    return function
+
+
+def nodal_average(function):
+    """Continuous, piecewise linear function whose nodal values average those of the cells around, by volume.
+
+    (The lumped L2 projection; it smooths stresses that jump between cells.) Collective.
+    """
+    domain = function.function_space.mesh
+    size = function.ufl_shape[0]
+    space = compat.function_space(domain, "Lagrange", 1, size)
+    test = ufl.TestFunction(space)
+    ones = fem.Constant(domain, np.ones(size))
+    weighted = assembled(fem.form(ufl.inner(function, test) * ufl.dx), space)
+    weights = assembled(fem.form(ufl.inner(ones, test) * ufl.dx), space)
+    average = fem.Function(space, name=function.name)
+    average.x.array[:] = weighted.array / weights.array
+    return average
+
+
+def assembled(form, space, into=None):
+    """Linear form as a vector (`dolfinx.la`), summed over ranks, ghost entries up to date. Collective."""
+    vector = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs) if into is None else into
+    vector.array[:] = 0.0
+    fem.assemble_vector(vector.array, form)
+    compat.add_shared(vector)
+    return vector

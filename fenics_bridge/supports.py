@@ -1,0 +1,86 @@
+"""Supports of a body by facet tag: fixed, rollers, prescribed displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from fenics_bridge.errors import InputError, agree
+
+
+@dataclass(frozen=True)
+class Support:
+    """Displacement components prescribed on the facets of one tag; None leaves a component free.
+
+    displacement: (D,) [m] or None for "all zero"
+    """
+
+    facet_tag: int
+    displacement: tuple | None = None
+
+
+def fixed(facet_tag):
+    """No displacement at all."""
+    return Support(facet_tag)
+
+
+def roller(facet_tag, normal):
+    """No displacement along `normal`, which must be an axis, e.g. (1, 0); free to slide across it."""
+    normal = np.asarray(normal, dtype=float)
+    along = np.flatnonzero(normal)
+    if len(along) != 1:
+        raise InputError(f"normal: got {tuple(normal)}, expected an axis such as (1, 0)")
+    return Support(facet_tag, tuple(0.0 if i == along[0] else None for i in range(len(normal))))
+
+
+def prescribed(facet_tag, displacement):
+    """Displacement components [m] on a part of the boundary; None leaves a component free."""
+    return Support(facet_tag, tuple(displacement))
+
+
+class Constraints:
+    """The supports of a body on the degrees of freedom of a displacement space.
+
+    `dofs` (k,) int32 local, `values` (k,) [m], both unrolled over components and with ghosts; `bcs` for assembling
+    matrices. Where supports meet, the later one holds.
+    """
+
+    def __init__(self, space, facet_tags, supports):
+        domain, dim = space.mesh, space.mesh.geometry.dim
+        agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
+        domain.topology.create_connectivity(dim - 1, dim)
+        value_of, self.bcs = {}, []
+        for support in supports:
+            displacement = support.displacement or (0.0,) * dim
+            facets = facet_tags.indices[facet_tags.values == support.facet_tag]
+            for component, value in enumerate(displacement):
+                if value is None:
+                    continue
+                part = space.sub(component)
+                dofs = fem.locate_dofs_topological(part, dim - 1, facets)
+                self.bcs.append(fem.dirichletbc(np.float64(0.0), dofs, part))
+                value_of.update(dict.fromkeys(dofs.tolist(), float(value)))
+        self.dofs = np.fromiter(value_of.keys(), np.int32, len(value_of))
+        self.values = np.fromiter(value_of.values(), float, len(value_of))
+
+
+def require_facet_tag(comm, facet_tags, tag, argument):
+    """Raise InputError, on all ranks, when no facet on any rank has the tag. Collective."""
+    found = facet_tags is not None and bool(np.any(facet_tags.values == tag))
+    known = comm.allgather(sorted(set(facet_tags.values.tolist())) if facet_tags is not None else [])
+    every = sorted(set().union(*known))
+    if not comm.allreduce(int(found)):
+        raise InputError(f"{argument}: no facet has the tag {tag!r}; the mesh has {every}")
+
+
+def _first_mistake(domain, facet_tags, supports, dim):
+    for support in supports:
+        require_facet_tag(domain.comm, facet_tags, support.facet_tag, "supports")
+        displacement = support.displacement
+        if displacement is not None and len(displacement) != dim:
+            return f"supports: {support} has {len(displacement)} components, expected {dim}"
+        if displacement is not None and not all(v is None or np.isfinite(v) for v in displacement):
+            return f"supports: {support} has a value that is not finite"
+    return None

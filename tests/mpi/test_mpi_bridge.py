@@ -1,0 +1,103 @@
+"""The bridge gives the same on 1, 2 and 3 ranks: `mpirun -n N python3 -m pytest tests/mpi`."""
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+from fenics_bridge.tagged import owned_cells
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points  # noqa: E402
+
+COMM = MPI.COMM_WORLD
+SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+
+
+def slope():
+    return bridge.slope_mesh(COMM)
+
+
+def gathered(array):
+    return np.concatenate(COMM.allgather(array))
+
+
+def test_every_cell_has_one_owner_and_ghosts_carry_their_tags():
+    domain, cell_tags, facet_tags = slope()
+    arrays = bridge.background_arrays(domain, cell_tags, facet_tags)
+    n_owned = owned_cells(domain)
+    mine = arrays["cell_owners"] == COMM.rank
+    assert mine[:n_owned].all() and not mine[n_owned:].any()
+    cells = gathered(arrays["global_cells"][:n_owned])
+    tags = gathered(arrays["cell_tags"][:n_owned])
+    assert sorted(cells) == list(range(len(cells)))
+    assert np.sum(tags == bridge.SOIL) == 640 and not np.any(tags == 0)
+    tag_of = dict(zip(cells, tags))
+    assert all(tag_of[c] == t for c, t in zip(arrays["global_cells"], arrays["cell_tags"]))
+    originals = gathered(bridge.original_cells(domain))
+    assert sorted(originals) == list(range(len(cells)))
+
+
+def test_shared_nodes_agree():
+    arrays = bridge.background_arrays(*slope())
+    numbers, points = gathered(arrays["global_nodes"]), gathered(arrays["points"])
+    reference = np.zeros((numbers.max() + 1, 2))
+    reference[numbers] = points
+    assert np.array_equal(reference[numbers], points)
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [("background", {1: 11, 2: 41, 3: 11, 4: 41, 5: 20, 6: 11}), ("soil", {1: 10, 2: 21, 5: 20, 6: 11})],
+)
+def test_facet_tags_do_not_depend_on_the_partition(body, expected):
+    arrays = bridge.background_arrays(*(slope() if body == "background" else bridge.soil_mesh(*slope())))
+    middle = gathered(arrays["points"][arrays["facets"]].mean(axis=1)).round(9)
+    facets = {(int(tag), *x) for tag, x in zip(gathered(arrays["facet_tags"]), middle.tolist())}
+    assert Counter(tag for tag, *_ in facets) == expected
+
+
+def test_soil_body_far_from_some_ranks_is_shared_by_all():
+    domain, cell_tags, facet_tags = bridge.slope_mesh(COMM, runout=20.0)
+    soil, _, _ = bridge.soil_mesh(domain, cell_tags, facet_tags)
+    counts = COMM.allgather(owned_cells(soil))
+    assert sum(counts) == 640 and min(counts) > 0
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_slope_does_not_depend_on_the_number_of_ranks(degree):
+    points = np.array([[1.1, 1.0], [0.53, 0.47], [1.62, 0.31]])
+    results = []
+    for comm in (COMM, MPI.COMM_SELF):
+        soil, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm))
+        solution = bridge.solve_elastic(soil, facet_tags, SUPPORTS, YOUNG, POISSON, UNIT_WEIGHT, degree)
+        results.append((solution.evaluate_at(points), solution.evaluate_at(points[1:], smooth=True)["stress"]))
+    (here, here_smooth), (alone, alone_smooth) = results
+    assert np.allclose(here["displacement"], alone["displacement"], rtol=1e-9)
+    assert np.allclose(here["stress"][1:], alone["stress"][1:], rtol=1e-8)
+    assert np.allclose(here_smooth, alone_smooth, rtol=1e-8)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_points_are_found_on_whatever_rank_they_are(dim):
+    domain, facet_tags, supports, _ = column(dim)
+    solution = bridge.solve_elastic(domain, facet_tags, supports, YOUNG, POISSON, UNIT_WEIGHT, degree=2)
+    points = interior_points(100 * COMM.rank, dim, seed=COMM.rank)  # none on rank 0
+    values = solution.evaluate_at(points)
+    assert np.allclose(values["stress"], column_stress(points[:, -1], dim), atol=1e-8 * UNIT_WEIGHT)
+
+
+def test_errors_reach_every_rank():
+    with pytest.raises(bridge.InputError, match="no file"):
+        bridge.read_mesh("nowhere.msh", COMM)
+    domain, _, facet_tags = bridge.soil_mesh(*slope())
+    last = COMM.size - 1
+    points = np.array([[9.0, 9.0]]) if COMM.rank == last else np.array([[0.5, 0.5]])
+    with pytest.raises(bridge.InputError, match=rf"point 0 on rank {last} at \(9, 9\)"):
+        bridge.PointSearch(domain, points).require_all()
+    with pytest.raises(bridge.InputError, match="tag 99"):
+        bridge.solve_elastic(domain, facet_tags, [bridge.fixed(99)], YOUNG, POISSON, UNIT_WEIGHT)

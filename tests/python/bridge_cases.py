@@ -1,0 +1,46 @@
+"""Bodies and closed forms that several tests of the bridge share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+MESHES = Path(__file__).resolve().parents[2] / "meshes"
+YOUNG, POISSON, UNIT_WEIGHT = 200e3, 0.33, 20e3
+
+
+def column(dim, cell_size=0.25):
+    """(domain, facet_tags, supports, height) of a column between rollers on a fixed base."""
+    if dim == 3:
+        domain, _, facet_tags = bridge.read_mesh(MESHES / "column.geo", MPI.COMM_WORLD, 3, {"cell_size": cell_size})
+        supports = [bridge.roller(2, (1, 0, 0)), bridge.roller(3, (0, 1, 0)), bridge.fixed(1)]
+        return domain, facet_tags, supports, 1.0
+    background, cell_tags, facet_tags = bridge.slope_mesh(MPI.COMM_WORLD, angle=90, crest=0.5, cell_size=cell_size)
+    domain, _, facet_tags = bridge.soil_mesh(background, cell_tags, facet_tags)
+    sides = [bridge.roller(tag, (1, 0)) for tag in (bridge.LEFT, bridge.SLOPE)]
+    return domain, facet_tags, [*sides, bridge.fixed(bridge.BASE)], 1.0
+
+
+def column_stress(y, dim, height=1.0, poisson=POISSON, unit_weight=UNIT_WEIGHT):
+    """sigma_v = gamma (H - y), sigma_h = nu / (1 - nu) sigma_v, compression negative: (n, S)."""
+    vertical = -unit_weight * (height - np.asarray(y))
+    stress = np.zeros((len(vertical), 4 if dim == 2 else 6))
+    stress[:, :3] = (poisson / (1 - poisson) * vertical)[:, None]
+    stress[:, dim - 1] = vertical
+    return stress
+
+
+def column_settlement(height=1.0, young=YOUNG, poisson=POISSON, unit_weight=UNIT_WEIGHT):
+    """u_top = -gamma H^2 / (2 E_oed) with the oedometer modulus E_oed."""
+    oedometer = young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
+    return -unit_weight * height**2 / (2 * oedometer)
+
+
+def interior_points(n, dim, seed=0):
+    """Random points inside the column of unit height and half that width."""
+    width = [0.5] * (dim - 1)
+    return np.random.default_rng(seed).random((n, dim)) * (*width, 1.0)
