@@ -1,0 +1,64 @@
+#pragma once
+/// @file
+/// The few vector and tensor operations that the kernels need. Loops of constant length, unrolled by the compiler.
+
+#include "base/types.h"
+
+#include <cmath>
+
+namespace mpm
+{
+template <int D>
+using Matrix = std::array<Vector<D>, D>; // row-major
+
+/// Number of independent entries of a symmetric D x D matrix (in plane strain without zz).
+template <int D>
+inline constexpr int n_symmetric = D * (D + 1) / 2;
+
+/// Row and column of entry k of a symmetric matrix: xx yy xy, or xx yy zz xy yz xz.
+template <int D>
+inline constexpr std::array<std::array<int, 2>, n_symmetric<D>> symmetric_pairs = []
+{
+  if constexpr (D == 2)
+    return std::array<std::array<int, 2>, 3>{{{0, 0}, {1, 1}, {0, 1}}};
+  else
+    return std::array<std::array<int, 2>, 6>{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}}};
+}();
+
+/// Component of stress that entry k of a symmetric matrix is: skips zz in plane strain.
+template <int D>
+inline constexpr std::array<int, n_symmetric<D>> stress_component = []
+{
+  if constexpr (D == 2)
+    return std::array<int, 3>{0, 1, 3};
+  else
+    return std::array<int, 6>{0, 1, 2, 3, 4, 5};
+}();
+
+/// Entry of a symmetric matrix at row i, column j.
+template <int D>
+constexpr int symmetric_index(int i, int j)
+{
+  if (i == j)
+    return i;
+  if constexpr (D == 2)
+    return 2;
+  else
+    return i + j == 1 ? 3 : (i + j == 3 ? 4 : 5);
+}
+
+template <int D>
+inline double dot(const Vector<D>& a, const Vector<D>& b)
+{
+  double sum = 0;
+  for (int i = 0; i < D; ++i)
+    sum += a[i] * b[i];
+  return sum;
+}
+
+template <int D>
+inline double norm(const Vector<D>& a)
+{
+  return std::sqrt(dot<D>(a, a));
+}
+} // namespace mpm

@@ -1,0 +1,31 @@
+#pragma once
+/// @file
+/// Finding the cell of a point.
+
+#include "mesh/mesh.h"
+
+namespace mpm
+{
+/// A point belongs to a cell when no shape function is below minus this: points on a facet must not fall between cells.
+inline constexpr double inside_tolerance = 1e-10;
+
+/// Where a point is.
+struct Location
+{
+  /// Its cell, or `none` when it is outside of the mesh
+  Index cell = none;
+  /// For a point outside: the cell and facet (opposite to this vertex) through which the walk left the mesh
+  Index exit_cell = none;
+  int exit_facet = -1;
+};
+
+/// The cell of point x, found by walking from cell `start` over neighbours, each time across the facet that x lies
+/// farthest behind. Where the walk ends at a boundary or goes round in circles, the bins of the mesh decide, so the answer
+/// is right on any mesh. A point that is not finite is outside.
+template <int D>
+Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
+
+/// The cell of point x without a guess, by the bins of the mesh; `none` when outside.
+template <int D>
+Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x);
+} // namespace mpm

@@ -1,0 +1,39 @@
+#pragma once
+/// @file
+/// Sums over nodes that several ranks share.
+
+#include "mesh/mesh.h"
+
+#include <mpi.h>
+
+namespace mpm
+{
+/// Which nodes this rank shares with which others, and the room for their messages.
+struct NodeExchange
+{
+  /// Nodes shared with one neighbour, in the same order on both sides.
+  struct Neighbour
+  {
+    int rank;
+    std::vector<Index> nodes;
+    std::vector<double> send, receive;
+  };
+  MPI_Comm comm = MPI_COMM_SELF;
+  int rank = 0;
+  int size = 1;
+  std::vector<Neighbour> neighbours; ///< by rising rank
+  std::vector<Index> shared_nodes;   ///< all nodes that have a neighbour
+  std::vector<double> own;           ///< this rank's share of them during a sum
+  std::vector<unsigned char> owned;  ///< per node: 1 on exactly one of the ranks that share it, for global sums
+};
+
+/// @note Collective. Nodes of ghost cells that no owned cell touches are not exchanged.
+template <int D>
+NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm);
+
+/// Replaces the values of shared nodes by their sum over the ranks that share them. The sum runs by rising rank, so it
+/// is the same to the last bit on all of them. One message per neighbour.
+/// @param values  (nodes, width) row-major
+/// @note Collective over neighbours
+void sum_shared(NodeExchange& exchange, double* values, int width);
+} // namespace mpm

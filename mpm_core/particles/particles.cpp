@@ -1,0 +1,106 @@
+#include "particles/particles.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+template <int D>
+void resize(Particles<D>& particles, Index size)
+{
+  const bool loaded = !particles.traction[0].empty();
+  const auto n = static_cast<std::size_t>(size);
+  for_each_column(particles, [n](const char*, int, auto& column) { column.resize(n); });
+  if (!loaded)
+    for (auto& column : particles.traction)
+      column.clear();
+}
+
+template <int D>
+void require_traction(Particles<D>& particles)
+{
+  for (auto& column : particles.traction)
+    column.resize(particles.id.size(), 0.0);
+}
+
+template <int D>
+void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials)
+{
+  const std::size_t n = particles.id.size();
+  auto key = [&](std::size_t p)
+  { return static_cast<std::size_t>(particles.cell[p]) * static_cast<std::size_t>(n_materials) +
+           static_cast<std::size_t>(n_materials > 1 ? particles.material[p] : 0); };
+  std::vector<Index> start(static_cast<std::size_t>(n_cells) * static_cast<std::size_t>(n_materials) + 1, 0);
+  for (std::size_t p = 0; p < n; ++p)
+    ++start[key(p) + 1];
+  for (std::size_t k = 1; k < start.size(); ++k)
+    start[k] += start[k - 1];
+  std::vector<Index> order(n);
+  for (std::size_t p = 0; p < n; ++p)
+    order[static_cast<std::size_t>(start[key(p)]++)] = static_cast<Index>(p);
+
+  for_each_column(particles,
+                  [&order](const char*, int, auto& column)
+                  {
+                    if (column.empty())
+                      return;
+                    std::remove_reference_t<decltype(column)> sorted(column.size());
+                    for (std::size_t p = 0; p < sorted.size(); ++p)
+                      sorted[p] = column[static_cast<std::size_t>(order[p])];
+                    column.swap(sorted);
+                  });
+}
+
+template <int D>
+void remove(Particles<D>& particles, std::span<const Index> numbers)
+{
+  auto last = particles.id.size();
+  for (std::size_t k = numbers.size(); k-- > 0;)
+  {
+    --last;
+    const auto hole = static_cast<std::size_t>(numbers[k]);
+    for_each_column(particles,
+                    [hole, last](const char*, int, auto& column)
+                    {
+                      if (!column.empty())
+                        column[hole] = column[last];
+                    });
+  }
+  resize(particles, static_cast<Index>(last));
+}
+
+template <int D>
+void find_runs(const Particles<D>& particles, Index longest, std::vector<Run>& runs)
+{
+  runs.clear();
+  const Index n = particles.size();
+  for (Index p = 0; p < n;)
+  {
+    const Index cell = particles.cell[p], material = particles.material[p];
+    const Index limit = std::min(n, p + longest);
+    Index q = p + 1;
+    while (q < limit && particles.cell[q] == cell && particles.material[q] == material)
+      ++q;
+    runs.push_back({p, q, cell, material});
+    p = q;
+  }
+}
+
+template <int D>
+double bytes_per_particle(const Particles<D>& particles)
+{
+  double bytes = 0;
+  for_each_column(particles, [&bytes](const char*, int, const auto& column)
+                  { bytes += static_cast<double>(column.size() * sizeof(column[0])); });
+  return particles.size() == 0 ? 0 : bytes / particles.size();
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template void resize(Particles<D>&, Index);                                                                          \
+  template void require_traction(Particles<D>&);                                                                       \
+  template void sort_by_cell(Particles<D>&, Index, Index);                                                             \
+  template void remove(Particles<D>&, std::span<const Index>);                                                         \
+  template void find_runs(const Particles<D>&, Index, std::vector<Run>&);                                              \
+  template double bytes_per_particle(const Particles<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

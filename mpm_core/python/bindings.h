@@ -1,0 +1,18 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <mpi.h>
+
+#include <cstdint>
+
+namespace mpm::python
+{
+void bind_laws(pybind11::module_& m);
+void bind_models(pybind11::module_& m);
+void bind_io(pybind11::module_& m);
+
+/// The communicator at an address that mpi4py gives (`MPI._addressof(comm)`).
+inline MPI_Comm communicator(std::uintptr_t address) { return *reinterpret_cast<MPI_Comm*>(address); }
+} // namespace mpm::python

@@ -1,0 +1,303 @@
+#include "python/bindings.h"
+
+#include "mesh/search.h"
+#include "particles/seed.h"
+#include "python/arrays.h"
+#include "steps/run.h"
+
+namespace mpm::python
+{
+namespace
+{
+template <int D>
+std::shared_ptr<Mesh<D>> mesh_from_arrays(const py::array& points, const py::array& cells, const py::array& cell_tags,
+                                          const py::array& facets, const py::array& facet_tags,
+                                          const py::array& global_nodes, const py::array& global_cells,
+                                          const py::array& cell_owners, int rank)
+{
+  check_array<double>("points", points, {-1, D});
+  check_array<Index>("cells", cells, {-1, D + 1});
+  check_array<Index>("cell_tags", cell_tags, {-1});
+  check_array<Index>("facets", facets, {-1, D});
+  check_array<Index>("facet_tags", facet_tags, {facets.shape(0)});
+  check_array<GlobalIndex>("global_nodes", global_nodes, {-1});
+  check_array<GlobalIndex>("global_cells", global_cells, {-1});
+  check_array<Index>("cell_owners", cell_owners, {-1});
+  return std::make_shared<Mesh<D>>(make_mesh<D>(
+      {values<double>(points), values<Index>(cells), values<Index>(cell_tags), values<Index>(facets),
+       values<Index>(facet_tags), values<GlobalIndex>(global_nodes), values<GlobalIndex>(global_cells),
+       values<Index>(cell_owners)},
+      rank));
+}
+
+/// Columns of a vector or tensor field as rows of a new array.
+template <class C>
+py::array_t<double> rows(const C& columns, std::size_t size)
+{
+  const std::size_t width = columns.size();
+  py::array_t<double> array({size, width});
+  double* out = array.mutable_data();
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t p = 0; p < columns[k].size(); ++p)
+      out[p * width + k] = columns[k][p];
+  return array;
+}
+
+template <class C>
+void set_rows(const char* name, const py::array& array, C& columns, std::size_t size)
+{
+  check_array<double>(name, array, {static_cast<py::ssize_t>(size), static_cast<py::ssize_t>(columns.size())});
+  const double* in = values<double>(array).data();
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    columns[k].resize(size);
+    for (std::size_t p = 0; p < size; ++p)
+      columns[k][p] = in[p * columns.size() + k];
+  }
+}
+
+/// A copy of the nodal values: (nodes,) for numbers, (nodes, D) for vectors.
+template <int D, class F>
+py::array_t<double> nodal_vectors(const Model<D>& model, F&& value)
+{
+  const std::size_t n = model.mesh.points.size();
+  py::array_t<double> array({n, static_cast<std::size_t>(D)});
+  double* out = array.mutable_data();
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    const Vector<D> v = value(i);
+    std::copy(v.begin(), v.end(), out + i * D);
+  }
+  return array;
+}
+
+template <int D>
+py::array_t<double> nodal(const Model<D>& model, const std::string& name)
+{
+  const auto& work = model.work;
+  if (!work.ready)
+    throw InputError("nodal values of '" + name + "' are there only after a step");
+  if (name == "velocity")
+    return nodal_vectors(model, [&](std::size_t i) { return work.velocity[i]; });
+  if (name == "acceleration")
+    return nodal_vectors(model, [&](std::size_t i) { return work.acceleration[i]; });
+  if (name == "internal_force")
+    return nodal_vectors(model, [&](std::size_t i) { return work.nodes[i].internal; });
+  if (name == "mass")
+  {
+    py::array_t<double> array(static_cast<py::ssize_t>(work.nodes.size()));
+    for (std::size_t i = 0; i < work.nodes.size(); ++i)
+      array.mutable_data()[i] = work.nodes[i].mass;
+    return array;
+  }
+  throw InputError("nodal field is '" + name + "', expected velocity, acceleration, internal_force or mass");
+}
+
+template <int D>
+py::object column(const Model<D>& model, const std::string& name)
+{
+  const Particles<D>& p = model.particles;
+  const std::size_t n = p.id.size();
+  if (name == "id")
+    return copied(p.id);
+  if (name == "material")
+    return copied(p.material);
+  if (name == "cell")
+    return copied(p.cell);
+  if (name == "volume")
+    return copied(p.volume);
+  if (name == "mass")
+    return copied(p.mass);
+  if (name == "deviatoric_strain")
+    return copied(p.deviatoric_strain);
+  if (name == "position")
+    return rows(p.position, n);
+  if (name == "velocity")
+    return rows(p.velocity, n);
+  if (name == "stress")
+    return rows(p.stress, n);
+  if (name == "initial_position")
+    return rows(p.initial_position, n);
+  if (name == "traction")
+    return rows(p.traction, p.traction[0].size());
+  if (name == "state")
+    return rows(p.state, n);
+  throw InputError("particle field is '" + name + "', which does not exist");
+}
+
+template <int D>
+void set_column(Model<D>& model, const std::string& name, const py::array& array)
+{
+  Particles<D>& p = model.particles;
+  const std::size_t n = p.id.size();
+  auto scalar = [&](Column& column)
+  {
+    check_array<double>(name.c_str(), array, {static_cast<py::ssize_t>(n)});
+    const auto in = values<double>(array);
+    column.assign(in.begin(), in.end());
+  };
+  if (name == "volume")
+    scalar(p.volume);
+  else if (name == "mass")
+    scalar(p.mass);
+  else if (name == "deviatoric_strain")
+    scalar(p.deviatoric_strain);
+  else if (name == "velocity")
+    set_rows(name.c_str(), array, p.velocity, n);
+  else if (name == "stress")
+    set_rows(name.c_str(), array, p.stress, n);
+  else if (name == "initial_position")
+    set_rows(name.c_str(), array, p.initial_position, n);
+  else if (name == "traction")
+    set_rows(name.c_str(), array, p.traction, n);
+  else if (name == "state")
+    set_rows(name.c_str(), array, p.state, n);
+  else
+    throw InputError("particle field is '" + name + "', which cannot be set");
+  model.work.ready = false;
+}
+
+py::dict as_dict(const Diagnostics& d)
+{
+  using namespace py::literals;
+  return py::dict("particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
+                  "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3),
+                  "kinetic_energy"_a = d.kinetic_energy, "external_work"_a = d.external_work,
+                  "internal_work"_a = d.internal_work, "damping_work"_a = d.damping_work,
+                  "support_work"_a = d.support_work,
+                  "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
+                  "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
+                  "plastic_share"_a = d.plastic_share, "unbalanced_ratio"_a = d.unbalanced_ratio);
+}
+
+template <int D>
+py::array_t<Index> cells_of(const Mesh<D>& mesh, const py::array& points)
+{
+  check_array<double>("points", points, {-1, D});
+  const auto x = values<double>(points);
+  py::array_t<Index> cells(points.shape(0));
+  for (py::ssize_t p = 0; p < points.shape(0); ++p)
+  {
+    Vector<D> at;
+    std::copy_n(&x[static_cast<std::size_t>(p) * D], D, at.begin());
+    cells.mutable_data()[p] = find_cell_in_bins<D>(mesh, at);
+  }
+  return cells;
+}
+
+template <int D>
+std::unique_ptr<Model<D>> new_model(const Mesh<D>& mesh, std::vector<Law> laws, std::uintptr_t comm)
+{
+  auto model = std::make_unique<Model<D>>();
+  model->mesh = mesh;
+  model->exchange = make_node_exchange(mesh, communicator(comm));
+  int states = 0;
+  for (const Law& law : laws)
+    states = std::max(states, n_state(law));
+  model->particles.state.resize(static_cast<std::size_t>(states));
+  model->laws = std::move(laws);
+  return model;
+}
+
+template <int D>
+void bind_model(py::module_& m, const std::string& suffix)
+{
+  py::class_<Mesh<D>, std::shared_ptr<Mesh<D>>>(m, ("Mesh" + suffix).c_str())
+      .def(py::init(&mesh_from_arrays<D>))
+      .def_property_readonly("owned_cells", [](const Mesh<D>& mesh) { return mesh.owned_cells; })
+      .def_property_readonly("cell_tags", [](const Mesh<D>& mesh) { return copied(mesh.cell_tags); })
+      .def("cells_of", &cells_of<D>)
+      .def("volumes",
+           [](const Mesh<D>& mesh)
+           {
+             std::vector<double> volumes;
+             for (const auto& shape : mesh.shapes)
+               volumes.push_back(shape.volume);
+             return copied(volumes);
+           });
+
+  using M = Model<D>;
+  py::class_<M>(m, ("Model" + suffix).c_str())
+      .def(py::init(&new_model<D>))
+      .def("seed_cells",
+           [](M& model, std::optional<Index> tag, int per_cell, Index material, double density, GlobalIndex first_id)
+           {
+             model.work.ready = false;
+             return seed_cells<D>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
+           })
+      .def("seed_points",
+           [](M& model, const py::array& points, const py::array& volumes, Index material, double density,
+              GlobalIndex first_id)
+           {
+             check_array<double>("points", points, {-1, D});
+             check_array<double>("volumes", volumes, {points.shape(0)});
+             model.work.ready = false;
+             return seed_points<D>(model.mesh, values<double>(points), values<double>(volumes), {material, density},
+                                   first_id, model.particles);
+           })
+      .def("load_facets",
+           [](M& model, Index facet_tag, const Vector<D>& traction)
+           {
+             model.work.ready = false;
+             return load_facets<D>(model.mesh, facet_tag, traction, model.particles);
+           })
+      .def("set_supports",
+           [](M& model, const std::vector<std::tuple<Index, bool, Vector<D>>>& wishes)
+           {
+             std::vector<SupportRequest<D>> requests;
+             for (const auto& [tag, whole, vector] : wishes)
+               requests.push_back({tag, whole, vector});
+             model.supports = make_supports<D>(model.mesh, model.exchange, requests);
+           })
+      .def_readwrite("outflow_tags", &M::outflow_tags)
+      .def_readwrite("gravity", &M::gravity)
+      .def_readwrite("gravity_ramp", &M::gravity_ramp)
+      .def_readwrite("time", &M::time)
+      .def_property_readonly("size", [](const M& model) { return model.particles.size(); })
+      .def_property_readonly("steps", [](const M& model) { return model.totals.steps; })
+      .def_property_readonly("sorts", [](const M& model) { return model.totals.sorts; })
+      .def_property_readonly("last_dt", [](const M& model) { return model.last.dt; })
+      .def("critical_time_step",
+           [](M& model)
+           {
+             prepare(model);
+             return critical_time_step(model);
+           })
+      .def("run_explicit",
+           [](M& model, const ExplicitOptions& options, const RunOptions& run)
+           {
+             py::gil_scoped_release release;
+             return run_explicit(model, options, run);
+           })
+      .def("diagnostics", [](const M& model) { return as_dict(diagnostics(model)); })
+      .def("column", &column<D>)
+      .def("set_column", &set_column<D>)
+      .def("nodal", &nodal<D>)
+      .def("bytes_per_particle", [](const M& model) { return bytes_per_particle(model.particles); });
+}
+} // namespace
+
+void bind_models(py::module_& m)
+{
+  py::enum_<StressUpdate>(m, "StressUpdate")
+      .value("MODIFIED_LAST", StressUpdate::modified_last)
+      .value("LAST", StressUpdate::last)
+      .value("FIRST", StressUpdate::first);
+  py::class_<ExplicitOptions>(m, "ExplicitOptions")
+      .def(py::init<>())
+      .def_readwrite("stress_update", &ExplicitOptions::stress_update)
+      .def_readwrite("damping", &ExplicitOptions::damping)
+      .def_readwrite("pic_share", &ExplicitOptions::pic_share)
+      .def_readwrite("mixed_discretisation", &ExplicitOptions::mixed_discretisation);
+  py::class_<RunOptions>(m, "RunOptions")
+      .def(py::init<>())
+      .def_readwrite("until", &RunOptions::until)
+      .def_readwrite("dt", &RunOptions::dt)
+      .def_readwrite("courant", &RunOptions::courant)
+      .def_readwrite("allow_unstable", &RunOptions::allow_unstable)
+      .def_readwrite("max_steps", &RunOptions::max_steps);
+  m.attr("control_interval") = control_interval;
+  bind_model<2>(m, "2");
+  bind_model<3>(m, "3");
+}
+} // namespace mpm::python

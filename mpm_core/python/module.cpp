@@ -1,0 +1,15 @@
+#include "python/bindings.h"
+
+#include "base/types.h"
+
+PYBIND11_MODULE(_core, m)
+{
+  m.doc() = "Compiled part of mpm_core: arrays in, arrays out. Use it through the package mpm_core.";
+  m.attr("version") = TALUS_VERSION;
+  m.attr("compiler") = __VERSION__;
+  pybind11::register_exception<mpm::InputError>(m, "InputError", PyExc_ValueError);
+  pybind11::register_exception<mpm::RunError>(m, "RunError", PyExc_RuntimeError);
+  mpm::python::bind_laws(m);
+  mpm::python::bind_models(m);
+  // mpm::python::bind_io(m);
+}

@@ -1,0 +1,25 @@
+"""Material point method for geomechanics: particles, constitutive laws, explicit and implicit steps.
+
+Conventions: SI units; tension positive; components ``xx yy zz xy`` in plane strain and ``xx yy zz xy yz xz`` in three
+dimensions; shear strain is engineering shear. Angles are in degrees where the name says ``angle``.
+"""
+
+from ._core import InputError, LinearElastic, MohrCoulomb, RunError, StressUpdate
+from ._core import compiler as compiler
+from ._core import version as __version__
+from .mesh import Mesh
+from .model import Model, Report
+from .particles import Particles
+
+__all__ = [
+    "InputError",
+    "LinearElastic",
+    "Mesh",
+    "Model",
+    "MohrCoulomb",
+    "Particles",
+    "Report",
+    "RunError",
+    "StressUpdate",
+    "__version__",
+]

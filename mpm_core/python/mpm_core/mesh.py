@@ -1,0 +1,146 @@
+"""The background mesh."""
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._core import InputError
+from .collective import collectively
+
+
+def _integers(name: str, values: ArrayLike, dtype: type, width: int | None) -> NDArray:
+    """Values as whole numbers of the given type, (n,) or (n, width)."""
+    array = np.asarray(values)
+    if array.size == 0:
+        array = np.zeros((0,) if width is None else (0, width), dtype=dtype)
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InputError(f"{name} has dtype {array.dtype}, expected whole numbers")
+    if array.ndim != (1 if width is None else 2) or (width is not None and array.shape[1] != width):
+        raise InputError(f"{name} has shape {array.shape}, expected {'(n,)' if width is None else f'(n, {width})'}")
+    return np.ascontiguousarray(array, dtype=dtype)
+
+
+def floats(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Values as finite float64 numbers in the given shape (None: any length).
+
+    Raises:
+        InputError: other dtype, shape, or a value that is not finite.
+    """
+    array = np.asarray(values)
+    if not (np.issubdtype(array.dtype, np.floating) or np.issubdtype(array.dtype, np.integer)):
+        raise InputError(f"{name} has dtype {array.dtype}, expected real numbers")
+    if array.ndim != len(shape) or any(e is not None and e != s for e, s in zip(shape, array.shape, strict=True)):
+        expected = tuple("n" if e is None else e for e in shape)
+        raise InputError(f"{name} has shape {array.shape}, expected {expected}".replace("'", ""))
+    array = np.ascontiguousarray(array, dtype=np.float64)
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name} is {array[where]} at index {where}, expected finite numbers")
+    return array
+
+
+class Mesh:
+    """Background mesh of triangles (plane strain) or tetrahedra, given by arrays.
+
+    Each rank gives the cells that it owns, then its ghost cells (those that share a facet with an owned one).
+
+    Args:
+        points: node coordinates [m], shape (nodes, D) with D = 2 or 3.
+        cells: node numbers of each cell, shape (cells, D + 1); any orientation.
+        cell_tags: tag of each cell, shape (cells,); 0 everywhere by default.
+        facets: node numbers of each tagged facet, shape (facets, D).
+        facet_tags: tag of each of them, shape (facets,).
+        global_nodes: number of each node over all ranks, shape (nodes,).
+        global_cells: number of each cell over all ranks, shape (cells,).
+        cell_owners: rank that owns each cell, shape (cells,).
+        comm: the ranks that share the mesh.
+
+    Raises:
+        InputError: wrong shape, dtype or number; a cell without area or volume; overlapping (inverted) cells; a tagged
+            facet that is no facet of a cell. Raised on every rank alike.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        cells: ArrayLike,
+        *,
+        cell_tags: ArrayLike = (),
+        facets: ArrayLike = (),
+        facet_tags: ArrayLike = (),
+        global_nodes: ArrayLike = (),
+        global_cells: ArrayLike = (),
+        cell_owners: ArrayLike = (),
+        comm: MPI.Comm = MPI.COMM_SELF,
+    ) -> None:
+        self.comm = comm
+
+        def build():
+            array = np.asarray(points)
+            if array.ndim != 2 or array.shape[1] not in (2, 3):
+                raise InputError(f"points has shape {array.shape}, expected (n, 2) or (n, 3)")
+            dim = array.shape[1]
+            node_numbers = np.asarray(cells)
+            if node_numbers.ndim == 2 and node_numbers.size and node_numbers.shape[1] != dim + 1:
+                kind = "triangles, 3" if dim == 2 else "tetrahedra, 4"
+                raise InputError(f"cells has {node_numbers.shape[1]} nodes per cell, expected {kind} nodes each")
+            if comm.size > 1:
+                for name, given in (
+                    ("global_nodes", global_nodes),
+                    ("global_cells", global_cells),
+                    ("cell_owners", cell_owners),
+                ):
+                    if len(array) and not np.size(given):
+                        raise InputError(f"{name} is empty, expected on {comm.size} ranks")
+            core = (_core.Mesh2 if dim == 2 else _core.Mesh3)(
+                floats("points", array, (None, dim)),
+                _integers("cells", cells, np.int32, dim + 1),
+                _integers("cell_tags", cell_tags, np.int32, None),
+                _integers("facets", facets, np.int32, dim),
+                _integers("facet_tags", facet_tags, np.int32, None),
+                _integers("global_nodes", global_nodes, np.int64, None),
+                _integers("global_cells", global_cells, np.int64, None),
+                _integers("cell_owners", cell_owners, np.int32, None),
+                comm.rank,
+            )
+            return dim, array, core
+
+        self.dim, array, self._core = collectively(comm, build)
+        self.points: NDArray[np.float64] = np.array(array, dtype=np.float64)
+        """Node coordinates [m], shape (nodes, D)."""
+        self.cells: NDArray[np.int32] = np.array(cells, dtype=np.int32).reshape(-1, self.dim + 1)
+        """Node numbers of each cell, shape (cells, D + 1); owned cells first."""
+        self.cell_tags: NDArray[np.int32] = self._core.cell_tags
+        self.facets: NDArray[np.int32] = np.array(facets, dtype=np.int32).reshape(-1, self.dim)
+        self._tags = {
+            "cell": set().union(*comm.allgather(set(self.cell_tags.tolist()))),
+            "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
+        }
+
+    @property
+    def owned_cells(self) -> int:
+        """Number of cells that this rank owns; they come before its ghost cells."""
+        return self._core.owned_cells
+
+    @property
+    def cell_volumes(self) -> NDArray[np.float64]:
+        """Area (D = 2) or volume (D = 3) of each cell [m^D], shape (cells,)."""
+        return self._core.volumes()
+
+    def cells_of(self, points: ArrayLike) -> NDArray[np.int32]:
+        """Number of the cell on this rank that holds each point, -1 where none does; shape (n,)."""
+        return self._core.cells_of(floats("points", points, (None, self.dim)))
+
+    def require_tag(self, kind: str, tag: int) -> int:
+        """The tag, where cells or facets (``kind``) with it exist on any rank.
+
+        Raises:
+            InputError: there are none; the message lists the tags that there are.
+        """
+        if tag not in self._tags[kind]:
+            raise InputError(f"{kind}_tag is {tag}, which the mesh does not have; it has {sorted(self._tags[kind])}")
+        return int(tag)

@@ -1,0 +1,294 @@
+"""A model: background mesh, particles, laws, loads and supports; and the explicit scheme over it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike
+
+from . import _core
+from ._core import InputError, StressUpdate
+from .collective import collectively
+from .mesh import Mesh, floats
+from .particles import Particles
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where a run stands; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
+
+    time: float
+    """Time [s]"""
+    steps: int
+    """Steps since the model was made"""
+    dt: float
+    """Length of the last step [s]"""
+    particles: int
+    mass: float
+    """[kg]"""
+    momentum: tuple[float, ...]
+    """[kg m/s]"""
+    kinetic_energy: float
+    external_work: float
+    """Work of gravity and tractions since the model was made"""
+    internal_work: float
+    """Work of the stresses"""
+    damping_work: float
+    """Energy taken out by local damping"""
+    support_work: float
+    """Work of prescribed velocities"""
+    plastic_share: float
+    """Share of the particles that yielded in the last step"""
+    unbalanced_ratio: float
+    """Out-of-balance over external force in the last step, Euclidean norms over the nodes"""
+    outflow_particles: int
+    """Particles that left through outflow facets"""
+    outflow_mass: float
+    particle_steps: int
+    """Sum over steps of the number of particles"""
+
+
+def _positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
+    if not (np.isfinite(value) and (value >= 0 if zero else value > 0)):
+        raise InputError(f"{name} is {value} {unit}, expected a {'number not below zero' if zero else 'positive number'}")
+    return float(value)
+
+
+def _within(name: str, value: float, low: float, high: float, *, open_above: bool = False) -> float:
+    if not (low <= value < high or (value == high and not open_above)):
+        raise InputError(f"{name} is {value}, expected {low} <= {name} {'<' if open_above else '<='} {high}")
+    return float(value)
+
+
+class Model:
+    """Soil as particles on a background mesh.
+
+    Args:
+        mesh: the background mesh.
+        laws: one constitutive law, or several that seeding chooses by number.
+
+    Raises:
+        InputError: no law, or something that is none.
+
+    Note:
+        Collective, as all methods are unless they say otherwise.
+    """
+
+    def __init__(self, mesh: Mesh, laws: Any | Sequence[Any]) -> None:
+        self.mesh = mesh
+        self.comm: MPI.Comm = mesh.comm
+        self.laws = list(laws) if isinstance(laws, (list, tuple)) else [laws]
+        for law in self.laws:
+            if not isinstance(law, (_core.LinearElastic, _core.MohrCoulomb)):
+                raise InputError(f"laws has {law!r}, expected constitutive laws such as MohrCoulomb(...)")
+        if not self.laws:
+            raise InputError("laws is empty, expected at least one constitutive law")
+        core_type = _core.Model2 if mesh.dim == 2 else _core.Model3
+        self._core = core_type(mesh._core, self.laws, MPI._addressof(self.comm))
+        self._wishes: list[tuple[int, bool, list[float]]] = []
+        self._next_id = 0
+        self.particles = Particles(self._core, mesh.dim)
+        """The particles on this rank."""
+
+    # --- particles -----------------------------------------------------------------------------------------------
+
+    def _seeded(self, added: int, ids: int) -> int:
+        self._next_id += ids
+        return self.comm.allreduce(added)
+
+    def _material(self, material: int) -> int:
+        if not 0 <= material < len(self.laws):
+            raise InputError(f"material is {material}, expected 0 to {len(self.laws) - 1}, the number of a law")
+        return material
+
+    def seed(self, *, density: float, per_cell: int = 10, cell_tag: int | None = None, material: int = 0) -> int:
+        """Place particles evenly in cells, each with the same share of its cell's volume.
+
+        Args:
+            density: [kg/m3].
+            per_cell: particles per cell: 1, 3, 4, 6, 10, 12, ... in a triangle; 1, 4, 8, 10, ... in a tetrahedron.
+            cell_tag: cells with this tag; all cells by default.
+            material: number of their law.
+
+        Returns:
+            Number of particles placed, over all ranks.
+
+        Raises:
+            InputError: a density that is not positive, a number that does not fill a cell evenly, an unknown tag or law.
+        """
+        if cell_tag is not None:
+            self.mesh.require_tag("cell", cell_tag)
+        density = _positive("density", density, "kg/m3")
+        if isinstance(per_cell, bool) or int(per_cell) != per_cell:
+            raise InputError(f"per_cell is {per_cell}, expected a whole number")
+        material = self._material(material)
+        cells = self.comm.allreduce(int(np.max(self.mesh.cells.shape[0], initial=0)))
+        added = collectively(
+            self.comm, lambda: self._core.seed_cells(cell_tag, int(per_cell), material, density, self._next_id)
+        )
+        return self._seeded(added, cells * int(per_cell))
+
+    def seed_points(self, points: ArrayLike, volumes: ArrayLike, *, density: float, material: int = 0) -> int:
+        """Place one particle at each given point. Every rank gives the same points.
+
+        Args:
+            points: [m], shape (n, D).
+            volumes: [m^D], shape (n,), positive.
+            density: [kg/m3].
+            material: number of their law.
+
+        Returns:
+            Number of particles placed, over all ranks.
+
+        Raises:
+            InputError: wrong shape, a point outside of the mesh, a volume or density that is not positive.
+        """
+
+        def place() -> int:
+            x = floats("points", points, (None, self.mesh.dim))
+            v = floats("volumes", volumes, (len(x),))
+            if (v <= 0).any():
+                raise InputError(f"volumes is {v.min()} m^{self.mesh.dim} at least, expected positive numbers")
+            rho = _positive("density", density, "kg/m3")
+            return self._core.seed_points(x, v, self._material(material), rho, self._next_id)
+
+        inside = collectively(self.comm, lambda: self._owned(points))
+        total = self.comm.allreduce(inside, MPI.MAX)
+        if not total.all():
+            first = int(np.argmin(total))
+            raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")
+        return self._seeded(collectively(self.comm, place), len(np.asarray(points)))
+
+    def _owned(self, points: ArrayLike) -> Any:
+        cells = self.mesh.cells_of(points)
+        return (cells >= 0) & (cells < self.mesh.owned_cells)
+
+    def traction(self, facet_tag: int, traction: ArrayLike) -> float:
+        """Load the particles next to the facets with a tag (15). The force moves with them and keeps its direction.
+
+        Args:
+            facet_tag: tag of the loaded facets.
+            traction: force per area [Pa], shape (D,).
+
+        Returns:
+            Area of the loaded facets [m^(D-1)] over all ranks.
+        """
+        self.mesh.require_tag("facet", facet_tag)
+        t = floats("traction", traction, (self.mesh.dim,))
+        area = self.comm.allreduce(self._core.load_facets(facet_tag, t.tolist()))
+        if area == 0:
+            raise InputError(f"facet_tag {facet_tag} has no filled cell behind it to carry the traction")
+        return area
+
+    # --- supports and loads --------------------------------------------------------------------------------------
+
+    def _support(self, facet_tag: int, whole: bool, vector: ArrayLike, name: str) -> None:
+        self.mesh.require_tag("facet", facet_tag)
+        wish = (facet_tag, whole, floats(name, vector, (self.mesh.dim,)).tolist())
+        collectively(self.comm, lambda: self._core.set_supports([*self._wishes, wish]))
+        self._wishes.append(wish)
+
+    def fix(self, facet_tag: int) -> None:
+        """Hold the nodes on facets with this tag."""
+        self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
+
+    def roller(self, facet_tag: int, normal: ArrayLike) -> None:
+        """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
+        self._support(facet_tag, False, normal, "normal")
+
+    def prescribe(self, facet_tag: int, velocity: ArrayLike) -> None:
+        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,)."""
+        self._support(facet_tag, True, velocity, "velocity")
+
+    def outflow(self, facet_tag: int) -> None:
+        """Let particles leave the mesh through facets with this tag; they are counted in the report."""
+        self._core.outflow_tags = [*self._core.outflow_tags, self.mesh.require_tag("facet", facet_tag)]
+
+    def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
+        """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
+        self._core.gravity = floats("gravity", gravity, (self.mesh.dim,)).tolist()
+        self._core.gravity_ramp = _positive("ramp", ramp, "s", zero=True)
+
+    # --- runs ----------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._core.time
+
+    def critical_time_step(self) -> float:
+        """Critical time step (16): smallest h_min / c_d over the particles [s]."""
+        return self._core.critical_time_step()
+
+    def report(self) -> Report:
+        """Where the run stands."""
+        values = self._core.diagnostics()
+        values["momentum"] = tuple(values["momentum"][: self.mesh.dim])
+        values["particle_steps"] = int(values["particle_steps"])
+        return Report(time=self.time, steps=self._core.steps, dt=self._core.last_dt, **values)
+
+    def nodal(self, name: str) -> Any:
+        """A copy of a nodal field of the last step: velocity, acceleration, internal_force (nodes, D) or mass (nodes,)."""
+        return self._core.nodal(name)
+
+    def explicit(
+        self,
+        until: float,
+        *,
+        every: float | None = None,
+        dt: float | None = None,
+        courant: float = 0.5,
+        damping: float = 0.0,
+        pic: float = 0.0,
+        nmd: bool = False,
+        stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
+        allow_unstable: bool = False,
+    ) -> Iterator[Report]:
+        """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
+
+        Args:
+            until: time to reach [s].
+            every: time between reports [s]; by default only at the end.
+            dt: time step [s]; by default ``courant`` times the critical one, which is found anew as the soil changes.
+            courant: alpha_c of (17), in (0, 1].
+            damping: local damping alpha, in [0, 1).
+            pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
+            nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
+            allow_unstable: take ``dt`` even above the critical time step.
+
+        Raises:
+            InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
+            RunError: a particle left the mesh, a value is not finite, a law failed; with the place.
+        """
+        options = _core.ExplicitOptions()
+        options.damping = _within("damping", damping, 0, 1, open_above=True)
+        options.pic_share = _within("pic", pic, 0, 1)
+        options.mixed_discretisation = bool(nmd)
+        options.stress_update = stress_update
+        run = _core.RunOptions()
+        run.dt = None if dt is None else _positive("dt", dt, "s")
+        if not 0 < courant <= 1:
+            raise InputError(f"courant is {courant}, expected 0 < courant <= 1")
+        run.courant = courant
+        run.allow_unstable = bool(allow_unstable)
+        if not (np.isfinite(until) and until >= self.time):
+            raise InputError(f"until is {until} s, expected a time not before the present, {self.time} s")
+        interval = until - self.time if every is None else _positive("every", every, "s")
+        if self.comm.allreduce(len(self.particles)) == 0:
+            raise InputError("the model has no particles, seed some first")
+        return self._run_explicit(options, run, until, interval)
+
+    def _run_explicit(self, options: Any, run: Any, until: float, interval: float) -> Iterator[Report]:
+        start = self.time
+        count = max(1, int(np.ceil((until - start) / interval - 1e-9))) if until > start else 0
+        # Python must get its turn now and then, for Ctrl-C.
+        most = max(1, self.comm.allreduce(len(self.particles), MPI.MAX))
+        run.max_steps = max(1, 2_000_000 // most // _core.control_interval) * _core.control_interval
+        for k in range(1, count + 1):
+            run.until = until if k == count else start + k * interval
+            while self.time < run.until:
+                self._core.run_explicit(options, run)
+            yield self.report()

@@ -1,0 +1,211 @@
+#include "steps/explicit.h"
+
+#include "steps/particle_pass.h"
+#include "transfer/kinematics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace mpm
+{
+namespace
+{
+/// m_i, momentum, f_int and tractions at nodes, summed over ranks; and v_i at the start with supports.
+template <int D>
+void map_to_nodes(Model<D>& model)
+{
+  Workspace<D>& work = model.work;
+  scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
+  sum_shared(model.exchange, &work.nodes.data()->mass, node_sums_width<D>);
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+    for (int a = 0; a < D; ++a)
+      work.start_velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
+  for (const Support<D>& support : model.supports)
+    impose<D>(support, work.start_velocity[support.node]);
+}
+
+/// a_i = (f_ext - f_int - D)_i / m_i, with supports; D_i = alpha |R_i| sign(v_i) per component, R = f_ext - f_int.
+template <int D>
+void solve_momentum(Model<D>& model, double damping, double dt)
+{
+  Workspace<D>& work = model.work;
+  const Vector<D> gravity = current_gravity(model);
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  {
+    const NodeSums<D>& node = work.nodes[i];
+    for (int a = 0; a < D; ++a)
+    {
+      const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
+      const double v = work.start_velocity[i][a];
+      const double drag = v == 0 ? 0 : std::copysign(damping * std::abs(residual), v);
+      work.acceleration[i][a] = node.mass > work.least_mass ? (residual - drag) / node.mass : 0;
+    }
+  }
+  for (const Support<D>& support : model.supports)
+  {
+    const Vector<D>& start = work.start_velocity[support.node];
+    Vector<D>& acceleration = work.acceleration[support.node];
+    Vector<D> end;
+    for (int a = 0; a < D; ++a)
+      end[a] = start[a] + dt * acceleration[a];
+    impose<D>(support, end);
+    for (int a = 0; a < D; ++a)
+      acceleration[a] = (end[a] - start[a]) / dt;
+  }
+}
+
+/// v_i at the end of the step. MUSL maps the new velocities of the particles back (19); the moments tell what they are.
+template <int D>
+void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double dt)
+{
+  Workspace<D>& work = model.work;
+  if (options.stress_update != StressUpdate::modified_last)
+  {
+    for (std::size_t i = 0; i < work.nodes.size(); ++i)
+      for (int a = 0; a < D; ++a)
+        work.velocity[i][a] = work.start_velocity[i][a] + dt * work.acceleration[i][a];
+    return;
+  }
+  const double pic = options.pic_share;
+  const auto acceleration = [&](Index i) -> const Vector<D>& { return work.acceleration[i]; };
+  const auto start_velocity = [&](Index i) -> const Vector<D>& { return work.start_velocity[i]; };
+  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  {
+    CellMoments<D>& moments = work.moments[c];
+    if (moments.mass == 0)
+      continue;
+    if (pic > 0)
+    {
+      for (int a = 0; a < D; ++a)
+      {
+        moments.momentum[a] *= 1 - pic;
+        for (int b = 0; b < D; ++b)
+          moments.momentum_xi[a][b] *= 1 - pic;
+      }
+      add_momentum<D>(moments, affine_field<D>(model.mesh, c, start_velocity), pic);
+    }
+    add_momentum<D>(moments, affine_field<D>(model.mesh, c, acceleration), dt);
+  }
+  scatter_momentum<D>(model.mesh, work.moments, work.velocity);
+  sum_shared(model.exchange, work.velocity.data()->data(), D);
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+    for (int a = 0; a < D; ++a)
+      work.velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.velocity[i][a] / work.nodes[i].mass : 0;
+  for (const Support<D>& support : model.supports)
+    impose<D>(support, work.velocity[support.node]);
+}
+
+/// Volumetric strains of the cells, averaged over nodes (nodal mixed discretisation).
+template <int D>
+void average_strains(Model<D>& model, double dt)
+{
+  Workspace<D>& work = model.work;
+  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
+  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  {
+    work.cell_volume[c] = work.moments[c].volume;
+    if (work.cell_volume[c] == 0)
+      continue;
+    const auto gradient = affine_field<D>(model.mesh, c, velocity).gradient;
+    work.volumetric_strain[c] = 0;
+    for (int a = 0; a < D; ++a)
+      work.volumetric_strain[c] += dt * gradient[a][a];
+  }
+  average_volumetric_strain<D>(model.mesh, work.cell_volume, model.exchange, work.volumetric_sums,
+                               work.volumetric_strain);
+}
+
+/// Work done in the step and the out-of-balance force. Forces act at the step's start, so their displacement is the mean
+/// of the one before and the one after: the energy balance of the leap-frog scheme.
+template <int D>
+void tally(Model<D>& model, double damping, double dt)
+{
+  Workspace<D>& work = model.work;
+  const Vector<D> gravity = current_gravity(model);
+  model.last.dt = dt;
+  model.last.unbalanced_squared = model.last.external_squared = 0;
+  std::size_t s = 0;
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  {
+    const NodeSums<D>& node = work.nodes[i];
+    while (s < model.supports.size() && static_cast<std::size_t>(model.supports[s].node) < i)
+      ++s;
+    if (!model.exchange.owned[i] || !(node.mass > work.least_mass))
+      continue;
+    Vector<D> unbalanced;
+    const Vector<D>& start = work.start_velocity[i];
+    for (int a = 0; a < D; ++a)
+    {
+      const double external = node.traction[a] + node.mass * gravity[a];
+      const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
+      unbalanced[a] = external - node.internal[a];
+      const double drag = start[a] == 0 ? 0 : std::copysign(damping * std::abs(unbalanced[a]), start[a]);
+      model.totals.external_work += external * u;
+      model.totals.internal_work += node.internal[a] * u;
+      model.totals.damping_work += drag * u;
+      model.totals.support_work += (node.mass * work.acceleration[i][a] - unbalanced[a] + drag) * u;
+      model.last.external_squared += external * external;
+    }
+    if (s < model.supports.size() && static_cast<std::size_t>(model.supports[s].node) == i)
+    {
+      Support<D> fixed = model.supports[s];
+      fixed.value.fill(0);
+      impose<D>(fixed, unbalanced);
+    }
+    model.last.unbalanced_squared += dot<D>(unbalanced, unbalanced);
+  }
+}
+} // namespace
+
+template <int D>
+void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
+{
+  Workspace<D>& work = model.work;
+  const bool first = options.stress_update == StressUpdate::first;
+  map_to_nodes(model); // (11), (14), (15)
+  if (first)
+  {
+    work.velocity = work.start_velocity;
+    if (options.mixed_discretisation)
+      average_strains(model, dt);
+    particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation});
+    map_to_nodes(model);
+  }
+  solve_momentum(model, options.damping, dt);
+  find_end_velocity(model, options, dt); // (19)
+  tally(model, options.damping, dt);
+  if (options.mixed_discretisation && !first)
+    average_strains(model, dt);
+  particle_pass<D>(model, {dt, true, !first, options.pic_share, options.mixed_discretisation}); // (18), (20), stresses
+  agree_on_trouble(model);
+  if (work.trouble)
+    return;
+  settle_particles(model);
+  model.time += dt;
+  ++model.totals.steps;
+  model.totals.particle_steps += model.particles.size();
+}
+
+template <int D>
+double critical_time_step(const Model<D>& model)
+{
+  double squared = std::numeric_limits<double>::infinity();
+  for (const Run& run : model.work.runs)
+  {
+    const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
+    double density = std::numeric_limits<double>::infinity();
+    for (Index p = run.first; p < run.last; ++p)
+      density = std::min(density, model.particles.mass[p] / model.particles.volume[p]);
+    squared = std::min(squared, h * h * density / p_wave_modulus(model.laws[run.material]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
+  return std::sqrt(squared);
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template void explicit_step(Model<D>&, const ExplicitOptions&, double);                                              \
+  template double critical_time_step(const Model<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

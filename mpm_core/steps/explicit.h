@@ -1,0 +1,36 @@
+#pragma once
+/// @file
+/// The explicit scheme, section 3 of the paper.
+
+#include "steps/model.h"
+
+namespace mpm
+{
+/// When stresses are updated, and with which velocities.
+enum class StressUpdate
+{
+  modified_last, ///< MUSL: last, with velocities mapped back from the moved particles (19)
+  last,          ///< USL: last, with v_i + dt a_i
+  first          ///< USF: before the momentum equation, with the velocities at the step's start
+};
+
+struct ExplicitOptions
+{
+  StressUpdate stress_update = StressUpdate::modified_last;
+  double damping = 0;         ///< local damping alpha of FLAC, in [0, 1)
+  double pic_share = 0;       ///< in [0, 1]
+  bool mixed_discretisation = false;
+};
+
+/// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.
+/// @pre prepare(model) has been called
+/// @post work.trouble is set on every rank when it is on any; the step is then not whole
+/// @note Collective
+template <int D>
+void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
+
+/// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
+/// @note Collective
+template <int D>
+double critical_time_step(const Model<D>& model);
+} // namespace mpm

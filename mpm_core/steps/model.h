@@ -1,0 +1,125 @@
+#pragma once
+/// @file
+/// All that a run consists of, as plain data: mesh, particles, laws, loads, supports, and the room that steps work in.
+
+#include "materials/law.h"
+#include "parallel/migration.h"
+#include "transfer/mixed_discretisation.h"
+#include "transfer/nodes.h"
+#include "transfer/supports.h"
+
+#include <optional>
+
+namespace mpm
+{
+/// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
+inline constexpr Index batch_size = 256;
+
+/// What stops a run, with its place.
+template <int D>
+struct Trouble
+{
+  enum class Kind
+  {
+    left_mesh,
+    not_finite,
+    law_failed
+  };
+  Kind kind;
+  GlobalIndex particle;
+  Vector<D> position;
+  Vector<D> velocity;
+  SymTensor<D> strain_increment;
+};
+
+/// Sums over this rank since the model was made. Energies in J (J/m in plane strain).
+struct Totals
+{
+  std::int64_t steps = 0;
+  std::int64_t particle_steps = 0;
+  std::int64_t sorts = 0;
+  std::int64_t outflow_particles = 0;
+  double outflow_mass = 0;
+  double external_work = 0; ///< of gravity and tractions
+  double internal_work = 0; ///< of stresses
+  double damping_work = 0;  ///< taken out by local damping
+  double support_work = 0;  ///< of prescribed velocities
+};
+
+/// Sums over this rank in the last step.
+struct LastStep
+{
+  double dt = 0;
+  std::int64_t plastic = 0;       ///< particles that yielded
+  double unbalanced_squared = 0;  ///< |f_ext - f_int|^2 over unsupported directions [N^2]
+  double external_squared = 0;    ///< |f_ext|^2 [N^2]
+};
+
+/// Room that steps work in; valid between steps only as far as said.
+template <int D>
+struct Workspace
+{
+  bool ready = false;                        ///< runs and moments agree with the particles
+  std::vector<Run> runs;                     ///< of the particles as they are now
+  std::vector<CellMoments<D>> moments;       ///< of the particles as they are now
+  std::vector<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
+  std::vector<NodeSums<D>> nodes;
+  std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;       ///< a_i
+  std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
+  std::vector<double> cell_volume;           ///< filled volume, at the step's start
+  std::vector<double> volumetric_strain;     ///< theta_c, averaged; used with nodal mixed discretisation
+  VolumetricSums volumetric_sums;
+  std::vector<Leaver> leavers;
+  std::vector<Index> outflow;
+  std::unordered_map<GlobalIndex, Index> owned_cells;
+  std::optional<Trouble<D>> trouble;
+  double least_mass = 0;                     ///< nodes below this mass are not moved [kg]
+  std::int64_t last_sort = 0;
+  Index strays = 0;                          ///< particles that changed cell since the last sort
+};
+
+template <int D>
+struct Model
+{
+  Mesh<D> mesh;
+  NodeExchange exchange;
+  Particles<D> particles;
+  std::vector<Law> laws;
+  std::vector<Support<D>> supports;
+  std::vector<Index> outflow_tags;
+  Vector<D> gravity{};     ///< [m/s2]
+  double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
+  double time = 0;         ///< [s]
+  Totals totals;
+  LastStep last;
+  Workspace<D> work;
+};
+
+/// Gravity at the model's time, with its ramp.
+template <int D>
+inline Vector<D> current_gravity(const Model<D>& model)
+{
+  Vector<D> g = model.gravity;
+  if (model.time < model.gravity_ramp)
+    for (double& component : g)
+      component *= model.time / model.gravity_ramp;
+  return g;
+}
+
+/// Sorts the particles, and gathers runs and moments; needed after anything but a step has changed the particles.
+/// Does nothing when they are up to date.
+/// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive
+/// @note Collective
+template <int D>
+void prepare(Model<D>& model);
+
+/// Makes `work.trouble` known to all ranks: that of the lowest rank that has one.
+/// @note Collective
+template <int D>
+void agree_on_trouble(Model<D>& model);
+
+/// Puts the particles back in cell order and finds their runs.
+template <int D>
+void sort_particles(Model<D>& model);
+} // namespace mpm

@@ -1,0 +1,210 @@
+#include "steps/particle_pass.h"
+
+#include "mesh/search.h"
+#include "transfer/kinematics.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+namespace
+{
+/// Consecutive runs of one material, at most `batch_size` particles: what a law is given at once.
+struct Batch
+{
+  std::size_t first_run, last_run;
+  Index first, last;
+  Index material;
+};
+
+Batch next_batch(const std::vector<Run>& runs, std::size_t first_run)
+{
+  Batch batch{first_run, first_run + 1, runs[first_run].first, runs[first_run].last, runs[first_run].material};
+  while (batch.last_run < runs.size() && runs[batch.last_run].material == batch.material &&
+         runs[batch.last_run].last - batch.first <= batch_size)
+    batch.last = runs[batch.last_run++].last;
+  return batch;
+}
+
+template <int D>
+void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index p, const SymTensor<D>& strain_increment)
+{
+  if (!model.work.trouble)
+    model.work.trouble = Trouble<D>{kind, model.particles.id[p], at<D>(model.particles.position, p),
+                                    at<D>(model.particles.velocity, p), strain_increment};
+}
+
+/// Strain increments of a batch, one column per component.
+template <int D>
+struct StrainScratch
+{
+  alignas(64) double column[n_stress<D>][batch_size];
+};
+
+template <int D>
+void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, StrainScratch<D>& scratch)
+{
+  Particles<D>& particles = model.particles;
+  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Run& run = model.work.runs[r];
+    const auto gradient = affine_field<D>(model.mesh, run.cell, velocity).gradient;
+    CellStrain<D> strain = strain_increment<D>(gradient, options.dt);
+    if (options.averaged)
+      set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+    for (int k = 0; k < n_stress<D>; ++k)
+      std::fill(scratch.column[k] + (run.first - batch.first), scratch.column[k] + (run.last - batch.first),
+                strain.increment[k]);
+    strain_particles<D>(particles, run.first, run.last, strain);
+  }
+
+  PointBatch<D> points;
+  points.size = batch.last - batch.first;
+  for (int k = 0; k < n_stress<D>; ++k)
+  {
+    points.strain_increment[k] = scratch.column[k];
+    points.stress[k] = particles.stress[k].data() + batch.first;
+  }
+  std::array<double*, 16> state;
+  for (std::size_t k = 0; k < particles.state.size(); ++k)
+    state[k] = particles.state[k].data() + batch.first;
+  points.state = state.data();
+  const BatchReport report = update<D>(model.laws[batch.material], points);
+  model.last.plastic += report.plastic;
+  if (report.failed > 0)
+  {
+    SymTensor<D> increment;
+    for (int k = 0; k < n_stress<D>; ++k)
+      increment[k] = scratch.column[k][report.first_failed];
+    note_trouble(model, Trouble<D>::Kind::law_failed, batch.first + report.first_failed, increment);
+  }
+}
+
+/// The new cell of a particle that is no longer in its old one; `none` when it is not to be gathered.
+template <int D>
+Index new_cell(Model<D>& model, Index p)
+{
+  Workspace<D>& work = model.work;
+  const Location found = find_cell<D>(model.mesh, at<D>(model.particles.position, p), model.particles.cell[p]);
+  if (found.cell != none && found.cell < model.mesh.owned_cells)
+    return found.cell;
+  if (found.cell != none)
+  {
+    work.leavers.push_back({p, found.cell});
+    return none;
+  }
+  const auto& tags = model.outflow_tags;
+  if (found.exit_cell == none)
+    note_trouble(model, Trouble<D>::Kind::not_finite, p, {});
+  else if (std::find(tags.begin(), tags.end(), model.mesh.facet_tags[found.exit_cell][found.exit_facet]) != tags.end())
+    work.outflow.push_back(p);
+  else
+    note_trouble(model, Trouble<D>::Kind::left_mesh, p, {});
+  return none;
+}
+
+template <int D>
+void gather_run(Model<D>& model, Index first, Index last, Index cell)
+{
+  gather<D>(model.particles, first, last, model.mesh.shapes[cell], model.work.moments[cell]);
+  if (!model.work.tractions.empty())
+    gather<D>(model.particles, first, last, model.mesh.shapes[cell], model.work.tractions[cell]);
+}
+
+/// Finds the cells of a run in which some particle left the run's cell, and gathers them piece by piece.
+template <int D>
+void gather_scattered(Model<D>& model, const Run& run)
+{
+  Index piece = run.first, piece_cell = none;
+  auto close = [&](Index p)
+  {
+    if (piece_cell != none && p > piece)
+      gather_run<D>(model, piece, p, piece_cell);
+  };
+  for (Index p = run.first; p < run.last; ++p)
+  {
+    const Index cell = new_cell(model, p);
+    if (cell != none && cell != model.particles.cell[p])
+    {
+      model.particles.cell[p] = cell;
+      ++model.work.strays;
+    }
+    if (cell != piece_cell)
+    {
+      close(p);
+      piece = p;
+      piece_cell = cell;
+    }
+  }
+  close(run.last);
+}
+} // namespace
+
+template <int D>
+void particle_pass(Model<D>& model, const PassOptions& options)
+{
+  Workspace<D>& work = model.work;
+  std::fill(work.moments.begin(), work.moments.end(), CellMoments<D>{});
+  std::fill(work.tractions.begin(), work.tractions.end(), TractionMoments<D>{});
+  if (options.stress)
+    model.last.plastic = 0;
+  const Index strays_before = work.strays;
+  const NodalMotion<D> motion{model.mesh, work.start_velocity, work.acceleration, work.velocity};
+  std::array<bool, batch_size> scattered;
+  StrainScratch<D> scratch;
+
+  for (std::size_t r = 0; r < work.runs.size();)
+  {
+    const Batch batch = next_batch(work.runs, r);
+    if (options.move)
+      for (r = batch.first_run; r < batch.last_run; ++r)
+      {
+        const Run& run = work.runs[r];
+        scattered[r - batch.first_run] =
+            move_particles<D>(model.particles, run, motion, options.dt, options.pic_share) > 0;
+      }
+    if (options.stress)
+      update_stress<D>(model, options, batch, scratch);
+    for (r = batch.first_run; r < batch.last_run; ++r)
+    {
+      const Run& run = work.runs[r];
+      if (options.move && scattered[r - batch.first_run])
+        gather_scattered<D>(model, run);
+      else
+        gather_run<D>(model, run.first, run.last, run.cell);
+    }
+  }
+  if (work.strays != strays_before && work.leavers.empty() && work.outflow.empty())
+    find_runs<D>(model.particles, batch_size, work.runs);
+}
+
+template <int D>
+void settle_particles(Model<D>& model)
+{
+  Workspace<D>& work = model.work;
+  const bool gone = !work.leavers.empty() || !work.outflow.empty();
+  for (Index p : work.outflow)
+    model.totals.outflow_mass += model.particles.mass[p];
+  model.totals.outflow_particles += static_cast<std::int64_t>(work.outflow.size());
+  const Index arrived =
+      migrate<D>(model.mesh, work.owned_cells, model.exchange, work.leavers, work.outflow, model.particles);
+  work.leavers.clear();
+  work.outflow.clear();
+  for (Index p = model.particles.size() - arrived; p < model.particles.size(); ++p)
+    gather_run<D>(model, p, p + 1, model.particles.cell[p]);
+  work.strays += arrived;
+
+  // Strays cut the runs of two cells; sorting costs about two steps, so it waits until a tenth of the particles strayed.
+  if (work.strays > model.particles.size() / 10 && model.totals.steps - work.last_sort > 50)
+    sort_particles(model);
+  else if (gone || arrived > 0)
+    find_runs<D>(model.particles, batch_size, work.runs);
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template void particle_pass(Model<D>&, const PassOptions&);                                                          \
+  template void settle_particles(Model<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

@@ -1,0 +1,122 @@
+#include "steps/run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace mpm
+{
+namespace
+{
+template <std::size_t N>
+std::string show(const std::array<double, N>& values)
+{
+  std::ostringstream out;
+  out.precision(6);
+  for (std::size_t i = 0; i < N; ++i)
+    out << (i ? ", " : "(") << values[i];
+  return out.str() + ")";
+}
+
+template <int D>
+[[noreturn]] void throw_trouble(const Model<D>& model)
+{
+  const Trouble<D>& trouble = *model.work.trouble;
+  std::ostringstream out;
+  out.precision(9);
+  out << "particle " << trouble.particle << " at " << show(trouble.position) << " m with velocity "
+      << show(trouble.velocity) << " m/s ";
+  switch (trouble.kind)
+  {
+  case Trouble<D>::Kind::left_mesh:
+    out << "left the background mesh; extend the mesh there or name the facets as outflow";
+    break;
+  case Trouble<D>::Kind::not_finite:
+    out << "has a position that is not a number; the step may be too large for the stiffness";
+    break;
+  case Trouble<D>::Kind::law_failed:
+    out << "has a law that failed for the strain increment " << show(trouble.strain_increment);
+    break;
+  }
+  out << " (in the step after t = " << model.time << " s)";
+  throw RunError(out.str());
+}
+
+template <int D>
+double next_step(const Model<D>& model, const RunOptions& run)
+{
+  const double critical = critical_time_step(model);
+  if (run.dt && *run.dt > critical * (1 + 1e-12) && !run.allow_unstable)
+  {
+    std::ostringstream out;
+    out.precision(6);
+    out << "dt is " << *run.dt << " s, above the critical time step " << critical << " s at t = " << model.time
+        << " s; take a smaller one or say allow_unstable";
+    throw InputError(out.str());
+  }
+  const double longest = run.dt.value_or(run.courant * critical);
+  const double left = run.until - model.time;
+  return left / std::max(1.0, std::ceil(left / longest - 1e-6));
+}
+} // namespace
+
+template <int D>
+std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run)
+{
+  prepare(model);
+  std::int64_t done = 0;
+  double dt = 0;
+  const double closeness = 1e-9 * std::abs(run.until);
+  while (run.until - model.time > closeness && (run.max_steps == 0 || done < run.max_steps))
+  {
+    if (done % control_interval == 0)
+      dt = next_step(model, run);
+    explicit_step(model, options, dt);
+    if (model.work.trouble)
+      throw_trouble(model);
+    ++done;
+  }
+  if (run.until - model.time <= closeness)
+    model.time = run.until;
+  return done;
+}
+
+template <int D>
+Diagnostics diagnostics(const Model<D>& model)
+{
+  const Particles<D>& particles = model.particles;
+  Diagnostics d{};
+  d.particles = particles.size();
+  for (Index p = 0; p < particles.size(); ++p)
+  {
+    const Vector<D> v = at<D>(particles.velocity, p);
+    d.mass += particles.mass[p];
+    for (int i = 0; i < D; ++i)
+      d.momentum[i] += particles.mass[p] * v[i];
+    d.kinetic_energy += 0.5 * particles.mass[p] * dot<D>(v, v);
+  }
+  d.external_work = model.totals.external_work;
+  d.internal_work = model.totals.internal_work;
+  d.damping_work = model.totals.damping_work;
+  d.support_work = model.totals.support_work;
+  d.outflow_particles = static_cast<double>(model.totals.outflow_particles);
+  d.outflow_mass = model.totals.outflow_mass;
+  d.particle_steps = static_cast<double>(model.totals.particle_steps);
+  d.plastic_share = static_cast<double>(model.last.plastic);
+  d.unbalanced_ratio = model.last.unbalanced_squared;
+  std::array<double, sizeof(Diagnostics) / sizeof(double) + 1> sums;
+  std::copy_n(&d.particles, sums.size() - 1, sums.begin());
+  sums.back() = model.last.external_squared;
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  std::copy_n(sums.begin(), sums.size() - 1, &d.particles);
+  d.plastic_share = d.particles > 0 ? d.plastic_share / d.particles : 0;
+  d.unbalanced_ratio = sums.back() > 0 ? std::sqrt(d.unbalanced_ratio / sums.back()) : 0;
+  return d;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template std::int64_t run_explicit(Model<D>&, const ExplicitOptions&, const RunOptions&);                            \
+  template Diagnostics diagnostics(const Model<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

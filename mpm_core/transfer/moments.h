@@ -1,0 +1,95 @@
+#pragma once
+/// @file
+/// Cell moments: all that the nodes need to know of the particles in a cell.
+///
+/// A linear shape function is affine inside a cell, so each nodal sum over the particles of a cell, such as
+/// sum m_p N_i(x_p), follows from a few moments of the particles about the cell's centre. They are gathered in one pass
+/// over the particles and scattered to nodes once per cell, instead of evaluating shape functions per particle and node.
+
+#include "mesh/mesh.h"
+#include "particles/particles.h"
+
+namespace mpm
+{
+/// Moments of the particles in one cell; xi is the position from the cell's centre.
+template <int D>
+struct CellMoments
+{
+  double volume;                                ///< sum V_p
+  double mass;                                  ///< sum m_p
+  Vector<D> mass_xi;                            ///< sum m_p xi
+  std::array<double, n_symmetric<D>> mass_xixi; ///< sum m_p xi (x) xi
+  Vector<D> momentum;                           ///< sum m_p v_p
+  Matrix<D> momentum_xi;                        ///< sum m_p v_p (x) xi; [component of v][component of xi]
+  std::array<double, n_symmetric<D>> stress;    ///< sum V_p sigma_p, without zz in plane strain
+};
+
+/// Moments of the tractions in one cell.
+template <int D>
+struct TractionMoments
+{
+  Vector<D> force;    ///< sum t_p
+  Matrix<D> force_xi; ///< sum t_p (x) xi
+};
+
+/// An affine vector field in a cell: value + gradient . xi
+template <int D>
+struct AffineField
+{
+  Vector<D> value;
+  Matrix<D> gradient;
+};
+
+/// The field that nodal values have inside a cell.
+/// @param nodal  value of node i, a callable Index -> const Vector<D>&
+template <int D, class Nodal>
+inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
+{
+  AffineField<D> field{};
+  for (int k = 0; k <= D; ++k)
+  {
+    const Vector<D>& u = nodal(mesh.cells[cell][k]);
+    for (int a = 0; a < D; ++a)
+    {
+      field.value[a] += u[a] / (D + 1);
+      for (int b = 0; b < D; ++b)
+        field.gradient[a][b] += u[a] * mesh.shapes[cell].gradient[k][b];
+    }
+  }
+  return field;
+}
+
+/// Adds the particles [first, last), all in this cell, to its moments.
+template <int D>
+void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<D>& moments);
+
+/// The same for the tractions they carry.
+template <int D>
+void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+            TractionMoments<D>& moments);
+
+/// Adds `factor * sum m_p f(x_p)` and its first moment to the momentum, for an affine field f. This is what the momentum
+/// becomes when each particle's velocity changes by f at its place, without visiting the particles.
+template <int D>
+inline void add_momentum(CellMoments<D>& moments, const AffineField<D>& f, double factor)
+{
+  for (int a = 0; a < D; ++a)
+  {
+    moments.momentum[a] += factor * (moments.mass * f.value[a] + dot<D>(f.gradient[a], moments.mass_xi));
+    for (int b = 0; b < D; ++b)
+    {
+      double sum = f.value[a] * moments.mass_xi[b];
+      for (int c = 0; c < D; ++c)
+        sum += f.gradient[a][c] * moments.mass_xixi[symmetric_index<D>(c, b)];
+      moments.momentum_xi[a][b] += factor * sum;
+    }
+  }
+}
+
+/// sum over particles of (scalar or vector) q_p N_k(x_p), from its zeroth and first moment
+template <int D>
+inline double at_vertex(double zeroth, const Vector<D>& first, const Vector<D>& gradient)
+{
+  return zeroth / (D + 1) + dot<D>(first, gradient);
+}
+} // namespace mpm

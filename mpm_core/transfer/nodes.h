@@ -1,0 +1,47 @@
+#pragma once
+/// @file
+/// From cell moments to nodal sums. Conservative: the sum over nodes equals the sum over particles.
+
+#include "transfer/moments.h"
+
+#include <span>
+
+namespace mpm
+{
+/// Nodal sums of one step; plain doubles, so that shared nodes are summed in one message.
+template <int D>
+struct NodeSums
+{
+  double mass;             ///< m_i (11)
+  Vector<D> momentum;      ///< sum m_p N_i v_p
+  Vector<D> internal;      ///< f_int,i (14)
+  Vector<D> traction;      ///< the part of f_ext,i (15) that boundary particles carry
+};
+template <int D>
+inline constexpr int node_sums_width = sizeof(NodeSums<D>) / sizeof(double);
+
+/// f_int of vertex k of a cell: B_k^T sum V_p sigma_p
+template <int D>
+inline Vector<D> internal_force(const CellMoments<D>& moments, const Vector<D>& gradient)
+{
+  Vector<D> force{};
+  for (int k = 0; k < n_symmetric<D>; ++k)
+  {
+    const auto [i, j] = symmetric_pairs<D>[k];
+    force[i] += moments.stress[k] * gradient[j];
+    if (i != j)
+      force[j] += moments.stress[k] * gradient[i];
+  }
+  return force;
+}
+
+/// Sums of mass, momentum, internal force and traction over this rank's cells.
+/// @param tractions  one per cell, or empty
+template <int D>
+void scatter(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<const TractionMoments<D>> tractions,
+             std::span<NodeSums<D>> nodes);
+
+/// Only the momentum, `sum m_p N_i v_p`, which (19) needs a second time.
+template <int D>
+void scatter_momentum(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<Vector<D>> momentum);
+} // namespace mpm

@@ -1,0 +1,49 @@
+#pragma once
+/// @file
+/// Supports: velocities prescribed at nodes, whole or along a direction.
+
+#include "parallel/node_exchange.h"
+
+#include <span>
+
+namespace mpm
+{
+/// What is prescribed at a node: v . direction[k] = value[k] for k < count. The directions are orthonormal.
+template <int D>
+struct Support
+{
+  Index node;
+  int count;
+  std::array<Vector<D>, D> direction;
+  std::array<double, D> value; ///< [m/s]
+};
+
+/// One wish of the user for all nodes on facets with a tag: v . normal = value, or the whole velocity.
+template <int D>
+struct SupportRequest
+{
+  Index facet_tag;
+  bool whole;      ///< true: `vector` is the prescribed velocity; false: v . vector = 0 (roller)
+  Vector<D> vector;
+};
+
+/// Merges the wishes into one support per node, sorted by node. Directions at a node are made orthonormal; a wish that
+/// follows from the others adds nothing.
+/// @throws InputError wishes that contradict each other at a node, a normal without length
+/// @note Collective
+template <int D>
+std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchange,
+                                      std::span<const SupportRequest<D>> requests);
+
+/// Makes v satisfy the support, changing it only along the supported directions.
+template <int D>
+inline void impose(const Support<D>& support, Vector<D>& v)
+{
+  for (int k = 0; k < support.count; ++k)
+  {
+    const double change = support.value[k] - dot<D>(support.direction[k], v);
+    for (int i = 0; i < D; ++i)
+      v[i] += change * support.direction[k][i];
+  }
+}
+} // namespace mpm
