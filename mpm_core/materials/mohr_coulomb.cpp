@@ -15,6 +15,9 @@ namespace
 {
 /// Points handled at a time: their work arrays stay in the first-level cache
 constexpr Index block_size = 256;
+/// Candidates are filled up to a multiple of this, so that no point is left to a scalar remainder of a vector loop:
+/// it would be slow, and might round differently, so that the result would depend on a point's neighbours
+constexpr std::size_t lanes = 8;
 
 template <class T>
 using Work = std::array<T, block_size>;
@@ -71,9 +74,12 @@ template <int D>
 void return_stresses(const Surface& surface, Candidates<D>& candidates)
 {
   const Surface m = surface; // a copy that no store can alias
-  const auto size = static_cast<std::size_t>(candidates.size);
+  const std::size_t padded = (static_cast<std::size_t>(candidates.size) + lanes - 1) / lanes * lanes;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    for (auto i = static_cast<std::size_t>(candidates.size); i < padded; ++i)
+      candidates.stress[k][i] = 0;
 #pragma GCC ivdep
-  for (std::size_t i = 0; i < size; ++i)
+  for (std::size_t i = 0; i < padded; ++i)
   {
     SymTensor<D> trial;
     for (std::size_t k = 0; k < n_stress<D>; ++k)
