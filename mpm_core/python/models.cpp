@@ -263,13 +263,25 @@ void bind_model(py::module_& m, const std::string& suffix)
              prepare(model);
              return critical_time_step(model);
            })
+      .def("out_of_balance",
+           [](M& model, const Vector<D>& gravity)
+           {
+             prepare(model);
+             map_to_nodes(model);
+             return out_of_balance<D>(model, gravity);
+           })
       .def("run_explicit",
            [](M& model, const ExplicitOptions& options, const RunOptions& run)
            {
              py::gil_scoped_release release;
              return run_explicit(model, options, run);
            })
-      .def("diagnostics", [](const M& model) { return as_dict(diagnostics(model)); })
+      .def("diagnostics",
+           [](M& model)
+           {
+             prepare(model);
+             return as_dict(diagnostics(model));
+           })
       .def("column", &column<D>)
       .def("set_column", &set_column<D>)
       .def("nodal", &nodal<D>)

@@ -11,13 +11,11 @@ namespace mpm
 {
 namespace
 {
-/// m_i, momentum, f_int and tractions at nodes, summed over ranks; and v_i at the start with supports.
+/// v_i at the start of the step, from the sums at nodes, with supports.
 template <int D>
-void map_to_nodes(Model<D>& model)
+void find_start_velocity(Model<D>& model)
 {
   Workspace<D>& work = model.work;
-  scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
-  sum_shared(model.exchange, &work.nodes.data()->mass, node_sums_width<D>);
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
     for (int a = 0; a < D; ++a)
       work.start_velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
@@ -116,7 +114,7 @@ void average_strains(Model<D>& model, double dt)
                                work.volumetric_strain);
 }
 
-/// Work done in the step and the out-of-balance force. Forces act at the step's start, so their displacement is the mean
+/// Work done in the step. Forces act at the step's start, so their displacement is the mean
 /// of the one before and the one after: the energy balance of the leap-frog scheme.
 template <int D>
 void tally(Model<D>& model, double damping, double dt)
@@ -124,36 +122,23 @@ void tally(Model<D>& model, double damping, double dt)
   Workspace<D>& work = model.work;
   const Vector<D> gravity = current_gravity(model);
   model.last.dt = dt;
-  model.last.unbalanced_squared = model.last.external_squared = 0;
-  std::size_t s = 0;
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
   {
     const NodeSums<D>& node = work.nodes[i];
-    while (s < model.supports.size() && static_cast<std::size_t>(model.supports[s].node) < i)
-      ++s;
     if (!model.exchange.owned[i] || !(node.mass > work.least_mass))
       continue;
-    Vector<D> unbalanced;
     const Vector<D>& start = work.start_velocity[i];
     for (int a = 0; a < D; ++a)
     {
       const double external = node.traction[a] + node.mass * gravity[a];
       const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
-      unbalanced[a] = external - node.internal[a];
-      const double drag = start[a] == 0 ? 0 : std::copysign(damping * std::abs(unbalanced[a]), start[a]);
+      const double residual = external - node.internal[a];
+      const double drag = start[a] == 0 ? 0 : std::copysign(damping * std::abs(residual), start[a]);
       model.totals.external_work += external * u;
       model.totals.internal_work += node.internal[a] * u;
       model.totals.damping_work += drag * u;
-      model.totals.support_work += (node.mass * work.acceleration[i][a] - unbalanced[a] + drag) * u;
-      model.last.external_squared += external * external;
+      model.totals.support_work += (node.mass * work.acceleration[i][a] - residual + drag) * u;
     }
-    if (s < model.supports.size() && static_cast<std::size_t>(model.supports[s].node) == i)
-    {
-      Support<D> fixed = model.supports[s];
-      fixed.value.fill(0);
-      impose<D>(fixed, unbalanced);
-    }
-    model.last.unbalanced_squared += dot<D>(unbalanced, unbalanced);
   }
 }
 } // namespace
@@ -164,13 +149,14 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
   Workspace<D>& work = model.work;
   const bool first = options.stress_update == StressUpdate::first;
   map_to_nodes(model); // (11), (14), (15)
+  find_start_velocity(model);
   if (first)
   {
     work.velocity = work.start_velocity;
     if (options.mixed_discretisation)
       average_strains(model, dt);
     particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation});
-    map_to_nodes(model);
+    map_to_nodes(model); // the stresses have changed
   }
   solve_momentum(model, options.damping, dt);
   find_end_velocity(model, options, dt); // (19)
@@ -185,6 +171,45 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
+}
+
+template <int D>
+void map_to_nodes(Model<D>& model)
+{
+  Workspace<D>& work = model.work;
+  scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
+  sum_shared(model.exchange, &work.nodes.data()->mass, node_sums_width<D>);
+}
+
+template <int D>
+double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
+{
+  std::array<double, 2> squares{}; // of f_ext - f_int over unsupported directions, and of f_ext
+  auto support = model.supports.begin();
+  for (Index i = 0; i < model.mesh.n_nodes(); ++i)
+  {
+    while (support != model.supports.end() && support->node < i)
+      ++support;
+    const NodeSums<D>& node = model.work.nodes[i];
+    if (!model.exchange.owned[i] || !(node.mass > model.work.least_mass))
+      continue;
+    Vector<D> external, unbalanced;
+    for (int a = 0; a < D; ++a)
+    {
+      external[a] = node.traction[a] + node.mass * gravity[a];
+      unbalanced[a] = external[a] - node.internal[a];
+    }
+    if (support != model.supports.end() && support->node == i)
+    {
+      Support<D> held = *support;
+      held.value.fill(0);
+      impose<D>(held, unbalanced);
+    }
+    squares[0] += dot<D>(unbalanced, unbalanced);
+    squares[1] += dot<D>(external, external);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, squares.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  return squares[1] > 0 ? std::sqrt(squares[0] / squares[1]) : 0;
 }
 
 template <int D>
@@ -205,6 +230,8 @@ double critical_time_step(const Model<D>& model)
 
 #define INSTANTIATE(D)                                                                                                 \
   template void explicit_step(Model<D>&, const ExplicitOptions&, double);                                              \
+  template void map_to_nodes(Model<D>&);                                                                               \
+  template double out_of_balance<D>(const Model<D>&, const Vector<D>&);                                                \
   template double critical_time_step(const Model<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

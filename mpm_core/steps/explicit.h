@@ -29,6 +29,18 @@ struct ExplicitOptions
 template <int D>
 void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
 
+/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
+/// @pre prepare(model) has been called
+/// @note Collective
+template <int D>
+void map_to_nodes(Model<D>& model);
+
+/// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported directions do not
+/// count above. 0 without external force.
+/// @note Collective
+template <int D>
+double out_of_balance(const Model<D>& model, const Vector<D>& gravity);
+
 /// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
 /// @note Collective
 template <int D>

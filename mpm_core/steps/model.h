@@ -46,13 +46,11 @@ struct Totals
   double support_work = 0;  ///< of prescribed velocities
 };
 
-/// Sums over this rank in the last step.
+/// Of the last step, on this rank.
 struct LastStep
 {
-  double dt = 0;
-  std::int64_t plastic = 0;       ///< particles that yielded
-  double unbalanced_squared = 0;  ///< |f_ext - f_int|^2 over unsupported directions [N^2]
-  double external_squared = 0;    ///< |f_ext|^2 [N^2]
+  double dt = 0;            ///< [s]
+  std::int64_t plastic = 0; ///< particles that yielded
 };
 
 /// Room that steps work in; valid between steps only as far as said.

@@ -103,14 +103,12 @@ Diagnostics diagnostics(const Model<D>& model)
   d.outflow_mass = model.totals.outflow_mass;
   d.particle_steps = static_cast<double>(model.totals.particle_steps);
   d.plastic_share = static_cast<double>(model.last.plastic);
-  d.unbalanced_ratio = model.last.unbalanced_squared;
-  std::array<double, sizeof(Diagnostics) / sizeof(double) + 1> sums;
-  std::copy_n(&d.particles, sums.size() - 1, sums.begin());
-  sums.back() = model.last.external_squared;
+  std::array<double, sizeof(Diagnostics) / sizeof(double)> sums;
+  std::copy_n(&d.particles, sums.size(), sums.begin());
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
-  std::copy_n(sums.begin(), sums.size() - 1, &d.particles);
+  std::copy_n(sums.begin(), sums.size(), &d.particles);
   d.plastic_share = d.particles > 0 ? d.plastic_share / d.particles : 0;
-  d.unbalanced_ratio = sums.back() > 0 ? std::sqrt(d.unbalanced_ratio / sums.back()) : 0;
+  d.unbalanced_ratio = out_of_balance<D>(model, current_gravity(model));
   return d;
 }
 

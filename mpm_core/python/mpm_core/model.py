@@ -222,6 +222,15 @@ class Model:
         """Critical time step (16): smallest h_min / c_d over the particles [s]."""
         return self._core.critical_time_step()
 
+    def out_of_balance(self, gravity: ArrayLike | None = None) -> float:
+        """Out-of-balance over external force of the particles as they are: |f_ext - f_int| / |f_ext| over the nodes [-].
+
+        Args:
+            gravity: [m/s2], shape (D,), to weigh the particles with; by default the model's own, without its ramp.
+        """
+        g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
+        return self._core.out_of_balance(g)
+
     def report(self) -> Report:
         """Where the run stands."""
         values = self._core.diagnostics()
