@@ -3,9 +3,10 @@
 #include "materials/mohr_coulomb_tangent.h"
 #include "materials/require.h"
 #include "materials/spectral.h"
+#include "materials/work_columns.h"
 
-// The loops marked `ivdep` vectorise: no branch, every local a scalar in the end. (`omp simd` would not do: it turns a
-// local aggregate into an array over the lanes, which g++ 12 then cannot vectorise.)
+// The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it turns
+// a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)
 
 namespace mpm
 {
@@ -13,24 +14,21 @@ using namespace mohr_coulomb;
 
 namespace
 {
-/// Points handled at a time: their work arrays stay in the first-level cache
-constexpr Index block_size = 256;
-/// Candidates are filled up to a multiple of this, so that no point is left to a scalar remainder of a vector loop:
-/// it would be slow, and might round differently, so that the result would depend on a point's neighbours
+/// Candidates are filled up to a multiple of this, so that no point is left to the scalar remainder of a vector loop: it
+/// would be slow, and might round differently, so that a point's result would depend on its neighbours.
 constexpr std::size_t lanes = 8;
-
-template <class T>
-using Work = std::array<T, block_size>;
 
 /// The points of a block that may yield, side by side
 template <int D>
 struct Candidates
 {
-  Index size = 0;
-  Work<Index> point;                          ///< number in the batch
-  std::array<Work<double>, n_stress<D>> stress; ///< trial stress, then the final one
-  Work<double> plastic_strain;                ///< increment of the accumulated plastic deviatoric strain
-  Work<std::int64_t> is_plastic;
+  std::size_t size = 0;
+  WorkColumn<Index> point;             ///< number in the batch
+  WorkColumns<SymTensor<D>> stress;    ///< trial stress, then the final one
+  WorkColumns<Spectral<D>> trial;      ///< principal stresses and directions before the return
+  WorkColumns<Returned> returned;      ///< principal stresses after the return, and the region
+  WorkColumn<double> plastic_strain;   ///< increment of the accumulated plastic deviatoric strain
+  WorkColumn<std::int64_t> is_plastic; ///< 1 where the point yields
 };
 
 Surface surface_of(const MohrCoulomb& law)
@@ -40,13 +38,13 @@ Surface surface_of(const MohrCoulomb& law)
                  law.dilation_angle * degree, law.tension_cutoff);
 }
 
-/// Elastic step of a range of points: their stress becomes the trial stress, unless that is not usable. Notes the points
-/// that may yield and returns the number of those that failed.
+/// Elastic step of the points first to last: their stress becomes the trial stress, unless that is not usable. Notes
+/// the points that may yield and returns the number of those that failed.
 template <int D>
 Index elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last, Candidates<D>& candidates)
 {
-  Work<std::int64_t> flag;
-  std::int64_t failed = 0, flagged = 0;
+  WorkColumn<std::int64_t> may_leave;
+  std::int64_t failed = 0, leaving = 0;
 #pragma GCC ivdep
   for (Index i = first; i < last; ++i)
   {
@@ -54,89 +52,84 @@ Index elastic_step(const Surface& m, const PointBatch<D>& points, Index first, I
     const bool usable = is_usable<D>(trial);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
-    const std::int64_t yields = usable & may_yield(m, trial) ? 1 : 0;
-    flag[static_cast<std::size_t>(i - first)] = yields;
-    flagged += yields;
+    const std::int64_t leaves = usable & may_yield(m, trial) ? 1 : 0;
+    may_leave[static_cast<std::size_t>(i - first)] = leaves;
+    leaving += leaves;
     failed += usable ? 0 : 1;
   }
   candidates.size = 0;
-  if (flagged > 0)
-    for (Index i = first; i < last; ++i)
-    {
-      candidates.point[static_cast<std::size_t>(candidates.size)] = i;
-      candidates.size += static_cast<Index>(flag[static_cast<std::size_t>(i - first)]);
-    }
+  for (Index i = first; i < last && leaving > 0; ++i) // without a branch on the single point
+  {
+    candidates.point[candidates.size] = i;
+    candidates.size += static_cast<std::size_t>(may_leave[static_cast<std::size_t>(i - first)]);
+  }
   return static_cast<Index>(failed);
 }
 
-/// Returns the trial stresses of the candidates to the surface, those that are outside
+/// Copies the trial stresses of the candidates, and fills up with zero stress.
+template <int D>
+void gather(const PointBatch<D>& points, Candidates<D>& candidates)
+{
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < candidates.size; ++i)
+      candidates.stress.column(k)[i] = points.stress[k][candidates.point[i]];
+  for (std::size_t i = candidates.size; i % lanes != 0; ++i)
+    candidates.stress.set(i, {});
+}
+
+/// Returns the trial stresses of the candidates to the surface, those that are outside.
 template <int D>
 void return_stresses(const Surface& surface, Candidates<D>& candidates)
 {
   const Surface m = surface; // a copy that no store can alias
-  const std::size_t padded = (static_cast<std::size_t>(candidates.size) + lanes - 1) / lanes * lanes;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    for (auto i = static_cast<std::size_t>(candidates.size); i < padded; ++i)
-      candidates.stress[k][i] = 0;
+  const std::size_t padded = (candidates.size + lanes - 1) / lanes * lanes;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < padded; ++i)
   {
-    SymTensor<D> trial;
-    for (std::size_t k = 0; k < n_stress<D>; ++k)
-      trial[k] = candidates.stress[k][i];
-    const Spectral<D> principal = spectral(trial);
-    const Returned returned = return_to_surface(m, principal.stress);
-    const SymTensor<D> stress = recomposed(returned.stress, principal.frame);
+    const SymTensor<D> trial = candidates.stress.at(i);
+    const Spectral<D> spectrum = spectral(trial);
+    const Returned returned = return_to_surface(m, spectrum.stress);
     const bool elastic = returned.region == Region::elastic;
+    SymTensor<D> stress = recomposed(returned.stress, spectrum.frame);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
-      candidates.stress[k][i] = elastic ? trial[k] : stress[k];
-    candidates.plastic_strain[i] = deviatoric_plastic_strain(m, principal.stress, returned.stress);
+      stress[k] = elastic ? trial[k] : stress[k]; // not one bit of an elastic stress changes
+    candidates.stress.set(i, stress);
+    candidates.trial.set(i, spectrum);
+    candidates.returned.set(i, returned);
+    candidates.plastic_strain[i] = deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
     candidates.is_plastic[i] = elastic ? 0 : 1;
   }
-}
-
-/// Writes the tangents of the candidates, from their trial stresses.
-template <int D>
-void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D>& candidates, double* tangents)
-{
-  for (std::size_t i = 0; i < static_cast<std::size_t>(candidates.size); ++i)
-  {
-    SymTensor<D> trial;
-    for (std::size_t k = 0; k < n_stress<D>; ++k)
-      trial[k] = candidates.stress[k][i];
-    constexpr std::size_t entries = n_stress<D> * n_stress<D>;
-    write_tangent<D>(m, maps, trial, tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
-  }
-}
-
-template <int D>
-void gather(const PointBatch<D>& points, Candidates<D>& candidates)
-{
-  const auto size = static_cast<std::size_t>(candidates.size);
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-#pragma GCC ivdep
-    for (std::size_t i = 0; i < size; ++i)
-      candidates.stress[k][i] = points.stress[k][candidates.point[i]];
 }
 
 /// Writes stress and state of the candidates back and returns how many yielded.
 template <int D>
 Index scatter(const Candidates<D>& candidates, const PointBatch<D>& points)
 {
-  const auto size = static_cast<std::size_t>(candidates.size);
   for (std::size_t k = 0; k < n_stress<D>; ++k)
 #pragma GCC ivdep
-    for (std::size_t i = 0; i < size; ++i)
-      points.stress[k][candidates.point[i]] = candidates.stress[k][i];
+    for (std::size_t i = 0; i < candidates.size; ++i)
+      points.stress[k][candidates.point[i]] = candidates.stress.column(k)[i];
   double* const accumulated = points.state[0];
   std::int64_t plastic = 0;
 #pragma GCC ivdep
-  for (std::size_t i = 0; i < size; ++i)
+  for (std::size_t i = 0; i < candidates.size; ++i)
   {
     accumulated[candidates.point[i]] += candidates.plastic_strain[i];
     plastic += candidates.is_plastic[i];
   }
   return static_cast<Index>(plastic);
+}
+
+/// Writes the tangents of the candidates that yielded.
+template <int D>
+void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D>& candidates, double* tangents)
+{
+  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
+  for (std::size_t i = 0; i < candidates.size; ++i)
+    if (candidates.is_plastic[i])
+      write_tangent<D>(m, maps, candidates.trial.at(i), candidates.returned.at(i),
+                       tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
 } // namespace
 
@@ -166,16 +159,17 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
     fill_elastic_tangent<D>(m.moduli, points.size, points.tangent);
   BatchReport report;
   Candidates<D> candidates;
-  for (Index first = 0; first < points.size; first += block_size)
+  constexpr auto block = static_cast<Index>(block_size);
+  for (Index first = 0; first < points.size; first += block)
   {
-    const Index last = std::min(points.size, first + block_size);
+    const Index last = std::min(points.size, first + block);
     report.failed += elastic_step(m, points, first, last, candidates);
     if (candidates.size == 0)
       continue;
     gather(points, candidates);
+    return_stresses(m, candidates);
     if (points.tangent)
       write_tangents(m, maps, candidates, points.tangent);
-    return_stresses(m, candidates);
     report.plastic += scatter(candidates, points);
   }
   if (report.failed > 0)

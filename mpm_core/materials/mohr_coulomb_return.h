@@ -208,7 +208,7 @@ inline Returned shear_tension_return(const Surface& m, Principal trial)
 /// Return of a trial stress. The multipliers of the planes solve a linear complementarity problem with a P-matrix (for
 /// psi <= phi), so the solution is unique: where the return to the surfaces of one kind respects the other kind, it is
 /// the one. An infinite cut-off needs no case of its own: all of its returns are passed over.
-inline Returned return_to_surface(const Surface& m, Principal trial)
+[[gnu::always_inline]] inline Returned return_to_surface(const Surface& m, Principal trial)
 {
   const Returned elastic{trial, Region::elastic};
   const Returned shear = select(yield(m, trial.s1, trial.s3) > 0, shear_return(m, trial), elastic);

@@ -113,14 +113,13 @@ RegionMaps region_maps(const Surface& m)
 }
 
 template <int D>
-void write_tangent(const Surface& m, const RegionMaps& maps, const SymTensor<D>& trial, double* tangent)
+void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& trial, const Returned& returned,
+                   double* tangent)
 {
-  const Spectral<D> spectrum = spectral(trial);
-  const Returned returned = return_to_surface(m, spectrum.stress);
   const Matrix3& map = maps.of[static_cast<std::size_t>(returned.region)];
-  const std::array<double, 3> before{spectrum.stress.s1, spectrum.stress.s2, spectrum.stress.s3};
+  const std::array<double, 3> before{trial.stress.s1, trial.stress.s2, trial.stress.s3};
   const std::array<double, 3> after{returned.stress.s1, returned.stress.s2, returned.stress.s3};
-  const Dyads<D> basis = dyads(spectrum.frame);
+  const Dyads<D> basis = dyads(trial.frame);
   std::fill_n(tangent, n_stress<D> * n_stress<D>, 0.0);
   for (std::size_t i = 0; i < 3; ++i)
   {
@@ -136,6 +135,6 @@ void write_tangent(const Surface& m, const RegionMaps& maps, const SymTensor<D>&
                    tangent);
 }
 
-template void write_tangent<2>(const Surface&, const RegionMaps&, const SymTensor<2>&, double*);
-template void write_tangent<3>(const Surface&, const RegionMaps&, const SymTensor<3>&, double*);
+template void write_tangent<2>(const Surface&, const RegionMaps&, const Spectral<2>&, const Returned&, double*);
+template void write_tangent<3>(const Surface&, const RegionMaps&, const Spectral<3>&, const Returned&, double*);
 } // namespace mpm::mohr_coulomb

@@ -19,5 +19,6 @@ RegionMaps region_maps(const Surface& m);
 
 /// Writes d stress / d strain (row-major, engineering shear) of a point that was returned from the trial stress given.
 template <int D>
-void write_tangent(const Surface& m, const RegionMaps& maps, const SymTensor<D>& trial, double* tangent);
+void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& trial, const Returned& returned,
+                   double* tangent);
 } // namespace mpm::mohr_coulomb

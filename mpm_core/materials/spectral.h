@@ -138,7 +138,7 @@ inline bool may_yield(const Surface& m, const SymTensor<2>& stress)
 /// found from the invariants, x = cos(theta) by two Newton steps on 4 x^3 - 3 x = |cos(3 theta)|, exact to 1e-8 and far
 /// cheaper than the eigenvectors.
 /// Source of the invariants: de Souza Neto, Peric, Owen (2008), box A.2 and eq. (8.16).
-inline bool may_yield(const Surface& m, const SymTensor<3>& stress)
+[[gnu::always_inline]] inline bool may_yield(const Surface& m, const SymTensor<3>& stress)
 {
   const double mean = (stress[0] + stress[1] + stress[2]) / 3;
   const double xx = stress[0] - mean, yy = stress[1] - mean, zz = stress[2] - mean;
