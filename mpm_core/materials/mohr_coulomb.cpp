@@ -5,8 +5,8 @@
 #include "materials/spectral.h"
 #include "materials/work_columns.h"
 
-// The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it turns
-// a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)
+// The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
+// turns a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)
 
 namespace mpm
 {
@@ -14,8 +14,8 @@ using namespace mohr_coulomb;
 
 namespace
 {
-/// Candidates are filled up to a multiple of this, so that no point is left to the scalar remainder of a vector loop: it
-/// would be slow, and might round differently, so that a point's result would depend on its neighbours.
+/// Candidates are filled up to a multiple of this, so that no point is left to the scalar remainder of a vector loop:
+/// it would be slow, and might round differently, so that a point's result would depend on its neighbours.
 constexpr std::size_t lanes = 8;
 
 /// The points of a block that may yield, side by side

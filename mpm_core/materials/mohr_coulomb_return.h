@@ -29,17 +29,17 @@ struct Principal
 /// The part of the surface that a stress was returned to. As wide as a stress, so that selections vectorise.
 enum class Region : std::int64_t
 {
-  elastic,           ///< inside, no return
-  plane,             ///< s1 > s2 > s3
-  compression_edge,  ///< s1 = s2, the meridian of triaxial compression
-  extension_edge,    ///< s2 = s3, the meridian of triaxial extension
-  apex,              ///< s1 = s2 = s3
-  tension_plane,     ///< s1 at the cut-off
-  tension_edge,      ///< s1 = s2 at the cut-off
-  tension_apex,      ///< all three at the cut-off
-  shear_tension,     ///< the line where plane and tension plane meet
+  elastic,            ///< inside, no return
+  plane,              ///< s1 > s2 > s3
+  compression_edge,   ///< s1 = s2, the meridian of triaxial compression
+  extension_edge,     ///< s2 = s3, the meridian of triaxial extension
+  apex,               ///< s1 = s2 = s3
+  tension_plane,      ///< s1 at the cut-off
+  tension_edge,       ///< s1 = s2 at the cut-off
+  tension_apex,       ///< all three at the cut-off
+  shear_tension,      ///< the line where plane and tension plane meet
   compression_corner, ///< the point where compression edge and cut-off meet
-  extension_corner,  ///< the point where extension edge and cut-off meet
+  extension_corner,   ///< the point where extension edge and cut-off meet
 };
 inline constexpr std::size_t n_regions = 11;
 
@@ -50,10 +50,10 @@ struct Surface
   double poisson;
   double cohesion_cos; ///< c cos(phi) [Pa]
   double sin_phi, sin_psi;
-  double slope;      ///< N = (1 + sin(phi)) / (1 - sin(phi)); on the surface s3 = N s1 - strength
-  double strength;   ///< uniaxial compressive strength 2 c sqrt(N) [Pa]
-  double apex;       ///< c cot(phi) [Pa], infinite for phi = 0
-  double tension;    ///< tension cut-off [Pa], infinite where the apex comes first
+  double slope;    ///< N = (1 + sin(phi)) / (1 - sin(phi)); on the surface s3 = N s1 - strength
+  double strength; ///< uniaxial compressive strength 2 c sqrt(N) [Pa]
+  double apex;     ///< c cot(phi) [Pa], infinite for phi = 0
+  double tension;  ///< tension cut-off [Pa], infinite where the apex comes first
   // Returns to an edge keep a weighted sum of the principal stresses: the plastic strain is normal to the edge of the
   // potential, so with it as r_b the sum is r_b . D^-1 sigma, scaled by 3K to stay finite as poisson nears 0.5.
   double compression_w12, compression_w3, compression_sum; ///< weights of s1 and s2, of s3; the sum on the edge per s1

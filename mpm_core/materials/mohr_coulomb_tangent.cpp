@@ -57,14 +57,11 @@ Dyads<2> dyads(const Frame<2>& frame)
   return {{major, minor, zz}, {{{0, 1, shear}}}};
 }
 
-SymTensor<3> dyad(const Direction& a)
-{
-  return {a.x * a.x, a.y * a.y, a.z * a.z, a.x * a.y, a.y * a.z, a.x * a.z};
-}
+SymTensor<3> dyad(const Direction& a) { return {a.x * a.x, a.y * a.y, a.z * a.z, a.x * a.y, a.y * a.z, a.x * a.z}; }
 
 SymTensor<3> dyad(const Direction& a, const Direction& b)
 {
-  return {2 * a.x * b.x,           2 * a.y * b.y,           2 * a.z * b.z,
+  return {2 * a.x * b.x,         2 * a.y * b.y,         2 * a.z * b.z,
           a.x * b.y + a.y * b.x, a.y * b.z + a.z * b.y, a.x * b.z + a.z * b.x};
 }
 

@@ -69,7 +69,8 @@ inline SymTensor<2> recomposed(Principal s, Frame<2> frame)
 /// One Jacobi rotation, in the plane of the axes p and q, of the symmetric matrix with the entries pp, qq, pq and, with
 /// the third axis, pr and qr; it makes pq zero. The columns p and q of the eigenvectors turn along.
 /// Source: Golub, Van Loan (2013), Matrix Computations, section 8.5.2.
-[[gnu::always_inline]] inline void rotate(double& pp, double& qq, double& pq, double& pr, double& qr, Direction& p, Direction& q)
+[[gnu::always_inline]] inline void rotate(double& pp, double& qq, double& pq, double& pr, double& qr, Direction& p,
+                                          Direction& q)
 {
   const double difference = qq - pp;
   const double root = std::sqrt(difference * difference + 4 * pq * pq);
@@ -119,12 +120,10 @@ inline SymTensor<2> recomposed(Principal s, Frame<2> frame)
 inline SymTensor<3> recomposed(Principal s, Frame<3> frame)
 {
   const Direction a = frame.n1, b = frame.n2, c = frame.n3;
-  return {s.s1 * a.x * a.x + s.s2 * b.x * b.x + s.s3 * c.x * c.x,
-          s.s1 * a.y * a.y + s.s2 * b.y * b.y + s.s3 * c.y * c.y,
-          s.s1 * a.z * a.z + s.s2 * b.z * b.z + s.s3 * c.z * c.z,
-          s.s1 * a.x * a.y + s.s2 * b.x * b.y + s.s3 * c.x * c.y,
-          s.s1 * a.y * a.z + s.s2 * b.y * b.z + s.s3 * c.y * c.z,
-          s.s1 * a.x * a.z + s.s2 * b.x * b.z + s.s3 * c.x * c.z};
+  return {
+      s.s1 * a.x * a.x + s.s2 * b.x * b.x + s.s3 * c.x * c.x, s.s1 * a.y * a.y + s.s2 * b.y * b.y + s.s3 * c.y * c.y,
+      s.s1 * a.z * a.z + s.s2 * b.z * b.z + s.s3 * c.z * c.z, s.s1 * a.x * a.y + s.s2 * b.x * b.y + s.s3 * c.x * c.y,
+      s.s1 * a.y * a.z + s.s2 * b.y * b.z + s.s3 * c.y * c.z, s.s1 * a.x * a.z + s.s2 * b.x * b.z + s.s3 * c.x * c.z};
 }
 
 /// Whether a stress may be outside the surface. In plane strain the answer is exact.

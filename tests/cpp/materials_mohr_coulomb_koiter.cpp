@@ -73,7 +73,8 @@ bool solve(std::vector<std::vector<double>> a, std::vector<double>& b)
 
 /// Koiter's rule by exhaustion, without knowledge of regions: of all sets of up to three planes, the one whose
 /// multipliers are positive and whose result satisfies all planes. Nothing where there is none (apex with psi = 0).
-std::optional<Vec3> koiter_return(const MohrCoulomb& law, const std::vector<Plane>& all, const Vec3& trial, double scale)
+std::optional<Vec3> koiter_return(const MohrCoulomb& law, const std::vector<Plane>& all, const Vec3& trial,
+                                  double scale)
 {
   const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
   const double unit = 1 / moduli.shear;
@@ -141,8 +142,8 @@ TEST(MohrCoulombReturn, FollowsKoitersRule)
         EXPECT_TRUE(law.dilation_angle == 0 && region == Region::apex) << static_cast<int>(region);
         continue;
       }
-      const double error = std::max({std::abs(s.s1 - (*expected)[0]), std::abs(s.s2 - (*expected)[1]),
-                                     std::abs(s.s3 - (*expected)[2])});
+      const double error =
+          std::max({std::abs(s.s1 - (*expected)[0]), std::abs(s.s2 - (*expected)[1]), std::abs(s.s3 - (*expected)[2])});
       ASSERT_LT(error, 1e-8 * scale) << "phi " << law.friction_angle << " psi " << law.dilation_angle << " region "
                                      << static_cast<int>(region) << " trial " << trial.s1 << " " << trial.s2 << " "
                                      << trial.s3;
