@@ -3,6 +3,7 @@
 #include "mesh/search.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
+#include "steps/mapping.h"
 #include "steps/run.h"
 
 namespace mpm::python

@@ -1,5 +1,6 @@
 #include "steps/explicit.h"
 
+#include "steps/mapping.h"
 #include "steps/particle_pass.h"
 #include "transfer/kinematics.h"
 
@@ -11,18 +12,6 @@ namespace mpm
 {
 namespace
 {
-/// v_i at the start of the step, from the sums at nodes, with supports.
-template <int D>
-void find_start_velocity(Model<D>& model)
-{
-  Workspace<D>& work = model.work;
-  for (std::size_t i = 0; i < work.nodes.size(); ++i)
-    for (int a = 0; a < D; ++a)
-      work.start_velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
-  for (const Support<D>& support : model.supports)
-    impose<D>(support, work.start_velocity[support.node]);
-}
-
 /// a_i = (f_ext - f_int - D)_i / m_i, with supports; D_i = alpha |R_i| sign(v_i) per component, R = f_ext - f_int.
 template <int D>
 void solve_momentum(Model<D>& model, double damping, double dt)
@@ -94,26 +83,6 @@ void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double d
     impose<D>(support, work.velocity[support.node]);
 }
 
-/// Volumetric strains of the cells, averaged over nodes (nodal mixed discretisation).
-template <int D>
-void average_strains(Model<D>& model, double dt)
-{
-  Workspace<D>& work = model.work;
-  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
-  {
-    work.cell_volume[c] = work.moments[c].volume;
-    if (work.cell_volume[c] == 0)
-      continue;
-    const auto gradient = affine_field<D>(model.mesh, c, velocity).gradient;
-    work.volumetric_strain[c] = 0;
-    for (int a = 0; a < D; ++a)
-      work.volumetric_strain[c] += dt * gradient[a][a];
-  }
-  average_volumetric_strain<D>(model.mesh, work.cell_volume, model.exchange, work.volumetric_sums,
-                               work.volumetric_strain);
-}
-
 /// Work done in the step. Forces act at the step's start, so their displacement is the mean
 /// of the one before and the one after: the energy balance of the leap-frog scheme.
 template <int D>
@@ -174,14 +143,6 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
 }
 
 template <int D>
-void map_to_nodes(Model<D>& model)
-{
-  Workspace<D>& work = model.work;
-  scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
-  sum_shared(model.exchange, &work.nodes.data()->mass, node_sums_width<D>);
-}
-
-template <int D>
 double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
 {
   std::array<double, 2> squares{}; // of f_ext - f_int over unsupported directions, and of f_ext
@@ -230,7 +191,6 @@ double critical_time_step(const Model<D>& model)
 
 #define INSTANTIATE(D)                                                                                                 \
   template void explicit_step(Model<D>&, const ExplicitOptions&, double);                                              \
-  template void map_to_nodes(Model<D>&);                                                                               \
   template double out_of_balance<D>(const Model<D>&, const Vector<D>&);                                                \
   template double critical_time_step(const Model<D>&);
 INSTANTIATE(2)

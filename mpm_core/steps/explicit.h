@@ -29,12 +29,6 @@ struct ExplicitOptions
 template <int D>
 void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
 
-/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
-/// @pre prepare(model) has been called
-/// @note Collective
-template <int D>
-void map_to_nodes(Model<D>& model);
-
 /// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported directions do not
 /// count above. 0 without external force.
 /// @note Collective

@@ -132,21 +132,15 @@ void set_volumetric(CellStrain<D>& strain, double volumetric)
 }
 
 template <int D>
-void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain)
+void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation)
 {
   constexpr int S = n_symmetric<D>;
   double* s[S];
-  for (int k = 0; k < S; ++k)
-    s[k] = particles.stress[stress_component<D>[k]].data();
-  double* const volume = particles.volume.data();
-  double* const deviatoric = particles.deviatoric_strain.data();
-  const Matrix<D> r = strain.rotation;
-  const double growth = 1 + strain.volumetric, increment = strain.deviatoric;
+  std::copy(stress.begin(), stress.end(), s);
+  const Matrix<D> r = rotation;
 #pragma omp simd
   for (Index p = first; p < last; ++p)
   {
-    volume[p] *= growth;
-    deviatoric[p] += increment;
     double half[D][D]; // R sigma
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
@@ -167,10 +161,29 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
   }
 }
 
+template <int D>
+void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain)
+{
+  SymmetricColumns<D> stress;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    stress[k] = particles.stress[stress_component<D>[k]].data();
+  rotate<D>(stress, first, last, strain.rotation);
+  double* const volume = particles.volume.data();
+  double* const deviatoric = particles.deviatoric_strain.data();
+  const double growth = 1 + strain.volumetric, increment = strain.deviatoric;
+#pragma omp simd
+  for (Index p = first; p < last; ++p)
+  {
+    volume[p] *= growth;
+    deviatoric[p] += increment;
+  }
+}
+
 #define INSTANTIATE(D)                                                                                                 \
   template int move_particles(Particles<D>&, const Run&, const NodalMotion<D>&, double, double);                       \
   template CellStrain<D> strain_increment<D>(const Matrix<D>&, double);                                                   \
   template void set_volumetric(CellStrain<D>&, double);                                                                \
+  template void rotate<D>(const SymmetricColumns<D>&, Index, Index, const Matrix<D>&);                                 \
   template void strain_particles(Particles<D>&, Index, Index, const CellStrain<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

@@ -44,6 +44,14 @@ CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double dt);
 template <int D>
 void set_volumetric(CellStrain<D>& strain, double volumetric);
 
+/// Columns of a symmetric tensor in the order of `symmetric_pairs`: the stress without zz in plane strain.
+template <int D>
+using SymmetricColumns = std::array<double*, n_symmetric<D>>;
+
+/// R sigma R^T for the entries [first, last) of stress columns, in place.
+template <int D>
+void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation);
+
 /// Rotates the stresses of the particles [first, last), grows their volumes and accumulates their deviatoric strain.
 template <int D>
 void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain);
