@@ -1,0 +1,224 @@
+#include "io/hdf5_file.h"
+
+#include <hdf5.h>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <type_traits>
+
+namespace mpm
+{
+namespace
+{
+static_assert(std::is_same_v<hid_t, std::int64_t>);
+
+/// Keeps HDF5 from printing its error stack while it lives; the reason goes into the exception instead.
+class Quiet
+{
+public:
+  Quiet()
+  {
+    H5Eget_auto2(H5E_DEFAULT, &_function, &_data);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, _function, _data); }
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+private:
+  H5E_auto2_t _function = nullptr;
+  void* _data = nullptr;
+};
+
+template <class T>
+hid_t native_type()
+{
+  if constexpr (std::is_same_v<T, float>)
+    return H5T_NATIVE_FLOAT;
+  else if constexpr (std::is_same_v<T, double>)
+    return H5T_NATIVE_DOUBLE;
+  else
+    return H5T_NATIVE_INT64;
+}
+
+/// The innermost message of HDF5's error stack, which is the nearest to the cause.
+std::string hdf5_reason()
+{
+  std::string reason;
+  const auto keep_last = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t
+  {
+    if (error->desc)
+      *static_cast<std::string*>(text) = error->desc;
+    return 0;
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, keep_last, &reason);
+  return reason;
+}
+
+/// What HDF5's own tables take at most for one dataset and its group, in bytes (measured: some 2000).
+constexpr std::int64_t table_size = 4096;
+/// Room that is always kept for tables that HDF5 has not written yet, in bytes.
+constexpr std::int64_t table_room = 1 << 18;
+
+/// Reserves space on the disk for the first `size` bytes of a file, which is created if it is not there. A disk that
+/// fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that was written stays.
+/// File systems that cannot reserve are taken at their word.
+/// @return why it cannot be had; empty if it can
+std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t size)
+{
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  if (file < 0)
+    return std::strerror(errno);
+  int error = 0;
+#ifdef __linux__
+  if (::fallocate(file, 0, 0, size) != 0 && errno != EOPNOTSUPP)
+    error = errno;
+#endif
+  ::close(file);
+  return error == 0 ? "" : std::strerror(error);
+}
+} // namespace
+
+RowSlice row_slice(MPI_Comm comm, std::size_t local)
+{
+  RowSlice rows;
+  rows.local = static_cast<GlobalIndex>(local);
+  GlobalIndex up_to_here = 0;
+  MPI_Scan(&rows.local, &up_to_here, 1, MPI_INT64_T, MPI_SUM, comm);
+  rows.before = up_to_here - rows.local;
+  MPI_Allreduce(&rows.local, &rows.total, 1, MPI_INT64_T, MPI_SUM, comm);
+  return rows;
+}
+
+std::string shared_failure(MPI_Comm comm, const std::string& failure)
+{
+  int rank = 0, size = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  const int mine = failure.empty() ? size : rank;
+  int first = size;
+  MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
+  if (first == size)
+    return {};
+  std::string text = failure;
+  auto length = static_cast<int>(text.size());
+  MPI_Bcast(&length, 1, MPI_INT, first, comm);
+  text.resize(static_cast<std::size_t>(length));
+  MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
+  return text;
+}
+
+Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path) : _comm(comm), _path(std::move(path))
+{
+  if (!has_room(0))
+    check();
+  const Quiet quiet;
+  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+  H5Pset_fapl_mpio(access, _comm, MPI_INFO_NULL);
+  _file = H5Fcreate(_path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  note(_file >= 0, "create");
+  H5Pclose(access);
+  check();
+}
+
+Hdf5File::~Hdf5File()
+{
+  int finalized = 0;
+  MPI_Finalized(&finalized);
+  if (finalized || _file < 0)
+    return;
+  const Quiet quiet;
+  H5Fclose(_file);
+}
+
+void Hdf5File::note(bool succeeded, const char* doing)
+{
+  if (!succeeded && _failure.empty())
+    _failure = std::string("cannot ") + doing + " " + _path.string() + ": " + hdf5_reason();
+}
+
+bool Hdf5File::has_room(std::int64_t bytes)
+{
+  _reserved += bytes + table_size;
+  int rank = 0;
+  MPI_Comm_rank(_comm, &rank);
+  const std::string obstacle =
+      shared_failure(_comm, rank == 0 ? reservation_obstacle(_path, _reserved + table_room) : "");
+  if (!obstacle.empty() && _failure.empty())
+    _failure = "cannot write " + _path.string() + ": " + obstacle;
+  return obstacle.empty();
+}
+
+void Hdf5File::create_group(const std::string& name)
+{
+  if (_file < 0)
+    throw RunError("cannot write " + _path.string() + ": it is closed");
+  const Quiet quiet;
+  const hid_t group = H5Gcreate2(_file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  note(group >= 0, "write");
+  if (group >= 0)
+    H5Gclose(group);
+}
+
+template <class T>
+void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, std::span<const T> values)
+{
+  const Quiet quiet;
+  if (!has_room(rows.total * width * static_cast<std::int64_t>(sizeof(T))))
+    return;
+  const int rank = width == 1 ? 1 : 2;
+  const hsize_t columns = static_cast<hsize_t>(width);
+  const hsize_t shape[2] = {static_cast<hsize_t>(rows.total), columns};
+  const hsize_t start[2] = {static_cast<hsize_t>(rows.before), 0};
+  const hsize_t count[2] = {static_cast<hsize_t>(rows.local), columns};
+  const hid_t in_file = H5Screate_simple(rank, shape, nullptr);
+  const hid_t in_memory = H5Screate_simple(rank, count, nullptr);
+  if (rows.local > 0)
+    H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, count, nullptr);
+  else
+    H5Sselect_none(in_file);
+  const hid_t dataset =
+      H5Dcreate2(_file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  note(dataset >= 0, "write");
+  const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
+  H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
+  if (dataset >= 0 && rows.total > 0)
+    note(H5Dwrite(dataset, native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0, "write");
+  if (dataset >= 0)
+    H5Dclose(dataset);
+  H5Pclose(transfer);
+  H5Sclose(in_memory);
+  H5Sclose(in_file);
+}
+
+void Hdf5File::flush()
+{
+  const Quiet quiet;
+  note(H5Fflush(_file, H5F_SCOPE_GLOBAL) >= 0, "write");
+}
+
+void Hdf5File::check()
+{
+  if (const std::string failure = shared_failure(_comm, _failure); !failure.empty())
+    throw RunError(failure);
+}
+
+void Hdf5File::close()
+{
+  if (_file < 0)
+    return;
+  {
+    const Quiet quiet;
+    note(H5Fclose(_file) >= 0, "close");
+  }
+  _file = -1;
+  check();
+}
+
+template void Hdf5File::write<float>(const std::string&, const RowSlice&, int, std::span<const float>);
+template void Hdf5File::write<double>(const std::string&, const RowSlice&, int, std::span<const double>);
+template void Hdf5File::write<std::int64_t>(const std::string&, const RowSlice&, int, std::span<const std::int64_t>);
+} // namespace mpm

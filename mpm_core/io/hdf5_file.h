@@ -1,0 +1,79 @@
+#pragma once
+/// @file
+/// A parallel HDF5 file that all ranks write together.
+
+#include "base/types.h"
+
+#include <mpi.h>
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace mpm
+{
+/// This rank's rows in an array that all ranks hold together, by rising rank.
+struct RowSlice
+{
+  GlobalIndex before = 0; ///< rows on lower ranks
+  GlobalIndex local = 0;
+  GlobalIndex total = 0;
+};
+
+/// @note Collective
+RowSlice row_slice(MPI_Comm comm, std::size_t local);
+
+/// An HDF5 file opened by all ranks of a communicator for writing.
+///
+/// A rank on which something fails goes on through the same collective calls as the others, so that nobody waits for
+/// it; `check` then raises the same RunError on all ranks. Every function is collective.
+class Hdf5File
+{
+public:
+  /// Creates the file; an older one under that name is replaced.
+  /// @param comm  must outlive the file
+  /// @throws RunError on all ranks, with path and reason
+  Hdf5File(MPI_Comm comm, std::filesystem::path path);
+  ~Hdf5File();
+  Hdf5File(const Hdf5File&) = delete;
+  Hdf5File& operator=(const Hdf5File&) = delete;
+
+  void create_group(const std::string& name);
+
+  /// Writes a whole array, each rank its rows.
+  /// @param name    of the dataset, from the root: "/frames/0/position"
+  /// @param rows    this rank's share, from `row_slice`
+  /// @param width   values per row; the dataset has the shape (rows.total, width), or (rows.total,) if the width is 1
+  /// @param values  (rows.local, width) row-major; T is float, double or std::int64_t
+  template <class T>
+  void write(const std::string& name, const RowSlice& rows, int width, std::span<const T> values);
+
+  /// Makes all that was written so far readable by others, now and if the run is killed.
+  void flush();
+
+  /// @throws RunError on all ranks if anything failed on any rank since the file was opened, with path and reason
+  void check();
+
+  /// @throws RunError as `check` does
+  void close();
+
+  MPI_Comm comm() const { return _comm; }
+  const std::filesystem::path& path() const { return _path; }
+
+private:
+  void note(bool succeeded, const char* doing);
+  /// Reserves room for more values; if it cannot be had, that is noted and they must not be written.
+  bool has_room(std::int64_t bytes);
+
+  MPI_Comm _comm;
+  std::filesystem::path _path;
+  std::int64_t _file = -1;    ///< hid_t, which is not named here so that only sources of this folder see HDF5
+  std::string _failure;       ///< what failed first on this rank; empty if nothing did
+  std::int64_t _reserved = 0; ///< bytes that the file may have come to need
+};
+
+/// The text of the lowest rank that has one, on all ranks; empty if nowhere anything failed.
+/// @param failure  what went wrong on this rank, or nothing
+/// @note Collective
+std::string shared_failure(MPI_Comm comm, const std::string& failure);
+} // namespace mpm

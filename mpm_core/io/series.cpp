@@ -1,0 +1,249 @@
+#include "io/series.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <functional>
+
+namespace mpm
+{
+namespace
+{
+const std::array<const char*, 6> component_names = {"xx", "yy", "zz", "xy", "yz", "xz"};
+
+std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix)
+{
+  if (path.extension() == ".h5" || path.extension() == ".xdmf")
+    path.replace_extension();
+  return path += suffix;
+}
+
+bool is_symmetric_tensor(int components) { return components == 4 || components == 6; }
+
+/// Copies columns [first, first + count) of an (n, width) array into an (n, padded_width) one, zeros after them.
+void copy_columns(std::span<const double> values, int width, int first, int count, int padded_width,
+                  std::vector<double>& columns)
+{
+  const auto n = values.size() / static_cast<std::size_t>(width);
+  columns.assign(n * static_cast<std::size_t>(padded_width), 0.0);
+  for (std::size_t row = 0; row < n; ++row)
+    std::copy_n(&values[row * static_cast<std::size_t>(width) + static_cast<std::size_t>(first)], count,
+                &columns[row * static_cast<std::size_t>(padded_width)]);
+}
+
+/// What is wrong with a field's name or length; empty if nothing is.
+std::string field_error(const std::string& name, int components, std::size_t n_values, std::size_t n_rows)
+{
+  const auto plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
+  if (name.empty() || !std::all_of(name.begin(), name.end(), plain))
+    return "name of a field is '" + name + "', expected letters, digits, _ and -";
+  if (components < 1)
+    return name + " has " + std::to_string(components) + " components, expected at least 1";
+  if (n_values != n_rows * static_cast<std::size_t>(components))
+    return name + " has " + std::to_string(n_values) + " values, expected " + std::to_string(n_rows) + " rows of " +
+           std::to_string(components);
+  return {};
+}
+
+std::string fields_error(const std::vector<OutputField>& fields, const std::vector<OutputIndexField>& index_fields,
+                         std::size_t n_rows)
+{
+  for (const OutputField& field : fields)
+    if (const std::string error = field_error(field.name, field.components, field.values.size(), n_rows);
+        !error.empty())
+      return error;
+  for (const OutputIndexField& field : index_fields)
+    if (const std::string error = field_error(field.name, 1, field.values.size(), n_rows); !error.empty())
+      return error;
+  return {};
+}
+
+/// Whether all ranks give the same text; different ones would make ranks wait for each other for ever.
+/// @note Collective
+bool is_same_on_all_ranks(MPI_Comm comm, const std::string& text)
+{
+  const std::size_t hash = std::hash<std::string>{}(text);
+  const std::uint64_t mine[2] = {hash, ~hash};
+  std::uint64_t smallest[2] = {};
+  MPI_Allreduce(mine, smallest, 2, MPI_UINT64_T, MPI_MIN, comm);
+  return smallest[0] == ~smallest[1];
+}
+
+/// @note Collective
+void require_frame(MPI_Comm comm, double time, std::string error, const std::vector<std::vector<OutputField>>& fields,
+                   const std::vector<OutputIndexField>& index_fields)
+{
+  if (error.empty() && !std::isfinite(time))
+    error = "time is " + std::to_string(time) + ", expected a finite number of seconds";
+  error = shared_failure(comm, error);
+  if (!error.empty())
+    throw InputError(error);
+  std::string names;
+  for (const auto& list : fields)
+    for (const OutputField& field : list)
+      names += field.name + ":" + std::to_string(field.components) + ",";
+  for (const OutputIndexField& field : index_fields)
+    names += field.name + ",";
+  if (!is_same_on_all_ranks(comm, names))
+    throw InputError("fields are not the same on all ranks; here: " + names);
+}
+} // namespace
+
+SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Precision precision)
+    : _file(comm, with_suffix(path, ".h5")), _xdmf_path(with_suffix(path, ".xdmf")), _grid(std::move(grid)),
+      _precision(precision)
+{
+  replace_xdmf(xdmf_series(_grid, ""));
+  _file.create_group("/frames");
+}
+
+void SeriesFile::begin_frame()
+{
+  _group = "/frames/" + std::to_string(_n_frames);
+  _file.create_group(_group);
+}
+
+XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, int width,
+                                 std::span<const double> values)
+{
+  const std::string dataset = _group + "/" + name;
+  const bool single = _precision == Precision::float32;
+  if (single)
+  {
+    // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
+    _single.assign(values.begin(), values.end());
+    _file.write<float>(dataset, rows, width, _single);
+  }
+  else
+    _file.write<double>(dataset, rows, width, values);
+  return {_file.path().filename().string() + ":" + dataset, rows.total, width, false, single ? 4 : 8};
+}
+
+XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& rows, int width,
+                                    std::span<const std::int64_t> values)
+{
+  const std::string dataset = _group + "/" + name;
+  _file.write<std::int64_t>(dataset, rows, width, values);
+  return {_file.path().filename().string() + ":" + dataset, rows.total, width, true, 8};
+}
+
+XdmfData SeriesFile::write_points(const std::string& name, const RowSlice& rows, int dimension,
+                                  std::span<const double> values)
+{
+  if (dimension == 3)
+    return write_reals(name, rows, 3, values);
+  copy_columns(values, dimension, 0, dimension, 3, _columns);
+  return write_reals(name, rows, 3, _columns);
+}
+
+std::string SeriesFile::write_fields(const std::string& center, const RowSlice& rows,
+                                     const std::vector<OutputField>& fields)
+{
+  std::string text;
+  for (const OutputField& field : fields)
+    if (is_symmetric_tensor(field.components))
+      for (int k = 0; k < field.components; ++k)
+      {
+        const std::string name = field.name + "_" + component_names[static_cast<std::size_t>(k)];
+        copy_columns(field.values, field.components, k, 1, 1, _columns);
+        text += xdmf_attribute(name, center, write_reals(name, rows, 1, _columns));
+      }
+    else
+      text += xdmf_attribute(field.name, center,
+                             field.components == 2 ? write_points(field.name, rows, 2, field.values)
+                                                   : write_reals(field.name, rows, field.components, field.values));
+  return text;
+}
+
+std::string SeriesFile::write_index_fields(const std::string& center, const RowSlice& rows,
+                                           const std::vector<OutputIndexField>& fields)
+{
+  std::string text;
+  for (const OutputIndexField& field : fields)
+    text += xdmf_attribute(field.name, center, write_integers(field.name, rows, 1, field.values));
+  return text;
+}
+
+void SeriesFile::end_frame(double time, const std::string& content)
+{
+  _file.flush();
+  _file.check();
+  ++_n_frames;
+  _frames += xdmf_frame(time, content);
+  replace_xdmf(xdmf_series(_grid, _frames));
+}
+
+void SeriesFile::write_single(const std::string& content)
+{
+  _file.flush();
+  _file.check();
+  replace_xdmf(xdmf_single(_grid, content));
+}
+
+void SeriesFile::replace_xdmf(const std::string& text)
+{
+  int rank = 0;
+  MPI_Comm_rank(comm(), &rank);
+  const std::string failure = shared_failure(comm(), rank == 0 ? replaced_file(_xdmf_path, text) : "");
+  if (!failure.empty())
+    throw RunError(failure);
+}
+
+ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision)
+    : _series(comm, path, "particles", precision)
+{
+}
+
+void ParticleSeries::write(double time, int dimension, std::span<const double> position,
+                           const std::vector<OutputField>& fields, const std::vector<OutputIndexField>& index_fields)
+{
+  const std::size_t n = position.size() / static_cast<std::size_t>(dimension);
+  require_frame(_series.comm(), time, fields_error(fields, index_fields, n), {fields}, index_fields);
+  const RowSlice rows = row_slice(_series.comm(), n);
+  _series.begin_frame();
+  const XdmfData points = _series.write_points("position", rows, dimension, position);
+  if (rows.total != _vertices.rows)
+    _vertices = write_vertices(rows);
+  // Named as a field as well: some readers give the points of the first frame only. It costs no space.
+  const std::string content = xdmf_topology("Polyvertex", _vertices) + xdmf_geometry(points) +
+                              xdmf_attribute("position", "Node", points) + _series.write_fields("Node", rows, fields) +
+                              _series.write_index_fields("Node", rows, index_fields);
+  _series.end_frame(time, content);
+}
+
+XdmfData ParticleSeries::write_vertices(const RowSlice& rows)
+{
+  std::vector<std::int64_t> numbers(static_cast<std::size_t>(rows.local));
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    numbers[i] = rows.before + static_cast<std::int64_t>(i);
+  return _series.write_integers("vertices", rows, 1, numbers);
+}
+
+MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision, int dimension,
+                       std::span<const double> points, std::span<const std::int64_t> cells)
+    : _series(comm, path, "mesh", precision),
+      _nodes(row_slice(comm, points.size() / static_cast<std::size_t>(dimension))),
+      _cells(row_slice(comm, cells.size() / static_cast<std::size_t>(dimension + 1)))
+{
+  std::vector<std::int64_t> numbers(cells.begin(), cells.end());
+  for (std::int64_t& node : numbers)
+    node += _nodes.before;
+  const XdmfData topology = _series.write_integers("cells", _cells, dimension + 1, numbers);
+  const XdmfData geometry = _series.write_points("points", _nodes, dimension, points);
+  _grid = xdmf_topology(dimension == 2 ? "Triangle" : "Tetrahedron", topology) + xdmf_geometry(geometry);
+  _series.write_single(_grid);
+}
+
+void MeshSeries::write(double time, const std::vector<OutputField>& node_fields,
+                       const std::vector<OutputField>& cell_fields)
+{
+  std::string error = fields_error(node_fields, {}, static_cast<std::size_t>(_nodes.local));
+  if (error.empty())
+    error = fields_error(cell_fields, {}, static_cast<std::size_t>(_cells.local));
+  require_frame(_series.comm(), time, error, {node_fields, cell_fields}, {});
+  _series.begin_frame();
+  const std::string content =
+      _grid + _series.write_fields("Node", _nodes, node_fields) + _series.write_fields("Cell", _cells, cell_fields);
+  _series.end_frame(time, content);
+}
+} // namespace mpm

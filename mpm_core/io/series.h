@@ -1,0 +1,134 @@
+#pragma once
+/// @file
+/// Particles and background mesh over time, in parallel HDF5 with an XDMF file beside it.
+
+#include "io/hdf5_file.h"
+#include "io/xdmf.h"
+
+#include <vector>
+
+namespace mpm
+{
+/// Real values to write: `values` is (n, components), row-major.
+struct OutputField
+{
+  std::string name;
+  int components = 1;
+  std::span<const double> values;
+};
+
+/// Whole numbers to write, one per particle, node or cell.
+struct OutputIndexField
+{
+  std::string name;
+  std::span<const std::int64_t> values;
+};
+
+enum class Precision
+{
+  float32,
+  float64
+};
+
+/// The files PATH.h5 and PATH.xdmf of one series. ParaView, VTK and meshio open the XDMF file, also while the run goes
+/// on and after it was killed: each frame is in the HDF5 file before the XDMF file names it.
+///
+/// How fields are stored: 2 components are padded to 3, so that they are vectors to ParaView; 4 and 6 components are a
+/// symmetric tensor in the order of base/types.h and become one dataset for each component, NAME_xx and so on; other
+/// counts are kept. Every function is collective, and raises errors on all ranks alike.
+class SeriesFile
+{
+public:
+  /// @param comm  must outlive the object
+  /// @param path  without suffix, or with .h5 or .xdmf; the folder must exist
+  /// @param grid  name of the grid in the XDMF file
+  /// @throws RunError if the files cannot be written, with path and reason
+  SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Precision precision);
+
+  /// Starts the group of a frame.
+  void begin_frame();
+
+  /// Writes points of 2 or 3 coordinates, padded to 3, into the present group.
+  XdmfData write_points(const std::string& name, const RowSlice& rows, int dimension, std::span<const double> values);
+
+  XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
+                          std::span<const std::int64_t> values);
+
+  /// Writes fields that live on nodes or cells into the present group.
+  /// @return their description in XDMF
+  std::string write_fields(const std::string& center, const RowSlice& rows, const std::vector<OutputField>& fields);
+  std::string write_index_fields(const std::string& center, const RowSlice& rows,
+                                 const std::vector<OutputIndexField>& fields);
+
+  /// Puts a frame, whose datasets are written, into the XDMF file.
+  void end_frame(double time, const std::string& content);
+
+  /// Writes the XDMF file of a grid without time.
+  void write_single(const std::string& content);
+
+  void close() { _file.close(); }
+  MPI_Comm comm() const { return _file.comm(); }
+
+private:
+  XdmfData write_reals(const std::string& name, const RowSlice& rows, int width, std::span<const double> values);
+  void replace_xdmf(const std::string& text);
+
+  Hdf5File _file;
+  std::filesystem::path _xdmf_path;
+  std::string _grid;
+  Precision _precision;
+  std::string _group; ///< group that datasets go into, without trailing slash
+  int _n_frames = 0;
+  std::string _frames;          ///< XDMF of the frames so far
+  std::vector<float> _single;   ///< room for a field in single precision
+  std::vector<double> _columns; ///< room for padded vectors and single components
+};
+
+/// Particles over time. Their number may change, and ranks may have none.
+class ParticleSeries
+{
+public:
+  ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision);
+
+  /// Writes a frame.
+  /// @param time        s, finite
+  /// @param dimension   2 or 3
+  /// @param position    (n, dimension) of this rank's particles; m
+  /// @param fields      of n rows each; the same names on all ranks
+  /// @throws InputError if lengths do not match, names differ between ranks or are no plain words
+  void write(double time, int dimension, std::span<const double> position, const std::vector<OutputField>& fields,
+             const std::vector<OutputIndexField>& index_fields);
+
+  void close() { _series.close(); }
+
+private:
+  XdmfData write_vertices(const RowSlice& rows);
+
+  SeriesFile _series;
+  XdmfData _vertices; ///< the latest topology; written again only when the number of particles changes
+};
+
+/// The background mesh, once, and fields on its nodes and cells over time.
+class MeshSeries
+{
+public:
+  /// Writes the mesh.
+  /// @param dimension  2 (triangles) or 3 (tetrahedra)
+  /// @param points     (n, dimension) nodes of this rank's cells; m. A node that several ranks give appears once for
+  /// each.
+  /// @param cells      (m, dimension + 1) rows of `points`, this rank's own cells only
+  MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision, int dimension,
+             std::span<const double> points, std::span<const std::int64_t> cells);
+
+  /// Writes a frame of fields on the nodes and cells given at the start.
+  void write(double time, const std::vector<OutputField>& node_fields, const std::vector<OutputField>& cell_fields);
+
+  void close() { _series.close(); }
+
+private:
+  SeriesFile _series;
+  RowSlice _nodes;
+  RowSlice _cells;
+  std::string _grid; ///< XDMF of topology and geometry
+};
+} // namespace mpm

@@ -1,0 +1,189 @@
+"""Particles and background mesh over time, in parallel HDF5 files with XDMF files beside them.
+
+ParaView, VTK and meshio open the ``.xdmf`` file, also while the run goes on and after it was killed: it is replaced as a
+whole after each frame, when the frame is in the ``.h5`` file. h5py reads the datasets ``/frames/NUMBER/NAME`` directly.
+
+Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
+and six components are a symmetric tensor, ``xx yy zz xy`` or ``xx yy zz xy yz xz``, and become one dataset for each
+component, ``NAME_xx`` and so on; other numbers of components are kept as they are. Names consist of letters, digits,
+``_`` and ``-``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from types import TracebackType
+
+import numpy as np
+from mpi4py import MPI
+
+from . import _core
+from ._core import InputError
+from .collective import collectively
+
+
+class ParticleOutput:
+    """Frames of particles; a context manager.
+
+    Example:
+        >>> with ParticleOutput("results/particles", MPI.COMM_WORLD) as output:
+        ...     output.write(0.0, {"position": x, "velocity": v, "stress": stress, "id": numbers})
+
+    Args:
+        path: of the files, without suffix; the folder must exist. Files of that name are replaced.
+        comm: communicator whose ranks write together; must not be freed before the output is closed.
+        float32: store real numbers in single precision; in double precision if false.
+
+    Raises:
+        RunError: on all ranks, with path and reason, when the files cannot be written (missing folder, no permission,
+            disk full).
+
+    Note:
+        Collective: construction, ``write`` and ``close`` are called by all ranks.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True) -> None:
+        self._comm = comm
+        self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32)
+
+    def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
+        """Write one frame, which is on disk when this returns.
+
+        Args:
+            time: s.
+            fields: arrays of this rank's particles by name, the same names on all ranks. ``position``, shape (n, 2) or
+                (n, 3) in m, must be among them; whole numbers keep their type as int64. n may differ from rank to rank
+                and from frame to frame, and may be zero.
+
+        Raises:
+            InputError: a field is missing, of another length or not numeric; names the field, what it is and what was
+                expected.
+            RunError: the frame cannot be written.
+        """
+        position, real, whole = collectively(self._comm, lambda: _particle_fields(fields))
+        self._series.write(float(time), position, real, whole)
+
+    def close(self) -> None:
+        """Close the files; nothing can be written after that."""
+        self._series.close()
+
+    def __enter__(self) -> ParticleOutput:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class MeshOutput:
+    """The background mesh, written once, and frames of fields on its nodes and cells; a context manager.
+
+    Args:
+        path: of the files, without suffix; the folder must exist. Files of that name are replaced.
+        comm: communicator whose ranks write together; must not be freed before the output is closed.
+        points: (n, 2) or (n, 3), nodes of this rank's cells, m. A node that several ranks give is stored once for each.
+        cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
+        float32: store real numbers in single precision; in double precision if false.
+
+    Raises:
+        InputError: ``points`` or ``cells`` have a wrong shape, or a cell names a point that is not there.
+        RunError: on all ranks, with path and reason, when the files cannot be written.
+
+    Note:
+        Collective: construction, ``write`` and ``close`` are called by all ranks.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        comm: MPI.Comm,
+        points: np.ndarray,
+        cells: np.ndarray,
+        float32: bool = True,
+    ) -> None:
+        self._comm = comm
+        points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
+        self._series = _core.MeshSeries(MPI._addressof(comm), os.fspath(path), float32, points, cells)
+
+    def write(
+        self,
+        time: float,
+        node_fields: Mapping[str, np.ndarray] | None = None,
+        cell_fields: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """Write one frame of fields, which is on disk when this returns.
+
+        Args:
+            time: s.
+            node_fields: arrays with a row for each of ``points``, by name.
+            cell_fields: arrays with a row for each of ``cells``, by name.
+
+        Raises:
+            InputError: a field is of another length or not numeric.
+            RunError: the frame cannot be written.
+        """
+        nodes, cells = collectively(self._comm, lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {})))
+        self._series.write(float(time), nodes, cells)
+
+    def close(self) -> None:
+        """Close the files; nothing can be written after that."""
+        self._series.close()
+
+    def __enter__(self) -> MeshOutput:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _numeric(name: str, values: np.ndarray) -> np.ndarray:
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiub":
+        raise InputError(f"{name} has dtype {array.dtype}, expected numbers")
+    if array.ndim not in (1, 2):
+        raise InputError(f"{name} has shape {array.shape}, expected (n,) or (n, k)")
+    return array
+
+
+def _real_fields(fields: Mapping[str, np.ndarray]) -> list[tuple[str, np.ndarray]]:
+    return [(name, np.ascontiguousarray(_numeric(name, values), np.float64)) for name, values in fields.items()]
+
+
+def _particle_fields(
+    fields: Mapping[str, np.ndarray],
+) -> tuple[np.ndarray, list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
+    """Position, real fields and fields of whole numbers."""
+    if "position" not in fields:
+        raise InputError(f"fields are {', '.join(fields) or 'none'}, expected 'position' among them")
+    position = _numeric("position", fields["position"])
+    if position.ndim != 2 or position.shape[1] not in (2, 3):
+        raise InputError(f"position has shape {position.shape}, expected (n, 2) or (n, 3)")
+    others = {name: _numeric(name, values) for name, values in fields.items() if name != "position"}
+    for name, values in others.items():
+        if len(values) != len(position):
+            raise InputError(f"{name} has {len(values)} rows, expected {len(position)} as position has")
+    whole = {name: values for name, values in others.items() if values.dtype.kind in "iub" and values.ndim == 1}
+    real = {name: values for name, values in others.items() if name not in whole}
+    return (
+        np.ascontiguousarray(position, np.float64),
+        _real_fields(real),
+        [(name, np.ascontiguousarray(values, np.int64)) for name, values in whole.items()],
+    )
+
+
+def _checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    points = np.asarray(points)
+    cells = np.asarray(cells)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise InputError(f"points has shape {points.shape}, expected (n, 2) or (n, 3)")
+    if cells.ndim != 2 or cells.shape[1] != points.shape[1] + 1 or cells.dtype.kind not in "iu":
+        raise InputError(
+            f"cells has shape {cells.shape} and dtype {cells.dtype}, expected (m, {points.shape[1] + 1}) whole numbers"
+        )
+    if cells.size and not 0 <= cells.min() <= cells.max() < len(points):
+        raise InputError(f"cells has node {max(cells.max(), -cells.min())}, expected numbers from 0 to {len(points) - 1}")
+    return np.ascontiguousarray(points, np.float64), np.ascontiguousarray(cells, np.int64)

@@ -1,0 +1,56 @@
+"""Output on several ranks: each writes its share, and an error on one is one on all."""
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from mpm_core import InputError, RunError
+from mpm_core.output import MeshOutput, ParticleOutput
+
+
+def test_shares_are_stored_by_rising_rank(comm, shared_path):
+    # Rank r has r particles, so the first has none; in the second frame all have two, in the third none has any.
+    counts = [[rank for rank in range(comm.size)], [2] * comm.size, [0] * comm.size]
+    with ParticleOutput(shared_path / "particles", comm, float32=False) as output:
+        for step, count in enumerate(counts):
+            n = count[comm.rank]
+            position = np.full((n, 3), comm.rank, dtype=float)
+            output.write(float(step), {"position": position, "id": 100 * comm.rank + np.arange(n)})
+    with h5py.File(shared_path / "particles.h5") as file:
+        for step, count in enumerate(counts):
+            ranks = np.repeat(np.arange(comm.size), count)
+            numbers = [100 * rank + i for rank in range(comm.size) for i in range(count[rank])]
+            np.testing.assert_array_equal(file[f"frames/{step}/position"][:, 0], ranks)
+            np.testing.assert_array_equal(file[f"frames/{step}/id"][()], numbers)
+
+
+def test_mesh_cells_keep_their_nodes(comm, shared_path):
+    # Each rank gives one triangle, moved by its rank along x.
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) + [comm.rank, 0.0]
+    with MeshOutput(shared_path / "mesh", comm, points, np.array([[0, 1, 2]])):
+        pass
+    mesh = meshio.read(shared_path / "mesh.xdmf")
+    corners = mesh.points[mesh.cells_dict["triangle"]]
+    np.testing.assert_array_equal(corners[:, 0, 0], np.arange(comm.size))
+    np.testing.assert_array_equal(corners[:, 1, 0], np.arange(comm.size) + 1)
+
+
+def test_a_bad_field_on_one_rank_is_raised_on_all(comm, shared_path):
+    last = comm.rank == comm.size - 1
+    with ParticleOutput(shared_path / "particles", comm) as output:
+        with pytest.raises(InputError, match="mass has 3 rows, expected 2"):
+            output.write(0.0, {"position": np.zeros((2, 2)), "mass": np.zeros(3 if last else 2)})
+
+
+def test_different_names_are_refused_on_all_ranks(comm, shared_path):
+    if comm.size == 1:
+        pytest.skip("needs two ranks")
+    name = "mass" if comm.rank == 0 else "volume"
+    with ParticleOutput(shared_path / "particles", comm) as output:
+        with pytest.raises(InputError, match="fields are not the same on all ranks"):
+            output.write(0.0, {"position": np.zeros((2, 2)), name: np.zeros(2)})
+
+
+def test_a_missing_folder_is_raised_on_all_ranks(comm, shared_path):
+    with pytest.raises(RunError, match="No such file or directory"):
+        ParticleOutput(shared_path / "nowhere" / "particles", comm)

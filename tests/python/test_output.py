@@ -1,0 +1,250 @@
+"""Output over time: what h5py, meshio and VTK read is what was written, and errors say what is wrong."""
+
+import signal
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from mpi4py import MPI
+from mpm_core import InputError, RunError
+from mpm_core.output import MeshOutput, ParticleOutput
+
+COMM = MPI.COMM_WORLD
+TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+
+
+def particle_fields(n, dimension, seed=0):
+    rng = np.random.default_rng(seed)
+    return {
+        "position": rng.random((n, dimension)),
+        "velocity": rng.random((n, dimension)),
+        "stress": rng.random((n, 4 if dimension == 2 else 6)),
+        "volume": rng.random(n),
+        "gradient": rng.random((n, 9)),
+        "id": rng.permutation(n).astype(np.int64),
+        "material": np.ones(n, dtype=np.int32),
+    }
+
+
+def padded(vectors):
+    return np.hstack([vectors, np.zeros((len(vectors), 3 - vectors.shape[1]))])
+
+
+def stored(fields):
+    """The datasets that fields of a frame become."""
+    names = ["xx", "yy", "zz", "xy", "yz", "xz"]
+    expected = {}
+    for name, values in fields.items():
+        if values.ndim == 2 and values.shape[1] in (4, 6):
+            expected |= {f"{name}_{names[k]}": values[:, k] for k in range(values.shape[1])}
+        else:
+            expected[name] = padded(values) if values.ndim == 2 and values.shape[1] == 2 else values
+    return expected
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("float32", [True, False])
+def test_h5py_reads_what_was_written(tmp_path, dimension, float32):
+    frames = [particle_fields(n, dimension, seed=n) for n in (7, 7, 5, 0, 1)]
+    with ParticleOutput(tmp_path / "particles", COMM, float32) as output:
+        for step, fields in enumerate(frames):
+            output.write(0.1 * step, fields)
+    with h5py.File(tmp_path / "particles.h5") as file:
+        assert set(file["frames"]) == {"0", "1", "2", "3", "4"}
+        for step, fields in enumerate(frames):
+            group = file[f"frames/{step}"]
+            for name, values in stored(fields).items():
+                real = values.dtype.kind == "f"
+                assert group[name].dtype == (np.float32 if real and float32 else np.float64 if real else np.int64)
+                # float32 keeps 24 binary digits
+                np.testing.assert_allclose(group[name][()], values, rtol=2.0**-24 if float32 and real else 0)
+
+
+def test_meshio_reads_the_particles_over_time(tmp_path):
+    frames = [particle_fields(6, 2, seed=step) for step in range(3)]
+    with ParticleOutput(tmp_path / "particles.xdmf", COMM, float32=False) as output:
+        for step, fields in enumerate(frames):
+            output.write(0.5 * step, fields)
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "particles.xdmf") as reader:
+        points, cells = reader.read_points_cells()
+        np.testing.assert_array_equal(points, padded(frames[0]["position"]))
+        assert cells[0].type == "vertex" and len(cells[0].data) == 6
+        assert reader.num_steps == 3
+        for step, fields in enumerate(frames):
+            time, data, _ = reader.read_data(step)
+            assert time == 0.5 * step
+            for name, values in stored(fields).items():
+                np.testing.assert_array_equal(data[name], values)
+
+
+def read_with_vtk(path, time):
+    """The data set that VTK's XDMF reader gives for a time."""
+    vtk = pytest.importorskip("vtk")
+    if not hasattr(vtk, "vtkXdmfReader"):
+        pytest.skip("this VTK was built without its XDMF reader")
+    reader = vtk.vtkXdmfReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    reader.UpdateTimeStep(time)
+    data = reader.GetOutputDataObject(0)
+    while data.IsA("vtkMultiBlockDataSet"):
+        data = data.GetBlock(0)
+    return data
+
+
+def test_vtk_reads_particles_and_mesh_over_time(tmp_path):
+    frames = [particle_fields(n, 2, seed=n) for n in (4, 6)]
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        for step, fields in enumerate(frames):
+            output.write(float(step), fields)
+    for step, fields in enumerate(frames):
+        data = read_with_vtk(tmp_path / "particles.xdmf", float(step))
+        n = len(fields["position"])
+        assert data.GetNumberOfPoints() == data.GetNumberOfCells() == n
+        points = [data.GetPoint(i) for i in range(n)]
+        np.testing.assert_allclose(points, padded(fields["position"]), rtol=1e-6)
+        stress = data.GetPointData().GetArray("stress_yy")
+        np.testing.assert_allclose([stress.GetTuple1(i) for i in range(n)], fields["stress"][:, 1], rtol=1e-6)
+        numbers = data.GetPointData().GetArray("id")
+        assert [numbers.GetTuple1(i) for i in range(n)] == fields["id"].tolist()
+    with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES):
+        pass
+    assert read_with_vtk(tmp_path / "mesh.xdmf", 0.0).GetNumberOfCells() == 2
+
+
+def test_mesh_without_fields_is_one_grid(tmp_path):
+    with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES, float32=False):
+        mesh = meshio.read(tmp_path / "mesh.xdmf")
+    np.testing.assert_array_equal(mesh.points, padded(SQUARE))
+    np.testing.assert_array_equal(mesh.cells_dict["triangle"], TRIANGLES)
+
+
+def test_mesh_fields_over_time(tmp_path):
+    tetrahedron = np.vstack([np.zeros(3), np.eye(3)])
+    with MeshOutput(tmp_path / "mesh", COMM, tetrahedron, np.array([[0, 1, 2, 3]]), float32=False) as output:
+        for step in range(2):
+            output.write(float(step), {"mass": np.arange(4.0) + step}, {"pressure": np.array([10.0 * step])})
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "mesh.xdmf") as reader:
+        points, cells = reader.read_points_cells()
+        np.testing.assert_array_equal(points, tetrahedron)
+        assert cells[0].type == "tetra"
+        for step in range(2):
+            time, at_nodes, in_cells = reader.read_data(step)
+            assert time == step
+            np.testing.assert_array_equal(at_nodes["mass"], np.arange(4.0) + step)
+            np.testing.assert_array_equal(in_cells["pressure"][0], [10.0 * step])
+
+
+def test_both_files_are_valid_while_the_run_goes_on(tmp_path):
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        for step in range(3):
+            output.write(float(step), particle_fields(5, 2))
+            tree = ElementTree.parse(tmp_path / "particles.xdmf")
+            assert [float(time.get("Value")) for time in tree.iter("Time")] == list(range(step + 1))
+            # Another process, as ParaView is.
+            read = "import h5py, sys; print(len(h5py.File(sys.argv[1])['frames']))"
+            counted = subprocess.run(
+                [sys.executable, "-c", read, tmp_path / "particles.h5"], capture_output=True, text=True, check=True
+            )
+            assert int(counted.stdout) == step + 1
+
+
+def test_frames_survive_a_kill(tmp_path):
+    script = f"""
+import os, signal
+import numpy as np
+from mpi4py import MPI
+from mpm_core.output import ParticleOutput
+output = ParticleOutput({str(tmp_path / "particles")!r}, MPI.COMM_WORLD)
+for step in range(4):
+    output.write(step, {{"position": np.full((1000, 2), step)}})
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    killed = subprocess.run([sys.executable, "-c", script], timeout=60)
+    assert killed.returncode == -signal.SIGKILL
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "particles.xdmf") as reader:
+        reader.read_points_cells()
+        assert reader.num_steps == 4
+        for step in range(4):
+            np.testing.assert_array_equal(reader.read_data(step)[1]["position"][:, :2], step)
+
+
+def test_missing_folder_is_named(tmp_path):
+    with pytest.raises(RunError, match=f"cannot write {tmp_path}/nowhere/particles.h5: No such file or directory"):
+        ParticleOutput(tmp_path / "nowhere" / "particles", COMM)
+
+
+def test_a_file_that_cannot_grow_is_named(tmp_path):
+    # A limit on the size of files stands for a full disk, which a test cannot make without being root.
+    script = f"""
+import resource, signal, sys
+import numpy as np
+from mpi4py import MPI
+from mpm_core import RunError
+from mpm_core.output import ParticleOutput
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))
+output = ParticleOutput({str(tmp_path / "particles")!r}, MPI.COMM_WORLD)
+try:
+    for step in range(10):
+        output.write(step, {{"position": np.zeros((5000, 3))}})
+except RunError as error:
+    print(error)
+    sys.exit(7)
+"""
+    refused = subprocess.run([sys.executable, "-c", script], timeout=60, capture_output=True, text=True)
+    assert refused.returncode == 7, refused.stderr
+    assert refused.stdout.strip() == f"cannot write {tmp_path}/particles.h5: File too large"
+    # What was written before is still there.
+    with h5py.File(tmp_path / "particles.h5") as file:
+        assert file["frames/0/position"].shape == (5000, 3)
+
+
+GOOD = particle_fields(3, 2)
+BAD_FIELDS = [
+    ({"velocity": GOOD["velocity"]}, "expected 'position' among them"),
+    ({"position": np.zeros(3)}, r"position has shape \(3,\), expected \(n, 2\) or \(n, 3\)"),
+    (GOOD | {"mass": np.zeros(4)}, "mass has 4 rows, expected 3"),
+    (GOOD | {"mass": np.array(["a", "b", "c"])}, "mass has dtype <U1, expected numbers"),
+    (GOOD | {"mass": np.zeros((3, 2, 2))}, r"mass has shape \(3, 2, 2\)"),
+    (GOOD | {"a/b": np.zeros(3)}, "name of a field is 'a/b', expected letters, digits, _ and -"),
+]
+
+
+@pytest.mark.parametrize("fields, message", BAD_FIELDS)
+def test_bad_fields_are_named(tmp_path, fields, message):
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        with pytest.raises(InputError, match=message):
+            output.write(0.0, fields)
+        output.write(0.0, GOOD)
+
+
+def test_time_must_be_finite(tmp_path):
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        with pytest.raises(InputError, match="time is nan, expected a finite number of seconds"):
+            output.write(float("nan"), GOOD)
+
+
+def test_nothing_is_written_after_closing(tmp_path):
+    output = ParticleOutput(tmp_path / "particles", COMM)
+    output.close()
+    with pytest.raises(RunError, match="it is closed"):
+        output.write(0.0, GOOD)
+
+
+BAD_MESHES = [
+    (SQUARE, TRIANGLES + 2, "cells has node 5, expected numbers from 0 to 3"),
+    (SQUARE, TRIANGLES[:, :2], r"cells has shape \(2, 2\)"),
+    (SQUARE[:, :1], TRIANGLES, r"points has shape \(4, 1\)"),
+]
+
+
+@pytest.mark.parametrize("points, cells, message", BAD_MESHES)
+def test_bad_meshes_are_named(tmp_path, points, cells, message):
+    with pytest.raises(InputError, match=message):
+        MeshOutput(tmp_path / "mesh", COMM, points, cells)
