@@ -105,7 +105,7 @@ std::vector<std::array<double, D + 1>> even_points(int count)
       {
         near += (shown++ ? ", " : "") + std::to_string(n);
       }
-    throw InputError("particles per cell is " + std::to_string(count) + ", expected a number that fills a " +
+    throw InputError("per_cell is " + std::to_string(count) + ", expected a number of particles that fills a " +
                      (D == 2 ? "triangle" : "tetrahedron") + " evenly, near it: " + near);
   }
   const auto [k, divisions] = *found;
