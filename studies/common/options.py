@@ -1,0 +1,129 @@
+"""Command line options of a study: the unit stands in the help, and a bad value is named with what was expected.
+
+Example:
+    >>> parser = study_parser(__doc__)
+    >>> add_number(parser, "--height", 1.0, "m", "height of the slope", above=0.0)
+    >>> add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0.0, below=90.0)
+    >>> add_count(parser, "--particles-per-cell", 10, "particles in each cell at the start", choices=(1, 3, 4, 6, 10, 12))
+    >>> options = parser.parse_args()
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from mpi4py import MPI
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that, on several ranks, speaks on the first one only."""
+
+    def _print_message(self, message: str, file=None) -> None:
+        if MPI.COMM_WORLD.rank == 0:
+            super()._print_message(message, file)
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}\n(--help lists the options)\n")
+
+
+def study_parser(description: str | None) -> argparse.ArgumentParser:
+    """A parser with the option ``--output`` for the results folder.
+
+    Args:
+        description: the study's docstring; shown as it is.
+    """
+    parser = _Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+    parser.prog = f"studies/run {Path(parser.prog).stem}"
+    parser.add_argument(
+        "--output", type=Path, default=None, metavar="DIR", help="folder for the results (default: results/NAME)"
+    )
+    return parser
+
+
+def _add(parser: argparse.ArgumentParser, name: str, default: object, text: str, **kind: object) -> None:
+    shown = "" if default is None else f" (default: {default:g})" if isinstance(default, float) else f" (default: {default})"
+    parser.add_argument(name, default=default, help=(text + shown).replace("%", "%%"), **kind)  # type: ignore[arg-type]
+
+
+def add_number(
+    parser: argparse.ArgumentParser,
+    name: str,
+    default: float | None,
+    unit: str,
+    text: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+) -> None:
+    """Add an option that takes a finite real number between bounds.
+
+    Args:
+        unit: shown in the help; "-" for a number without unit.
+        text: what the number means.
+        above, at_least, below, at_most: bounds; ``above`` and ``below`` exclude the bound itself.
+    """
+    bounds = [(above, "above", lambda x, b: x > b), (at_least, "at least", lambda x, b: x >= b)]
+    bounds += [(below, "below", lambda x, b: x < b), (at_most, "at most", lambda x, b: x <= b)]
+    given = [(bound, word, holds) for bound, word, holds in bounds if bound is not None]
+    expected = " and ".join([f"{word} {bound:g}" for bound, word, _ in given])
+    label = "" if unit == "-" else f" {unit}"
+
+    def number(value: str) -> float:
+        try:
+            result = float(value)
+        except ValueError:
+            result = math.nan
+        if not math.isfinite(result) or not all(holds(result, bound) for bound, _, holds in given):
+            raise argparse.ArgumentTypeError(f"is '{value}', expected a number {expected}{label}".replace("  ", " "))
+        return result
+
+    _add(parser, name, default, f"{text} [{unit}]", type=number, metavar="X")
+
+
+def add_count(
+    parser: argparse.ArgumentParser, name: str, default: int, text: str, *, choices: Sequence[int] | None = None
+) -> None:
+    """Add an option that takes a whole number from 1 on, or one of ``choices``."""
+    expected = "a whole number from 1 on" if choices is None else "one of " + ", ".join(map(str, choices))
+
+    def count(value: str) -> int:
+        result = int(value) if value.isdecimal() else 0
+        if result < 1 or (choices is not None and result not in choices):
+            raise argparse.ArgumentTypeError(f"is '{value}', expected {expected}")
+        return result
+
+    _add(parser, name, default, text, type=count, metavar="N")
+
+
+def add_choice(parser: argparse.ArgumentParser, name: str, default: str, choices: Sequence[str], text: str) -> None:
+    """Add an option that takes one of some words."""
+
+    def choice(value: str) -> str:
+        if value not in choices:
+            raise argparse.ArgumentTypeError(f"is '{value}', expected one of {', '.join(choices)}")
+        return value
+
+    _add(parser, name, default, text, type=choice, metavar="|".join(choices))
+
+
+def add_switch(parser: argparse.ArgumentParser, name: str, default: bool, text: str) -> None:
+    """Add a pair of options, ``--name`` and ``--no-name``."""
+    shown = name if default else "--no-" + name.removeprefix("--")
+    parser.add_argument(name, action=argparse.BooleanOptionalAction, default=default, help=f"{text} (default: {shown})")
+
+
+def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:
+    """End with an error when options that depend on each other do not fit together.
+
+    Example:
+        >>> check(parser, options.dilation_angle <= options.friction_angle,
+        ...       f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle")
+    """
+    if not holds:
+        parser.error(message if isinstance(message, str) else message())

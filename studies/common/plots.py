@@ -1,0 +1,271 @@
+"""Pictures of particles, background mesh and histories, ready for a paper; plane problems.
+
+Each quantity keeps its colour map and unit everywhere (`Quantity`), and one colour scale over time is found by
+`colour_limits`. Particles are drawn as discs of their own area, so that a picture shows how they fill space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+SOIL = "#b98a5e"
+GREY = "#8c8c8c"
+CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444")
+WIDTH = 6.9  # in; a page's text width
+STYLE = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 10,
+    "axes.linewidth": 0.6,
+    "axes.labelsize": 10,
+    "axes.titlesize": 10,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "savefig.dpi": 200,
+}
+
+
+def paper_style() -> AbstractContextManager[None]:
+    """Fonts and lines of all pictures, as a context."""
+    return plt.rc_context(STYLE)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is drawn in colour.
+
+    Args:
+        name: as it stands at the colour bar.
+        unit: as shown; "-" for none.
+        scale: shown value = value in SI units times this.
+        colours: a perceptually uniform colour map of Matplotlib.
+    """
+
+    name: str
+    unit: str
+    scale: float = 1.0
+    colours: str = "viridis"
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} [{self.unit}]"
+
+
+DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
+SHEAR_STRAIN = Quantity("Accumulated shear strain", "-", colours="inferno")
+VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="cividis")
+SPEED = Quantity("Speed", "m/s", colours="plasma")
+
+
+@dataclass
+class Scene:
+    """The background mesh that particles are drawn in front of.
+
+    Args:
+        points: (n, 2), m.
+        cells: (m, 3) rows of ``points``.
+        is_soil: (m,) true for cells that held soil at the start; all if not given.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    is_soil: np.ndarray | None = None
+    boundary: np.ndarray = field(init=False, repr=False)
+    initial_outline: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        soil = self.cells if self.is_soil is None else self.cells[self.is_soil]
+        self.boundary = self.points[boundary_edges(self.cells)]
+        self.initial_outline = self.points[boundary_edges(soil)]
+
+    def limits(self, positions: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the soil at the start and the given positions, with a margin."""
+        corners = [self.initial_outline.reshape(-1, 2), *positions]
+        corners = [corner for corner in corners if len(corner)]
+        lower = np.min([corner.min(axis=0) for corner in corners], axis=0)
+        upper = np.max([corner.max(axis=0) for corner in corners], axis=0)
+        margin = 0.04 * (upper - lower).max()
+        return lower - margin, upper + margin
+
+
+def boundary_edges(cells: np.ndarray) -> np.ndarray:
+    """Edges that belong to one triangle only, (k, 2) node numbers."""
+    edges = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    return unique[counts == 1]
+
+
+def colour_limits(quantity: Quantity, values: Iterable[np.ndarray]) -> tuple[float, float]:
+    """One colour scale for a quantity over time, in its shown unit, with round numbers at its ends.
+
+    The hundredth part of particles with the most extreme values is left out at each end, in the frame where they are
+    most extreme: in a thin sheet or at a sharp toe single particles carry values that would hide all others.
+
+    Args:
+        values: per frame, in SI units.
+    """
+    shown = [quantity.scale * frame for frame in values if len(frame)]
+    if not shown:
+        return 0.0, 1.0
+    low = min(np.percentile(frame, 1) for frame in shown)
+    high = max(np.percentile(frame, 99) for frame in shown)
+    if all(frame.min() >= 0 for frame in shown):
+        low = 0.0
+    if not high > low:
+        low, high = low - 0.5, high + 0.5
+    ticks = MaxNLocator(7).tick_values(low, high)
+    return float(ticks[0]), float(ticks[-1])
+
+
+def figure_with_bar(lower: np.ndarray, upper: np.ndarray) -> tuple[Figure, Axes, Axes]:
+    """A figure for a picture in equal axes that shows [lower, upper], with room for a horizontal colour bar below."""
+    left, right, bottom, top, bar = 0.52, 0.18, 0.98, 0.34, 0.11  # in
+    width = WIDTH - left - right
+    height = np.clip(width * (upper[1] - lower[1]) / (upper[0] - lower[0]), 1.2, 6.5)
+    total = bottom + height + top
+    figure = plt.figure(figsize=(WIDTH, total))
+    axes = figure.add_axes((left / WIDTH, bottom / total, width / WIDTH, height / total))
+    bar_axes = figure.add_axes(((left + 0.2 * width) / WIDTH, 0.42 / total, 0.6 * width / WIDTH, bar / total))
+    axes.set_aspect("equal")
+    axes.set_xlim(lower[0], upper[0])
+    axes.set_ylim(lower[1], upper[1])
+    axes.set_xlabel("$x$ [m]", labelpad=1)
+    axes.set_ylabel("$y$ [m]")
+    return figure, axes, bar_axes
+
+
+def draw_scene(axes: Axes, scene: Scene) -> None:
+    """Boundary of the background mesh, and the outline of the soil at the start."""
+    axes.add_collection(LineCollection(scene.boundary, colors="black", linewidths=1.0, zorder=3))
+    axes.add_collection(LineCollection(scene.initial_outline, colors=GREY, linewidths=0.6, zorder=2))
+
+
+def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) -> EllipseCollection:
+    """Particles as discs of area ``volume`` (per metre of thickness); drawn a little larger, so that they just touch."""
+    diameter = 1.15 * np.sqrt(4.0 / np.pi * volume)
+    collection = EllipseCollection(
+        diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=position, transOffset=axes.transData, **look
+    )
+    axes.add_collection(collection)
+    return collection
+
+
+def draw_bar(figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[float, float], has_less: bool = True) -> None:
+    """The colour bar, with arrows where values beyond its ends may occur."""
+    colours = ScalarMappable(Normalize(*limits), quantity.colours)
+    extend = "both" if has_less else "max"
+    bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend)
+    bar.set_label(quantity.label, labelpad=2)
+    bar.outline.set_linewidth(0.5)
+
+
+def save_particles(
+    path: Path,
+    scene: Scene,
+    position: np.ndarray,
+    volume: np.ndarray,
+    values: np.ndarray,
+    quantity: Quantity,
+    *,
+    limits: tuple[float, float] | None = None,
+    title: str = "",
+) -> None:
+    """Draw particles coloured by a quantity.
+
+    Args:
+        path: of the PNG or PDF file.
+        position: (n, 2), m.
+        volume: (n,), m^3 per metre of thickness.
+        values: (n,), SI units.
+        limits: of the colour scale, from `colour_limits`; those of ``values`` if not given.
+        title: stands above, for instance the time.
+    """
+    limits = limits or colour_limits(quantity, [values])
+    with paper_style():
+        figure, axes, bar_axes = figure_with_bar(*scene.limits([position]))
+        draw_scene(axes, scene)
+        collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
+        collection.set_array(quantity.scale * values)
+        axes.set_title(title, loc="left", pad=4)
+        draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
+        _save(figure, path)
+
+
+def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray) -> None:
+    """Draw the background mesh, whole, with the particles in it; each cell's edges and each particle show."""
+    with paper_style():
+        lower, upper = scene.points.min(axis=0), scene.points.max(axis=0)
+        margin = 0.02 * (upper - lower).max()
+        figure, axes, bar_axes = figure_with_bar(lower - margin, upper + margin)
+        bar_axes.remove()
+        axes.triplot(*scene.points.T, scene.cells, color=GREY, linewidth=0.35, zorder=1)
+        # Half the diameter, so that the particles stand apart and the mesh shows between them.
+        discs(axes, position, 0.25 * volume, facecolors=SOIL, edgecolors="none", zorder=2)
+        axes.add_collection(LineCollection(scene.boundary, colors="black", linewidths=1.0, zorder=3))
+        axes.set_title(
+            f"{len(scene.cells)} triangles, {int(np.sum(scene.is_soil)) if scene.is_soil is not None else len(scene.cells)}"
+            f" of them filled with {len(position)} particles",
+            loc="left",
+            pad=4,
+        )
+        _save(figure, path)
+
+
+def save_history(
+    path: Path,
+    time: np.ndarray,
+    curves: Mapping[str, np.ndarray],
+    label: str,
+    *,
+    limits: tuple[float, float] | None = None,
+    markers: Sequence[tuple[float, float, str]] = (),
+) -> None:
+    """Draw curves over time.
+
+    Args:
+        time: s.
+        curves: values by name; the names form a legend if there are several.
+        label: of the vertical axis, with unit.
+        limits: of the vertical axis.
+        markers: single points to compare with: time, value, name.
+    """
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.6, 3.0), layout="constrained")
+        for k, (name, values) in enumerate(curves.items()):
+            axes.plot(time, values, color=CURVES[k % len(CURVES)], label=name)
+        for t, value, name in markers:
+            axes.plot(t, value, "o", color="black", markersize=4, markerfacecolor="white", label=name)
+        axes.set_xlabel("Time [s]")
+        axes.set_ylabel(label)
+        axes.set_xlim(0, max(float(np.max(time, initial=0.0)), 1e-12))
+        if limits:
+            axes.set_ylim(*limits)
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        if len(curves) + len(markers) > 1:
+            axes.legend()
+        _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
+    plt.close(figure)
