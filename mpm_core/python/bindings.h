@@ -11,6 +11,7 @@ namespace mpm::python
 {
 void bind_laws(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
+void bind_implicit(pybind11::module_& m);
 void bind_io(pybind11::module_& m);
 
 /// The communicator at an address that mpi4py gives (`MPI._addressof(comm)`).

@@ -11,5 +11,6 @@ PYBIND11_MODULE(_core, m)
   pybind11::register_exception<mpm::RunError>(m, "RunError", PyExc_RuntimeError);
   mpm::python::bind_laws(m);
   mpm::python::bind_models(m);
+  mpm::python::bind_implicit(m);
   mpm::python::bind_io(m);
 }

@@ -94,15 +94,22 @@ struct Model
   Workspace<D> work;
 };
 
-/// Gravity at the model's time, with its ramp.
+/// Gravity at a time, with its ramp.
+template <int D>
+inline Vector<D> gravity_at(const Model<D>& model, double time)
+{
+  Vector<D> g = model.gravity;
+  if (time < model.gravity_ramp)
+    for (double& component : g)
+      component *= time / model.gravity_ramp;
+  return g;
+}
+
+/// Gravity at the model's time.
 template <int D>
 inline Vector<D> current_gravity(const Model<D>& model)
 {
-  Vector<D> g = model.gravity;
-  if (model.time < model.gravity_ramp)
-    for (double& component : g)
-      component *= model.time / model.gravity_ramp;
-  return g;
+  return gravity_at(model, model.time);
 }
 
 /// Sorts the particles, and gathers runs and moments; needed after anything but a step has changed the particles.

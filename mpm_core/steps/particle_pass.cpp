@@ -1,6 +1,7 @@
 #include "steps/particle_pass.h"
 
 #include "mesh/search.h"
+#include "steps/batches.h"
 #include "transfer/kinematics.h"
 
 #include <algorithm>
@@ -9,23 +10,6 @@ namespace mpm
 {
 namespace
 {
-/// Consecutive runs of one material, at most `batch_size` particles: what a law is given at once.
-struct Batch
-{
-  std::size_t first_run, last_run;
-  Index first, last;
-  Index material;
-};
-
-Batch next_batch(const std::vector<Run>& runs, std::size_t first_run)
-{
-  Batch batch{first_run, first_run + 1, runs[first_run].first, runs[first_run].last, runs[first_run].material};
-  while (batch.last_run < runs.size() && runs[batch.last_run].material == batch.material &&
-         runs[batch.last_run].last - batch.first <= batch_size)
-    batch.last = runs[batch.last_run++].last;
-  return batch;
-}
-
 template <int D>
 void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index p, const SymTensor<D>& strain_increment)
 {

@@ -18,8 +18,10 @@ std::string show(const std::array<double, N>& values)
   return out.str() + ")";
 }
 
+} // namespace
+
 template <int D>
-[[noreturn]] void throw_trouble(const Model<D>& model)
+std::string trouble_text(const Model<D>& model)
 {
   const Trouble<D>& trouble = *model.work.trouble;
   std::ostringstream out;
@@ -39,9 +41,11 @@ template <int D>
     break;
   }
   out << " (in the step after t = " << model.time << " s)";
-  throw RunError(out.str());
+  return out.str();
 }
 
+namespace
+{
 template <int D>
 double next_step(const Model<D>& model, const RunOptions& run)
 {
@@ -73,7 +77,7 @@ std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const
       dt = next_step(model, run);
     explicit_step(model, options, dt);
     if (model.work.trouble)
-      throw_trouble(model);
+      throw RunError(trouble_text(model));
     ++done;
   }
   if (run.until - model.time <= closeness)
@@ -113,6 +117,7 @@ Diagnostics diagnostics(const Model<D>& model)
 }
 
 #define INSTANTIATE(D)                                                                                                 \
+  template std::string trouble_text(const Model<D>&);                                                                  \
   template std::int64_t run_explicit(Model<D>&, const ExplicitOptions&, const RunOptions&);                            \
   template Diagnostics diagnostics(const Model<D>&);
 INSTANTIATE(2)

@@ -27,6 +27,10 @@ inline constexpr std::int64_t control_interval = 32;
 template <int D>
 std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run);
 
+/// What stopped the last step, in words. @pre `work.trouble` is set
+template <int D>
+std::string trouble_text(const Model<D>& model);
+
 /// Where a run stands, summed over ranks. Units SI; energies in J, masses in kg (per metre in plane strain).
 struct Diagnostics
 {

@@ -18,7 +18,7 @@ void scatter(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::sp
     {
       NodeSums<D>& node = nodes[mesh.cells[c][k]];
       const Vector<D>& gradient = mesh.shapes[c].gradient[k];
-      const Vector<D> force = internal_force<D>(moments, gradient);
+      const Vector<D> force = internal_force<D>(moments.stress, gradient);
       node.mass += at_vertex<D>(moments.mass, moments.mass_xi, gradient);
       for (int a = 0; a < D; ++a)
       {

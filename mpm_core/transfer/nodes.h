@@ -20,17 +20,17 @@ struct NodeSums
 template <int D>
 inline constexpr int node_sums_width = sizeof(NodeSums<D>) / sizeof(double);
 
-/// f_int of vertex k of a cell: B_k^T sum V_p sigma_p
+/// f_int of a vertex of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function
 template <int D>
-inline Vector<D> internal_force(const CellMoments<D>& moments, const Vector<D>& gradient)
+inline Vector<D> internal_force(const std::array<double, n_symmetric<D>>& stress, const Vector<D>& gradient)
 {
   Vector<D> force{};
   for (int k = 0; k < n_symmetric<D>; ++k)
   {
     const auto [i, j] = symmetric_pairs<D>[k];
-    force[i] += moments.stress[k] * gradient[j];
+    force[i] += stress[k] * gradient[j];
     if (i != j)
-      force[j] += moments.stress[k] * gradient[i];
+      force[j] += stress[k] * gradient[i];
   }
   return force;
 }

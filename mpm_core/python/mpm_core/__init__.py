@@ -8,15 +8,19 @@ from ._core import InputError, LinearElastic, MohrCoulomb, RunError, StressUpdat
 from ._core import compiler as compiler
 from ._core import version as __version__
 from .mesh import Mesh
-from .model import Model, Report
+from .model import Model
+from .newton import Newton
 from .particles import Particles
+from .report import ImplicitReport, Report
 
 __all__ = [
+    "ImplicitReport",
     "InputError",
     "LinearElastic",
     "Mesh",
     "Model",
     "MohrCoulomb",
+    "Newton",
     "Particles",
     "Report",
     "RunError",

@@ -1,0 +1,117 @@
+#include "python/arrays.h"
+#include "python/bindings.h"
+#include "steps/implicit_system.h"
+#include "steps/run.h"
+
+namespace mpm::python
+{
+namespace
+{
+/// An implicit step of a model, with its linear system.
+template <int D>
+struct Implicit
+{
+  Model<D>& model;
+  ImplicitStep<D> step;
+  ImplicitSystem<D> system;
+  CooEntries stiffness, volumetric_force, volumetric_strain;
+};
+
+py::dict as_dict(const TrialReport& report)
+{
+  using namespace py::literals;
+  return py::dict("residual"_a = report.residual, "scale"_a = report.scale, "plastic"_a = report.plastic,
+                  "failed"_a = report.failed);
+}
+
+py::tuple places(const CooEntries& entries) { return py::make_tuple(copied(entries.rows), copied(entries.columns)); }
+
+/// Coordinates of this rank's nodes of the system, (n, D).
+template <int D>
+py::array_t<double> owned_points(const Implicit<D>& implicit)
+{
+  const auto values = owned_values<D>(implicit.system, implicit.model.mesh.points);
+  return copied(values).reshape({-1, D});
+}
+
+template <int D>
+void bind_implicit_step(py::module_& m, const std::string& suffix)
+{
+  using I = Implicit<D>;
+  using Release = py::call_guard<py::gil_scoped_release>;
+  py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
+      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(
+          "start",
+          [](I& i, const ImplicitOptions& options, double dt)
+          {
+            start_step(i.model, i.step, options, dt);
+            const bool changed = number_nodes(i.model, i.step, i.system);
+            if (changed)
+              i.stiffness = i.volumetric_force = i.volumetric_strain = {};
+            return changed;
+          },
+          Release())
+      .def(
+          "trial",
+          [](I& i, bool tangents)
+          {
+            py::gil_scoped_release release;
+            const TrialReport report = find_residual(i.model, i.step, tangents);
+            py::gil_scoped_acquire acquire;
+            return as_dict(report);
+          },
+          py::arg("tangents") = false)
+      .def(
+          "assemble",
+          [](I& i)
+          {
+            stiffness_entries(i.model, i.step, i.system, i.stiffness);
+            if (!i.step.options.mixed_discretisation)
+              return;
+            volumetric_force_entries(i.model, i.step, i.system, i.volumetric_force);
+            volumetric_strain_entries(i.model, i.system, i.volumetric_strain);
+          },
+          Release())
+      .def(
+          "finish",
+          [](I& i)
+          {
+            const bool done = finish_step(i.model, i.step);
+            const std::string why = done ? "" : trouble_text(i.model);
+            i.model.work.trouble.reset();
+            return why;
+          },
+          Release())
+      .def_property_readonly("owned_nodes", [](const I& i) { return i.system.owned.size(); })
+      .def_property_readonly("total_nodes", [](const I& i) { return i.system.total; })
+      .def_property_readonly("points", &owned_points<D>)
+      .def_property_readonly("residual", [](const I& i) { return copied(owned_values<D>(i.system, i.step.residual)); })
+      .def_property(
+          "velocity", [](const I& i) { return copied(owned_values<D>(i.system, i.model.work.velocity)); },
+          [](I& i, const py::array& array)
+          {
+            check_array<double>("velocity", array, {static_cast<py::ssize_t>(i.system.owned.size() * D)});
+            set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.work.velocity);
+          })
+      .def("stiffness_places", [](const I& i) { return places(i.stiffness); })
+      .def("stiffness_values", [](const I& i) { return copied(i.stiffness.values); })
+      .def("volumetric_force_places", [](const I& i) { return places(i.volumetric_force); })
+      .def("volumetric_force_values", [](const I& i) { return copied(i.volumetric_force.values); })
+      .def("volumetric_strain_places", [](const I& i) { return places(i.volumetric_strain); })
+      .def("volumetric_strain_values", [](const I& i) { return copied(i.volumetric_strain.values); });
+}
+} // namespace
+
+void bind_implicit(py::module_& m)
+{
+  py::class_<ImplicitOptions>(m, "ImplicitOptions")
+      .def(py::init<>())
+      .def_readwrite("damping", &ImplicitOptions::damping)
+      .def_readwrite("pic_share", &ImplicitOptions::pic_share)
+      .def_readwrite("mixed_discretisation", &ImplicitOptions::mixed_discretisation)
+      .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);
+  bind_implicit_step<2>(m, "2");
+  bind_implicit_step<3>(m, "3");
+}
+} // namespace mpm::python

@@ -1,0 +1,135 @@
+"""The tangent of an implicit step as a PETSc matrix, and the solution of its linear systems."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+_DIRECT_LIMIT = {2: 150_000, 3: 20_000}
+"""Nodes up to which the default is a direct solver, by dimension."""
+
+
+def _coo_matrix(comm: MPI.Comm, sizes: tuple[int, int], blocks: tuple[int, int], places: Any) -> PETSc.Mat:
+    """Matrix with this rank's numbers of rows and columns, for values at (rows, columns); see ``_set_values``."""
+    matrix = PETSc.Mat().create(comm)
+    matrix.setSizes(((sizes[0], None), (sizes[1], None)))
+    matrix.setBlockSizes(*blocks)
+    matrix.setType(PETSc.Mat.Type.AIJ)
+    rows, columns = (np.array(p, dtype=PETSc.IntType) for p in places)
+    if hasattr(matrix, "setPreallocationCOO"):
+        matrix.setPreallocationCOO(rows, columns)
+    else:  # petsc4py before 3.19 does not wrap it
+        _checked(
+            _petsc().MatSetPreallocationCOO(
+                ctypes.c_void_p(matrix.handle),
+                ctypes.c_ssize_t(len(rows)),
+                ctypes.c_void_p(rows.ctypes.data),
+                ctypes.c_void_p(columns.ctypes.data),
+            )
+        )
+    return matrix
+
+
+def _set_values(matrix: PETSc.Mat, values: NDArray[np.float64]) -> None:
+    """Set the values at the matrix's places; those of the same place add up, also across ranks."""
+    values = np.ascontiguousarray(values, dtype=PETSc.ScalarType)
+    if hasattr(matrix, "setValuesCOO"):
+        matrix.setValuesCOO(values, PETSc.InsertMode.INSERT_VALUES)
+        return
+    _checked(
+        _petsc().MatSetValuesCOO(
+            ctypes.c_void_p(matrix.handle),
+            ctypes.c_void_p(values.ctypes.data),
+            ctypes.c_int(int(PETSc.InsertMode.INSERT_VALUES)),
+        )
+    )
+
+
+def _petsc() -> ctypes.CDLL:
+    """The PETSc library that petsc4py is linked with."""
+    return ctypes.CDLL(PETSc.__file__)
+
+
+def _checked(code: int) -> None:
+    if code:
+        raise PETSc.Error(code)
+
+
+class Tangent:
+    """J = d (f_int + inertia) / du of an implicit step.
+
+    With nodal mixed discretisation J = K + K_p G, where G gives the nodes' averaged volumetric strain: the product grows the
+    stencil to two rings.
+
+    Args:
+        step: the core's implicit step, assembled.
+        comm: its ranks.
+        dim: 2 or 3.
+        prefix: of the PETSc options of solver and preconditioner.
+
+    Note:
+        Collective, as its methods are.
+    """
+
+    def __init__(self, step: Any, comm: MPI.Comm, dim: int, prefix: str) -> None:
+        nodes, dofs = step.owned_nodes, step.owned_nodes * dim
+        self._stiffness = _coo_matrix(comm, (dofs, dofs), (dim, dim), step.stiffness_places())
+        self._averaged = comm.allreduce(len(step.volumetric_force_values())) > 0
+        self._product: PETSc.Mat | None = None
+        if self._averaged:
+            self._force = _coo_matrix(comm, (dofs, nodes), (dim, 1), step.volumetric_force_places())
+            self._strain = _coo_matrix(comm, (nodes, dofs), (1, dim), step.volumetric_strain_places())
+        self._ksp = _solver(step, comm, dim, prefix)
+        self._near_null_space = _rigid_body_motions(step, comm, dim)
+        self.iterations = 0
+        """Krylov iterations of the last solution."""
+
+    def update(self, step: Any) -> None:
+        """Take the values of the step's present iterate."""
+        _set_values(self._stiffness, step.stiffness_values())
+        self.matrix = self._stiffness
+        if self._averaged:
+            _set_values(self._force, step.volumetric_force_values())
+            _set_values(self._strain, step.volumetric_strain_values())
+            self._product = self._force.matMult(self._strain, self._product)
+            self._product.axpy(1.0, self._stiffness, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self.matrix = self._product
+        self.matrix.setNearNullSpace(self._near_null_space)
+        self._ksp.setOperators(self.matrix)
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """J^-1 times this rank's part of a vector; None when the solver failed."""
+        x, b = self.matrix.createVecs()
+        b.array[:] = right
+        self._ksp.solve(b, x)
+        self.iterations = self._ksp.getIterationNumber()
+        good = self._ksp.getConvergedReason() > 0 and np.isfinite(x.norm())
+        return x.array.copy() if good else None
+
+
+def _solver(step: Any, comm: MPI.Comm, dim: int, prefix: str) -> PETSc.KSP:
+    """Direct where the system is small, else GMRES with algebraic multigrid; PETSc options with the prefix change it."""
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix(prefix)
+    if step.total_nodes <= _DIRECT_LIMIT[dim]:
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        ksp.getPC().setType(PETSc.PC.Type.LU)
+        if PETSc.Sys.hasExternalPackage("mumps"):
+            ksp.getPC().setFactorSolverType("mumps")
+    else:
+        ksp.setType(PETSc.KSP.Type.GMRES)
+        ksp.setTolerances(rtol=1e-6)
+        ksp.getPC().setType(PETSc.PC.Type.GAMG)
+    ksp.setFromOptions()
+    return ksp
+
+
+def _rigid_body_motions(step: Any, comm: MPI.Comm, dim: int) -> PETSc.NullSpace:
+    """What multigrid must keep on its coarse levels."""
+    points = PETSc.Vec().createWithArray(np.ascontiguousarray(step.points).ravel(), bsize=dim, comm=comm)
+    return PETSc.NullSpace().createRigidBody(points)

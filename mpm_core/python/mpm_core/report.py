@@ -1,0 +1,52 @@
+"""What a run says of itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where a run stands; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
+
+    time: float
+    """Time [s]"""
+    steps: int
+    """Steps since the model was made"""
+    dt: float
+    """Length of the last step [s]"""
+    particles: int
+    mass: float
+    """[kg]"""
+    momentum: tuple[float, ...]
+    """[kg m/s]"""
+    kinetic_energy: float
+    external_work: float
+    """Work of gravity and tractions since the model was made"""
+    internal_work: float
+    """Work of the stresses"""
+    damping_work: float
+    """Energy taken out by local damping"""
+    support_work: float
+    """Work of prescribed velocities"""
+    plastic_share: float
+    """Share of the particles that yielded in the last step"""
+    unbalanced_ratio: float
+    """Out-of-balance over external force in the last step, Euclidean norms over the nodes"""
+    outflow_particles: int
+    """Particles that left through outflow facets"""
+    outflow_mass: float
+    particle_steps: int
+    """Sum over steps of the number of particles"""
+
+
+@dataclass(frozen=True)
+class ImplicitReport(Report):
+    """Where an implicit run stands; the last three are of the steps since the last report."""
+
+    iterations: int
+    """Iterations of the solver, those of failed steps included"""
+    cuts: int
+    """Steps that failed and were tried again, shorter"""
+    residual: float
+    """|r| relative to the largest of |f_ext|, |f_int| and inertia, when the last step was solved"""

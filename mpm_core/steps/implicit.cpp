@@ -1,0 +1,185 @@
+#include "steps/implicit.h"
+
+#include "steps/implicit_trial.h"
+#include "steps/mapping.h"
+#include "steps/particle_pass.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm
+{
+namespace
+{
+/// Nodes that a filled cell touches: those that the step moves. A node may have stiffness and yet hardly any mass.
+template <int D>
+void find_active(Model<D>& model, ImplicitStep<D>& step)
+{
+  std::vector<double> filled(model.mesh.points.size(), 0.0);
+  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+    if (model.work.moments[c].volume > 0)
+      for (Index node : model.mesh.cells[c])
+        filled[node] = 1;
+  sum_shared(model.exchange, filled.data(), 1);
+  step.active.resize(filled.size());
+  std::transform(filled.begin(), filled.end(), step.active.begin(), [](double f) { return f > 0 ? 1 : 0; });
+}
+
+/// f_int (14) of the trial's stresses, at the nodes.
+template <int D>
+void find_internal_force(Model<D>& model, const ImplicitStep<D>& step, std::vector<Vector<D>>& internal)
+{
+  internal.assign(model.mesh.points.size(), {});
+  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  {
+    if (model.work.moments[c].volume == 0)
+      continue;
+    for (int k = 0; k <= D; ++k)
+    {
+      const Vector<D> force = internal_force<D>(step.stress[c], model.mesh.shapes[c].gradient[k]);
+      for (int a = 0; a < D; ++a)
+        internal[model.mesh.cells[c][k]][a] += force[a];
+    }
+  }
+  sum_shared(model.exchange, internal.data()->data(), D);
+  for (std::size_t i = 0; i < internal.size(); ++i)
+    model.work.nodes[i].internal = internal[i];
+}
+
+/// Work done in the step: forces act at its end, over its whole displacement.
+template <int D>
+void tally(Model<D>& model, const ImplicitStep<D>& step)
+{
+  const Workspace<D>& work = model.work;
+  Totals& totals = model.totals;
+  model.last.dt = step.dt;
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  {
+    if (!model.exchange.owned[i])
+      continue;
+    for (int a = 0; a < D; ++a)
+    {
+      const double u = step.dt * work.velocity[i][a];
+      const double unbalanced = step.external[i][a] - work.nodes[i].internal[a];
+      const double inertia = work.nodes[i].mass * work.acceleration[i][a];
+      const double reaction = inertia_force(model, step, static_cast<Index>(i), a).force - unbalanced;
+      totals.external_work += step.external[i][a] * u;
+      totals.internal_work += work.nodes[i].internal[a] * u;
+      totals.support_work += reaction * u;
+      totals.damping_work += (unbalanced + reaction - inertia) * u;
+    }
+  }
+}
+} // namespace
+
+template <int D>
+Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component)
+{
+  if (step.options.quasi_static)
+    return {0, 0};
+  const Workspace<D>& work = model.work;
+  return damped_inertia(work.nodes[node].mass, work.start_velocity[node][component], work.velocity[node][component],
+                        step.dt, step.options.damping);
+}
+
+template <int D>
+void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt)
+{
+  prepare(model);
+  Workspace<D>& work = model.work;
+  step.options = options;
+  step.dt = dt;
+  map_to_nodes(model); // (11), (15)
+  find_start_velocity(model);
+  find_active(model, step);
+  if (options.quasi_static)
+    std::fill(work.start_velocity.begin(), work.start_velocity.end(), Vector<D>{});
+  work.velocity = work.start_velocity;
+  for (const Support<D>& support : model.supports)
+    if (step.active[support.node])
+      impose<D>(support, work.velocity[support.node]);
+
+  const Vector<D> gravity = gravity_at(model, model.time + dt);
+  step.external.resize(work.nodes.size());
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+    for (int a = 0; a < D; ++a)
+      step.external[i][a] = work.nodes[i].traction[a] + work.nodes[i].mass * gravity[a];
+}
+
+template <int D>
+TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
+{
+  if (step.options.mixed_discretisation)
+    average_strains(model, step.dt);
+  const TrialCount count = try_stresses(model, step, tangents);
+  find_internal_force<D>(model, step, step.residual);
+
+  std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
+  for (std::size_t i = 0; i < step.residual.size(); ++i)
+    for (int a = 0; a < D; ++a)
+    {
+      const double external = step.external[i][a], internal = step.residual[i][a];
+      const double inertia = inertia_force(model, step, static_cast<Index>(i), a).force;
+      step.residual[i][a] = external - internal - inertia;
+      if (!model.exchange.owned[i])
+        continue;
+      sums[1] += external * external;
+      sums[2] += internal * internal;
+      sums[3] += inertia * inertia;
+    }
+  for (Support<D> held : model.supports)
+  {
+    held.value.fill(0);
+    impose<D>(held, step.residual[held.node]);
+  }
+  for (std::size_t i = 0; i < step.residual.size(); ++i)
+    if (model.exchange.owned[i])
+      sums[0] += dot<D>(step.residual[i], step.residual[i]);
+  sums[4] = static_cast<double>(count.plastic);
+  sums[5] = static_cast<double>(count.failed);
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  model.last.plastic = count.plastic;
+  return {std::sqrt(sums[0]), std::sqrt(std::max({sums[1], sums[2], sums[3]})), static_cast<std::int64_t>(sums[4]),
+          static_cast<std::int64_t>(sums[5])};
+}
+
+template <int D>
+bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
+{
+  Workspace<D>& work = model.work;
+  const ImplicitOptions& options = step.options;
+  for (std::size_t i = 0; i < work.velocity.size(); ++i)
+    for (int a = 0; a < D; ++a)
+      work.acceleration[i][a] = options.quasi_static ? 0 : (work.velocity[i][a] - work.start_velocity[i][a]) / step.dt;
+  if (options.mixed_discretisation)
+    average_strains(model, step.dt);
+  const Particles<D> start = model.particles;
+  // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
+  const double pic = options.quasi_static ? 1 : options.pic_share;
+  particle_pass<D>(model, {step.dt, true, true, pic, options.mixed_discretisation}); // (18), (20), stresses
+  agree_on_trouble(model);
+  if (work.trouble)
+  {
+    model.particles = start;
+    work.leavers.clear();
+    work.outflow.clear();
+    work.ready = false;
+    return false;
+  }
+  tally(model, step);
+  settle_particles(model);
+  model.time += step.dt;
+  ++model.totals.steps;
+  model.totals.particle_steps += model.particles.size();
+  map_to_nodes(model); // so that the out-of-balance ratio is that of the particles as they are now
+  return true;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template Inertia inertia_force(const Model<D>&, const ImplicitStep<D>&, Index, int);                                 \
+  template void start_step(Model<D>&, ImplicitStep<D>&, const ImplicitOptions&, double);                               \
+  template TrialReport find_residual(Model<D>&, ImplicitStep<D>&, bool);                                               \
+  template bool finish_step(Model<D>&, const ImplicitStep<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

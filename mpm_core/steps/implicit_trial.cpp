@@ -1,0 +1,248 @@
+#include "steps/implicit_trial.h"
+
+#include "materials/elasticity.h"
+#include "steps/batches.h"
+#include "transfer/kinematics.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+namespace
+{
+/// Part of a cell's volume below which an increment is refused.
+constexpr double least_growth = 0.1;
+
+constexpr int longest_state = 16;
+
+/// Copies of a batch: what a law reads and writes.
+template <int D>
+struct TrialScratch
+{
+  alignas(64) double strain[n_stress<D>][batch_size];
+  alignas(64) double start[n_stress<D>][batch_size]; ///< stress at the start, turned with the material
+  alignas(64) double stress[n_stress<D>][batch_size];
+  alignas(64) double state[longest_state][batch_size];
+  std::vector<double> tangent;
+};
+
+/// What turns with the iterate in one cell: strain and rotation, and the derivatives of the rotation.
+template <int D>
+struct CellTurn
+{
+  CellStrain<D> strain;
+  /// For each pair b < m of axes, d Omega = dR R^T per du_b/dx_m; its negative belongs to du_m/dx_b
+  std::array<Matrix<D>, D*(D - 1) / 2> spin;
+};
+
+template <int D>
+constexpr std::array<std::array<int, 2>, D*(D - 1) / 2> spin_pairs = []
+{
+  std::array<std::array<int, 2>, D*(D - 1) / 2> pairs{};
+  for (int b = 0, k = 0; b < D; ++b)
+    for (int m = b + 1; m < D; ++m)
+      pairs[k++] = {b, m};
+  return pairs;
+}();
+
+/// The Cayley transform R of the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
+template <int D>
+CellTurn<D> cell_turn(const CellStrain<D>& strain)
+{
+  CellTurn<D> turn{strain, {}};
+  Matrix<D> y = strain.rotation;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      y[i][j] = 0.5 * (y[i][j] + (i == j ? 1.0 : 0.0));
+  for (std::size_t k = 0; k < turn.spin.size(); ++k)
+  {
+    const auto [b, m] = spin_pairs<D>[k];
+    for (int i = 0; i < D; ++i)
+      for (int j = 0; j < D; ++j)
+        turn.spin[k][i][j] = 0.5 * (y[i][b] * y[j][m] - y[i][m] * y[j][b]);
+  }
+  return turn;
+}
+
+/// Omega sigma - sigma Omega of a symmetric tensor; zz of plane strain does not turn.
+template <int D>
+SymTensor<D> turned_by(const Matrix<D>& omega, const SymTensor<D>& stress)
+{
+  Matrix<D> product{};
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      for (int k = 0; k < D; ++k)
+        product[i][j] += omega[i][k] * stress[stress_component<D>[symmetric_index<D>(k, j)]];
+  SymTensor<D> turned{};
+  for (int k = 0; k < n_symmetric<D>; ++k)
+  {
+    const auto [i, j] = symmetric_pairs<D>[k];
+    turned[stress_component<D>[k]] = product[i][j] + product[j][i]; // -sigma Omega is the transpose of Omega sigma
+  }
+  return turned;
+}
+
+/// Elastic strain that goes with a stress.
+template <int D>
+SymTensor<D> elastic_strain(const ElasticModuli& moduli, const SymTensor<D>& stress)
+{
+  const double mean = (stress[0] + stress[1] + stress[2]) / 3;
+  const double volumetric = mean / (3 * moduli.lambda + 2 * moduli.shear);
+  SymTensor<D> strain;
+  for (int k = 0; k < n_stress<D>; ++k)
+    strain[k] = k < 3 ? (stress[k] - mean) / (2 * moduli.shear) + volumetric : stress[k] / moduli.shear;
+  return strain;
+}
+
+/// Adds V d sigma / d grad u of one particle: the law's tangent C acts on the strain, and on the strain that would turn
+/// the start's stress as the rotation does, since laws begin at an elastic trial.
+template <int D>
+void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& start, const ElasticModuli& moduli,
+                 double volume, bool averaged, CellTangent<D>& tangent)
+{
+  constexpr int S = n_stress<D>;
+  for (int b = 0; b < D; ++b)
+    for (int m = 0; m < D; ++m)
+      for (int k = 0; k < n_symmetric<D>; ++k)
+        tangent.by_gradient[k][b * D + m] += volume * c[stress_component<D>[k] * S + stress_component<D>[symmetric_index<D>(b, m)]];
+  for (std::size_t s = 0; s < turn.spin.size(); ++s)
+  {
+    const SymTensor<D> strain = elastic_strain<D>(moduli, turned_by<D>(turn.spin[s], start));
+    const auto [b, m] = spin_pairs<D>[s];
+    for (int k = 0; k < n_symmetric<D>; ++k)
+    {
+      double turned = 0;
+      for (int j = 0; j < S; ++j)
+        turned += c[stress_component<D>[k] * S + j] * strain[j];
+      tangent.by_gradient[k][b * D + m] += volume * turned;
+      tangent.by_gradient[k][m * D + b] -= volume * turned;
+    }
+  }
+  if (averaged)
+    for (int k = 0; k < n_symmetric<D>; ++k)
+    {
+      double volumetric = 0;
+      for (int j = 0; j < D; ++j)
+        volumetric += c[stress_component<D>[k] * S + j] / D;
+      tangent.by_volumetric[k] += volume * volumetric;
+      for (int j = 0; j < D; ++j)
+        tangent.by_gradient[k][j * D + j] -= volume * volumetric;
+    }
+}
+
+ElasticModuli moduli_of(const Law& law)
+{
+  return std::visit([](const auto& l) { return elastic_moduli(l.young, l.poisson); }, law);
+}
+
+/// Copies one run's stresses and states to the scratch and prepares its strains. @returns strain and rotation of the cell
+template <int D>
+CellStrain<D> load_run(const Model<D>& model, const ImplicitStep<D>& step, const Run& run, Index at,
+                       TrialScratch<D>& scratch)
+{
+  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
+  CellStrain<D> strain = strain_increment<D>(affine_field<D>(model.mesh, run.cell, velocity).gradient, step.dt);
+  if (step.options.mixed_discretisation)
+    set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+  const Index size = run.last - run.first;
+  for (int k = 0; k < n_stress<D>; ++k)
+  {
+    std::fill_n(scratch.strain[k] + at, size, strain.increment[k]);
+    std::copy_n(model.particles.stress[k].data() + run.first, size, scratch.start[k] + at);
+  }
+  SymmetricColumns<D> columns;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    columns[k] = scratch.start[stress_component<D>[k]];
+  rotate<D>(columns, at, at + size, strain.rotation);
+  for (int k = 0; k < n_stress<D>; ++k)
+    std::copy_n(scratch.start[k] + at, size, scratch.stress[k] + at);
+  for (std::size_t k = 0; k < model.particles.state.size(); ++k)
+    std::copy_n(model.particles.state[k].data() + run.first, size, scratch.state[k] + at);
+  return strain;
+}
+
+template <int D>
+BatchReport update_scratch(const Law& law, Index size, bool tangents, TrialScratch<D>& scratch)
+{
+  PointBatch<D> points;
+  points.size = size;
+  for (int k = 0; k < n_stress<D>; ++k)
+  {
+    points.strain_increment[k] = scratch.strain[k];
+    points.stress[k] = scratch.stress[k];
+  }
+  std::array<double*, longest_state> state;
+  for (int k = 0; k < longest_state; ++k)
+    state[k] = scratch.state[k];
+  points.state = state.data();
+  points.tangent = tangents ? scratch.tangent.data() : nullptr;
+  return update<D>(law, points);
+}
+
+/// Adds the particles of one run, at `at` in the scratch, to the sums of its cell.
+template <int D>
+void sum_run(const Model<D>& model, ImplicitStep<D>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
+{
+  const double* const volume = model.particles.volume.data() + run.first;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    for (Index p = 0; p < run.last - run.first; ++p)
+      step.stress[run.cell][k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
+}
+
+template <int D>
+void sum_tangents(const Model<D>& model, ImplicitStep<D>& step, const Run& run, const CellStrain<D>& strain, Index at,
+                  const TrialScratch<D>& scratch)
+{
+  const CellTurn<D> turn = cell_turn<D>(strain);
+  const ElasticModuli moduli = moduli_of(model.laws[run.material]);
+  for (Index p = 0; p < run.last - run.first; ++p)
+  {
+    SymTensor<D> start;
+    for (int k = 0; k < n_stress<D>; ++k)
+      start[k] = scratch.start[k][at + p];
+    add_tangent<D>(&scratch.tangent[static_cast<std::size_t>((at + p) * n_stress<D> * n_stress<D>)], turn, start, moduli,
+                   model.particles.volume[run.first + p], step.options.mixed_discretisation, step.tangents[run.cell]);
+  }
+}
+} // namespace
+
+template <int D>
+TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents)
+{
+  const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
+  step.stress.assign(cells, {});
+  if (tangents)
+    step.tangents.assign(cells, {});
+  TrialScratch<D> scratch;
+  if (tangents)
+    scratch.tangent.resize(static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>));
+  std::vector<CellStrain<D>> strains;
+  TrialCount count;
+  const auto& runs = model.work.runs;
+  for (std::size_t r = 0; r < runs.size();)
+  {
+    const Batch batch = next_batch(runs, r);
+    strains.clear();
+    for (r = batch.first_run; r < batch.last_run; ++r)
+    {
+      strains.push_back(load_run(model, step, runs[r], runs[r].first - batch.first, scratch));
+      if (!(1 + strains.back().volumetric > least_growth))
+        count.failed += runs[r].last - runs[r].first;
+    }
+    const BatchReport report = update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
+    count.plastic += report.plastic;
+    count.failed += report.failed;
+    for (std::size_t k = 0; k < strains.size(); ++k)
+    {
+      const Run& run = runs[batch.first_run + k];
+      sum_run(model, step, run, run.first - batch.first, scratch);
+      if (tangents)
+        sum_tangents(model, step, run, strains[k], run.first - batch.first, scratch);
+    }
+  }
+  return count;
+}
+
+template TrialCount try_stresses(const Model<2>&, ImplicitStep<2>&, bool);
+template TrialCount try_stresses(const Model<3>&, ImplicitStep<3>&, bool);
+} // namespace mpm
