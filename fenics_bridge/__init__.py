@@ -4,19 +4,25 @@ What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 """
 
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
+from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
 from fenics_bridge.elastic import ElasticSolution, solve_elastic
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
 from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_stress
+from fenics_bridge.load_steps import LoadStep, print_step
+from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
+from fenics_bridge.newton import NewtonReport
+from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 __all__ = [
-    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "ElasticSolution", "InputError", "PointSearch",
-    "Support", "background_arrays", "background_mesh", "evaluate_at", "fixed", "k0_elastic", "k0_jaky", "k0_stress",
-    "nodal_average", "original_cells", "prescribed", "read_mesh", "roller", "slope_mesh", "soil_mesh",
-    "solve_elastic",
+    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "ElasticSolution", "InputError",
+    "Load", "LoadStep", "NewtonReport", "PointSearch", "QuasiStatic", "Support", "background_arrays",
+    "background_mesh", "collapse_load", "evaluate_at", "factor_of_safety", "fixed", "k0_elastic", "k0_jaky",
+    "k0_stress", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh", "reduced_strength",
+    "roller", "slope_mesh", "soil_mesh", "solve_elastic",
 ]

@@ -12,7 +12,7 @@ import fenics_bridge as bridge
 from fenics_bridge.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
-from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points  # noqa: E402
+from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points, slope_model  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
@@ -101,3 +101,24 @@ def test_errors_reach_every_rank():
         bridge.PointSearch(domain, points).require_all()
     with pytest.raises(bridge.InputError, match="tag 99"):
         bridge.solve_elastic(domain, facet_tags, [bridge.fixed(99)], YOUNG, POISSON, UNIT_WEIGHT)
+
+
+@pytest.mark.parametrize("dilation_angle", [25.0, 0.0])
+def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle):
+    points = np.array([[1.1, 1.0], [0.53, 0.47], [1.62, 0.31]])
+    results = []
+    for comm in (COMM, MPI.COMM_SELF):
+        model = slope_model(dilation_angle=dilation_angle, comm=comm)
+        model.solve(bridge.Load(unit_weight=18e3))
+        assert model.converged
+        results.append((model.evaluate_at(points), model.reaction(bridge.BASE)))
+    (here, here_reaction), (alone, alone_reaction) = results
+    assert np.allclose(here["displacement"], alone["displacement"], rtol=1e-6)
+    assert np.allclose(here["stress"][1:], alone["stress"][1:], rtol=1e-5)
+    assert np.allclose(here_reaction, alone_reaction, rtol=1e-6)
+
+
+def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
+    factors = [bridge.factor_of_safety(slope_model(comm=comm), bridge.Load(unit_weight=20e3)).value
+               for comm in (COMM, MPI.COMM_SELF)]
+    assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails

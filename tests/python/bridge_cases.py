@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mpm_core as mpm
 import numpy as np
 from mpi4py import MPI
 
@@ -44,3 +45,22 @@ def interior_points(n, dim, seed=0):
     """Random points inside the column of unit height and half that width."""
     width = [0.5] * (dim - 1)
     return np.random.default_rng(seed).random((n, dim)) * (*width, 1.0)
+
+
+def slope_model(cell_size=0.1, dilation_angle=25.0, comm=MPI.COMM_WORLD, degree=2):
+    """QuasiStatic of the paper's slope."""
+    domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=cell_size))
+    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0,
+                          dilation_angle=dilation_angle)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, degree)
+
+
+def excess_of_strength(stress, cohesion, friction_angle):
+    """Mohr-Coulomb's function over the cohesion, in plane strain; positive outside the surface. stress: (n, 4)"""
+    xx, yy, zz, xy = stress.T
+    centre, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    principal = np.sort(np.column_stack([centre - radius, centre + radius, zz]), axis=1)
+    phi = np.radians(friction_angle)
+    low, high = principal[:, 0], principal[:, 2]
+    return (0.5 * (high - low) + 0.5 * (high + low) * np.sin(phi) - cohesion * np.cos(phi)) / cohesion

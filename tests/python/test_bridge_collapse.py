@@ -1,0 +1,78 @@
+"""Collapse loads and factors of safety against limit analysis (associated flow, quadratic elements)."""
+
+import mpm_core as mpm
+import numpy as np
+import pytest
+from bridge_cases import MESHES, POISSON, YOUNG, slope_model
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+
+def weight(unit_weight):
+    return bridge.Load(unit_weight=unit_weight)
+
+
+def test_slope_collapses_at_the_load_of_limit_analysis():
+    """Rotational log-spiral: 22.9 kN/m3; finite elements come from above."""
+    coarse = bridge.collapse_load(slope_model(0.1), weight, first_step=5e3)
+    fine = bridge.collapse_load(slope_model(0.05), weight, first_step=5e3)
+    assert 22.9e3 < fine.value < coarse.value
+    assert fine.value == pytest.approx(22.9e3, rel=0.02)
+    assert coarse.failed_at - coarse.value <= 4e-3 * coarse.value
+    assert np.all(np.diff(coarse.curve, axis=0) > 0)  # it settles more and more as the load rises
+    lengths = np.linalg.norm(coarse.mechanism.x.array.reshape(-1, 2), axis=1)
+    assert lengths.max() == pytest.approx(1.0)
+
+
+def test_factor_of_safety_of_the_slope():
+    """At 20 kN/m3 limit analysis gives 1.053."""
+    result = bridge.factor_of_safety(slope_model(0.1), weight(20e3))
+    assert result.value == pytest.approx(1.053, rel=0.02)
+
+
+def test_flow_without_dilation_collapses_earlier():
+    associated = bridge.collapse_load(slope_model(0.1), weight, first_step=5e3).value
+    without = bridge.collapse_load(slope_model(0.1, dilation_angle=0.0), weight, first_step=5e3).value
+    assert 0.8 * associated < without < associated
+
+
+def test_vertical_cut():
+    """gamma H / c = 6.69 for a friction angle of 30 degrees."""
+    background = bridge.slope_mesh(MPI.COMM_WORLD, angle=90, cell_size=0.05)
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0, dilation_angle=30.0)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports)
+    result = bridge.collapse_load(model, weight, first_step=2e3)
+    assert result.value / 1e3 == pytest.approx(6.69, rel=0.03)
+
+
+@pytest.mark.parametrize(("friction_angle", "factor", "tolerance"), [(0.0, 2 + np.pi, 0.02), (20.0, 14.83, 0.03)])
+def test_strip_footing(friction_angle, factor, tolerance):
+    """Bearing capacity c Nc of weightless ground under a smooth, flexible strip (Prandtl)."""
+    domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", MPI.COMM_WORLD)
+    law = mpm.MohrCoulomb(young=1e5, poisson=0.3, cohesion=1e3, friction_angle=friction_angle,
+                          dilation_angle=friction_angle)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (1, 0)), bridge.fixed(2)]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports)
+    result = bridge.collapse_load(model, lambda q: bridge.Load(pressure={5: q}), first_step=2e3)
+    assert result.value / 1e3 == pytest.approx(factor, rel=tolerance)
+
+
+def test_reduced_strength():
+    law = mpm.MohrCoulomb(young=1.0, poisson=0.3, cohesion=10.0, friction_angle=30.0, dilation_angle=20.0)
+    weak = bridge.reduced_strength(law, 2.0)
+    assert weak.cohesion == 5.0
+    assert np.tan(np.radians(weak.friction_angle)) == pytest.approx(np.tan(np.radians(30.0)) / 2)
+    assert weak.dilation_angle == weak.friction_angle  # 16.1 degrees: no longer 20
+    assert bridge.reduced_strength(law, 1.2).dilation_angle == 20.0
+    with pytest.raises(bridge.InputError, match="factor"):
+        bridge.reduced_strength(law, 0.0)
+    with pytest.raises(bridge.InputError, match="LinearElastic"):
+        bridge.reduced_strength(mpm.LinearElastic(young=1.0, poisson=0.3), 1.0)
+
+
+def test_slope_that_cannot_stand_is_refused():
+    with pytest.raises(bridge.InputError, match="start.*smaller"):
+        bridge.factor_of_safety(slope_model(), weight(80e3), start=1.0)

@@ -1,0 +1,152 @@
+"""Elasto-plastic equilibrium with the laws of the particles."""
+
+import mpm_core as mpm
+import numpy as np
+import pytest
+from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, excess_of_strength,
+                          interior_points, slope_model)
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+
+def elastic_column(dim, degree=2):
+    domain, facet_tags, supports, _ = column(dim)
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, degree)
+
+
+def top_of_column(model):
+    top = np.full((1, model.domain.geometry.dim), 0.2)
+    top[0, -1] = 1.0
+    return model.evaluate_at(top)["displacement"][0, -1]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_elastic_column_is_exact_at_the_quadrature_points(dim):
+    model = elastic_column(dim)
+    model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    exact = column_stress(model.points.coordinates()[:, -1], dim)
+    assert model.converged
+    assert np.allclose(model.points.stress, exact, atol=1e-8 * UNIT_WEIGHT)
+    assert top_of_column(model) == pytest.approx(column_settlement(), rel=1e-9)
+    points = interior_points(50, dim)
+    values = model.evaluate_at(points, smooth=True)
+    assert np.allclose(values["stress"], column_stress(points[:, -1], dim), atol=1e-8 * UNIT_WEIGHT)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_law_of_the_particles_gives_the_linear_solution(degree):
+    model = slope_model(degree=degree)
+    model.equilibrate(bridge.Load(unit_weight=UNIT_WEIGHT), mpm.LinearElastic(young=YOUNG, poisson=POISSON))
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    linear = bridge.solve_elastic(model.domain, model.facet_tags, supports, YOUNG, POISSON, UNIT_WEIGHT, degree)
+    scale = np.abs(linear.displacement.x.array).max()
+    assert np.allclose(model.displacement.x.array, linear.displacement.x.array, atol=1e-9 * scale)
+
+
+def test_stages_add_up_and_pressure_acts_on_its_facets():
+    model = elastic_column(2)
+    model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    model.solve(bridge.Load(unit_weight=UNIT_WEIGHT, pressure={bridge.CREST: 5e3}))
+    exact = column_stress(model.points.coordinates()[:, 1], 2)
+    sideways = POISSON / (1 - POISSON)
+    exact += -5e3 * np.array([sideways, 1, sideways, 0])
+    assert np.allclose(model.points.stress, exact, atol=1e-8 * UNIT_WEIGHT)
+    # the body presses on its base with its weight and the pressure: 0.5 m wide, 1 m high
+    assert np.allclose(model.reaction(bridge.BASE)[1], -(UNIT_WEIGHT * 0.5 + 5e3 * 0.5))
+    model.reset_displacement()
+    model.solve(bridge.Load())
+    assert np.allclose(model.points.stress, 0, atol=1e-8 * UNIT_WEIGHT)
+    assert top_of_column(model) == pytest.approx(-column_settlement() + 5e3 / (UNIT_WEIGHT / -2 / column_settlement()))
+
+
+@pytest.mark.parametrize("friction_angle", [0.0, 30.0])
+def test_compression_between_plates_ends_at_the_strength(friction_angle):
+    """Biaxial test: sigma_1 = 2 c tan(45 + phi/2) at failure without side pressure."""
+    background, cell_tags, facet_tags = bridge.slope_mesh(MPI.COMM_WORLD, angle=90, crest=0.5, cell_size=0.25)
+    domain, _, facet_tags = bridge.soil_mesh(background, cell_tags, facet_tags)
+    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=friction_angle)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.roller(bridge.BASE, (0, 1)),
+                bridge.prescribed(bridge.CREST, (None, -0.05))]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports)
+    model.solve(bridge.Load(displacement=1.0))
+    strength = 2e3 * np.tan(np.radians(45 + friction_angle / 2))
+    assert model.converged
+    assert np.allclose(model.points.stress[:, 1], -strength, rtol=1e-6)
+    assert model.reaction(bridge.CREST)[1] == pytest.approx(0.5 * strength, rel=1e-6)
+    assert model.reaction(bridge.BASE)[1] == pytest.approx(-0.5 * strength, rel=1e-6)
+
+
+@pytest.mark.parametrize("dilation_angle", [25.0, 0.0])
+def test_newton_converges_quadratically(dilation_angle):
+    model = slope_model(dilation_angle=dilation_angle)
+    model.solve(bridge.Load(unit_weight=15e3))
+    report = model.equilibrate(bridge.Load(unit_weight=17e3), tolerance=1e-12)
+    print("residuals", *(f"{residual:.2e}" for residual in report.residuals))
+    tail = [r for r in report.residuals if r > 1e-13][-3:]  # the last ones before rounding shows
+    order = np.log(tail[2] / tail[1]) / np.log(tail[1] / tail[0])
+    assert report.converged and order > 1.7
+
+
+def test_stress_of_the_slope_is_admissible_and_its_mean_too():
+    model = slope_model()
+    model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    assert model.converged and model.points.state[:, 0].max() > 1e-4
+    assert excess_of_strength(model.points.stress, 1e3, 25.0).max() < 1e-8
+    points = np.random.default_rng(0).random((500, 2)) * (1.1, 1.0)
+    values = model.evaluate_at(points)
+    assert excess_of_strength(values["stress"], 1e3, 25.0).max() < 1e-8
+    assert values["state"].shape == (500, 1) and values["state"].min() >= 0
+
+
+def test_step_beyond_collapse_fails_and_leaves_everything_as_it_was():
+    model = slope_model()
+    model.solve(bridge.Load(unit_weight=15e3))
+    before = model.points.stress.copy(), model.displacement.x.array.copy(), model.load
+    report = model.equilibrate(bridge.Load(unit_weight=40e3))
+    assert not report.converged and not model.converged
+    assert np.array_equal(before[0], model.points.stress) and np.array_equal(before[1], model.displacement.x.array)
+    assert model.load == before[2]
+    steps = model.solve(bridge.Load(unit_weight=40e3), tolerance=0.05)
+    assert not model.converged and 20e3 < model.load.unit_weight < 25e3 and not steps[-1].converged
+
+
+def test_ground_at_rest_stays_at_rest():
+    model = elastic_column(2)
+    load = bridge.Load(unit_weight=UNIT_WEIGHT)
+    start = bridge.k0_stress(model.points.coordinates(), 1.0, UNIT_WEIGHT, 0.8)
+    model.set_initial_stress(start, load)
+    report = model.equilibrate(load)
+    assert report.converged and np.allclose(model.points.stress, start, atol=1e-8 * UNIT_WEIGHT)
+    assert np.abs(model.displacement.x.array).max() < 1e-12
+
+
+def test_slope_at_rest_comes_into_equilibrium():
+    model = slope_model()
+    load = bridge.Load(unit_weight=15e3)
+    surface = [(1.1, 1.0), (2.1, 0.0)]
+    model.set_initial_stress(bridge.k0_stress(model.points.coordinates(), surface, 15e3, bridge.k0_jaky(25.0)), load)
+    assert model.equilibrate(load).converged
+    weight = 15e3 * 1.6
+    assert model.reaction(bridge.BASE)[1] == pytest.approx(-weight)
+    assert excess_of_strength(model.points.stress, 1e3, 25.0).max() < 1e-8
+
+
+def test_progress_names_every_step(capsys):
+    model = slope_model()
+    steps = model.solve(bridge.Load(unit_weight=15e3), progress=bridge.print_step)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == len(steps) and "Newton" in lines[0] and "residual" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [(lambda m: m.set_initial_stress(np.zeros((3, 4)), bridge.Load()), r"stress.*\(3, 4\)"),
+     (lambda m: m.solve(bridge.Load(pressure={77: 1.0})), "pressure.*tag 77"),
+     (lambda m: slope_model(degree=3), "degree.*3"),
+     (lambda m: m.evaluate_at(np.array([[5.0, 5.0]])), r"\(5, 5\)")],
+)
+def test_bad_arguments_are_named(call, words):
+    with pytest.raises(bridge.InputError, match=words):
+        call(slope_model())
