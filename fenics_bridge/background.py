@@ -15,7 +15,8 @@ def background_arrays(domain, cell_tags=None, facet_tags=None):
     points (n, D) [m], cells (m, D + 1) int32 local nodes, cell_tags (m,) int32, 0 where untagged,
     facets (k, D) int32 local nodes of the tagged facets, facet_tags (k,) int32,
     global_nodes (n,) int64, global_cells (m,) int64, cell_owners (m,) int32 ranks.
-    `original_cells(domain)` leads from cells back to the input's numbering.
+    Cells are numbered as where the mesh was made (see `original_cells`), so that what is numbered by cells, such as
+    particles, does not depend on the partition.
     """
     dim = domain.topology.dim
     nodes = domain.geometry.index_map()
@@ -31,7 +32,7 @@ def background_arrays(domain, cell_tags=None, facet_tags=None):
         "facets": compat.facet_nodes(domain, tagged),
         "facet_tags": np.empty(0, np.int32) if facet_tags is None else np.array(facet_tags.values, dtype=np.int32),
         "global_nodes": global_numbers(nodes, n_nodes),
-        "global_cells": global_numbers(cells, n_cells),
+        "global_cells": np.array(domain.topology.original_cell_index[:n_cells], dtype=np.int64),
         "cell_owners": owners.astype(np.int32),
     }
 

@@ -24,8 +24,8 @@ void solve_momentum(Model<D>& model, double damping, double dt)
     for (int a = 0; a < D; ++a)
     {
       const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double v = work.start_velocity[i][a];
-      const double drag = v == 0 ? 0 : std::copysign(damping * std::abs(residual), v);
+      const double drag =
+          local_damping(damping, residual, work.start_velocity[i][a], residual * dt / node.mass);
       work.acceleration[i][a] = node.mass > work.least_mass ? (residual - drag) / node.mass : 0;
     }
   }
@@ -102,7 +102,7 @@ void tally(Model<D>& model, double damping, double dt)
       const double external = node.traction[a] + node.mass * gravity[a];
       const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
       const double residual = external - node.internal[a];
-      const double drag = start[a] == 0 ? 0 : std::copysign(damping * std::abs(residual), start[a]);
+      const double drag = local_damping(damping, residual, start[a], residual * dt / node.mass);
       model.totals.external_work += external * u;
       model.totals.internal_work += node.internal[a] * u;
       model.totals.damping_work += drag * u;

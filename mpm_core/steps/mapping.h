@@ -4,6 +4,8 @@
 
 #include "steps/model.h"
 
+#include <cmath>
+
 namespace mpm
 {
 /// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
@@ -21,4 +23,16 @@ void find_start_velocity(Model<D>& model);
 /// @note Collective
 template <int D>
 void average_strains(Model<D>& model, double dt);
+/// Local damping of FLAC for one component: alpha |R| sign(v).
+///
+/// Where v is less than a tenth of the change that R makes of it in a step, the damping passes linearly through zero
+/// instead of jumping: a node that a wave has just reached has a residual while its velocity is still round-off, and a
+/// sign taken from round-off would let results depend on the order of summation, so on the number of ranks.
+/// @param change  R dt / m_i, what R makes of the velocity in a step [m/s]
+inline double local_damping(double alpha, double residual, double velocity, double change)
+{
+  const double width = 0.1 * std::abs(change);
+  return std::abs(velocity) < width ? alpha * std::abs(residual) * (velocity / width)
+                                    : std::copysign(alpha * std::abs(residual), velocity);
+}
 } // namespace mpm
