@@ -1,0 +1,69 @@
+"""The tangent is the derivative of the residual: central differences, for each law, with rotation and averaging."""
+
+import numpy as np
+import pytest
+from core_cases import box
+from implicit_cases import LEFT, floor, tangent
+
+import mpm_core as mpm
+from mpm_core import _core
+
+ELASTIC = mpm.LinearElastic(young=1e6, poisson=0.3)
+PLASTIC = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=2e3, friction_angle=25.0, dilation_angle=5.0)
+
+
+def started_step(dim, law, *, nmd=False, quasi_static=False, damping=0.0):
+    """A step of a box with random velocities and stresses, half of it filled, one side on inclined rollers."""
+    mesh = box([3 if dim == 2 else 2] * dim, shake=0.2)
+    model = mpm.Model(mesh, law)
+    rng = np.random.default_rng(1)
+    points = rng.uniform(0.02, 0.98, (120, dim)) * ([0.6] + [1.0] * (dim - 1))
+    model.seed_points(points, np.full(120, 0.6 / 120), density=2000.0)
+    stress = rng.normal(0.0, 5e3, model.particles.stress.shape)
+    stress[:, :3] -= 3e4
+    model.particles.set("stress", stress)
+    model.particles.set("velocity", rng.normal(0.0, 0.3, (120, dim)))
+    model.fix(floor(dim))
+    model.roller(LEFT, [1.0] + [0.3] * (dim - 1))
+    model.set_gravity([0.0] * (dim - 1) + [-9.81])
+    options = _core.ImplicitOptions()
+    options.mixed_discretisation, options.quasi_static, options.damping = nmd, quasi_static, damping
+    step = (_core.ImplicitStep2 if dim == 2 else _core.ImplicitStep3)(model._core)
+    step.start(options, 0.02)
+    return step, rng
+
+
+def free(step, dim, direction):
+    """The part of a direction that the supports of `started_step` leave free."""
+    direction = direction.reshape(-1, dim).copy()
+    normal = np.array([1.0] + [0.3] * (dim - 1))
+    normal /= np.linalg.norm(normal)
+    on_left = step.points[:, 0] < 1e-9
+    direction[on_left] -= np.outer(direction[on_left] @ normal, normal)
+    direction[step.points[:, -1] < 1e-9] = 0.0
+    return direction.ravel()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+@pytest.mark.parametrize("options", [{}, {"nmd": True}, {"damping": 0.75}, {"quasi_static": True}], ids=str)
+def test_tangent_is_the_derivative_of_the_residual(dim, law, options):
+    dt = 0.02
+    step, rng = started_step(dim, law, **options)
+    v = step.velocity + 0.3 * free(step, dim, rng.normal(0.0, 1.0, len(step.velocity)))
+    step.velocity = v
+    report = step.trial(tangents=True)
+    assert report["failed"] == 0
+    assert (report["plastic"] > 30) == (law is PLASTIC)
+    step.assemble()
+    j = tangent(step, dim)
+    for _ in range(4):
+        direction = free(step, dim, rng.normal(0.0, 1.0, len(v)))
+        h = 1e-7
+        forces = []
+        for side in (1, -1):
+            step.velocity = v + side * h / dt * direction
+            step.trial()
+            forces.append(step.residual)
+        difference = (forces[1] - forces[0]) / (2 * h)
+        assert np.abs(j @ direction - difference).max() < 2e-6 * np.abs(difference).max()
