@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.colors import Normalize
 
-from .plots import Quantity, Scene, colour_limits, draw_bar, draw_scene, figure_with_bar, paper_style
+from .plots import Quantity, Scene, colour_limits, disc_diameter, draw_bar, draw_scene, figure_with_bar, paper_style
 
 
 @dataclass
@@ -44,7 +44,7 @@ def save_animation(
     quantity: Quantity,
     *,
     limits: tuple[float, float] | None = None,
-    seconds: float = 12.0,
+    seconds: float = 10.0,
 ) -> Path:
     """Draw a film with one colour scale over time.
 
@@ -52,7 +52,7 @@ def save_animation(
         path: without suffix; ``.mp4`` or ``.gif`` is added.
         frames: in the order shown, at least one.
         limits: of the colour scale; found from all frames if not given.
-        seconds: how long the film lasts; it shows at most 15 frames per second.
+        seconds: how long the film lasts; it shows at most 12 frames per second.
 
     Returns:
         The file that was written.
@@ -60,7 +60,7 @@ def save_animation(
     if not frames:
         raise ValueError("frames is empty, expected at least one")
     limits = limits or colour_limits(quantity, [frame.values for frame in frames])
-    shown = frames[:: max(1, -(-len(frames) // int(15 * seconds)))]
+    shown = frames[:: max(1, -(-len(frames) // int(12 * seconds)))]
     rate = max(1, round(len(shown) / seconds))
     has_ffmpeg = shutil.which("ffmpeg") is not None
     path = path.with_suffix(".mp4" if has_ffmpeg else ".gif")
@@ -79,7 +79,7 @@ def save_animation(
             for frame in shown:
                 title.set_text(f"$t$ = {frame.time:.2f} s")
                 points.set_offsets(frame.position)
-                points.set_sizes(1.15**2 * 4 / np.pi * frame.volume * points_per_metre**2)
+                points.set_sizes((disc_diameter(frame.volume) * points_per_metre) ** 2)
                 points.set_array(quantity.scale * frame.values)
                 writer.grab_frame()
         plt.close(figure)

@@ -1,7 +1,7 @@
 """Pictures of particles, background mesh and histories, ready for a paper; plane problems.
 
 Each quantity keeps its colour map and unit everywhere (`Quantity`), and one colour scale over time is found by
-`colour_limits`. Particles are drawn as discs of their own area, so that a picture shows how they fill space.
+`colour_limits`. Particles are drawn as discs that fit their volume, so that a picture shows how they fill space.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from matplotlib.ticker import MaxNLocator
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444")
+ROUND_TICKS = MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
 WIDTH = 6.9  # in; a page's text width
 STYLE = {
     "font.family": "STIXGeneral",
@@ -132,7 +133,7 @@ def colour_limits(quantity: Quantity, values: Iterable[np.ndarray]) -> tuple[flo
         low = 0.0
     if not high > low:
         low, high = low - 0.5, high + 0.5
-    ticks = MaxNLocator(7).tick_values(low, high)
+    ticks = ROUND_TICKS.tick_values(low, high)
     return float(ticks[0]), float(ticks[-1])
 
 
@@ -159,9 +160,14 @@ def draw_scene(axes: Axes, scene: Scene) -> None:
     axes.add_collection(LineCollection(scene.initial_outline, colors=GREY, linewidths=0.6, zorder=2))
 
 
+def disc_diameter(volume: np.ndarray) -> np.ndarray:
+    """Diameter of the discs that just cover the plane when each stands for a square of this area, m."""
+    return np.sqrt(2.0 * volume)
+
+
 def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) -> EllipseCollection:
-    """Particles as discs of area ``volume`` (per metre of thickness); drawn a little larger, so that they just touch."""
-    diameter = 1.15 * np.sqrt(4.0 / np.pi * volume)
+    """Particles as discs that belong to ``volume`` (per metre of thickness)."""
+    diameter = disc_diameter(volume)
     collection = EllipseCollection(
         diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=position, transOffset=axes.transData, **look
     )
@@ -173,7 +179,7 @@ def draw_bar(figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[f
     """The colour bar, with arrows where values beyond its ends may occur."""
     colours = ScalarMappable(Normalize(*limits), quantity.colours)
     extend = "both" if has_less else "max"
-    bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend)
+    bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend, ticks=ROUND_TICKS)
     bar.set_label(quantity.label, labelpad=2)
     bar.outline.set_linewidth(0.5)
 

@@ -10,28 +10,28 @@ import mpm_core as mpm
 import numpy as np
 from mpi4py import MPI
 
+from .options import add_choice, add_count, add_number
+from .plots import Scene
+
 GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
 
 
-def add_slope_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the slope's geometry, soil and mesh; the defaults are the paper's, section 6."""
-    group = parser.add_argument_group("slope")
-    group.add_argument("--height", type=float, default=1.0, help="height of the slope [m]")
-    group.add_argument("--angle", type=float, default=45.0, help="inclination [degrees], up to 90")
-    group.add_argument("--crest", type=float, default=1.1, help="length of the level crest [m]")
-    group.add_argument("--runout-length", type=float, default=2.0, help="background mesh beyond the toe [m]")
-    group.add_argument("--cell-size", type=float, default=0.1, help="side of the squares or triangles [m]")
-    group.add_argument(
-        "--mesh", choices=("crossed", "gmsh"), default="crossed", help="squares cut by their diagonals, or unstructured"
-    )
-    group = parser.add_argument_group("soil")
-    group.add_argument("--unit-weight", type=float, default=80e3, help="unit weight that makes it slide [N/m3]")
-    group.add_argument("--young", type=float, default=200e3, help="Young's modulus [Pa]")
-    group.add_argument("--poisson", type=float, default=0.33, help="Poisson's ratio [-]")
-    group.add_argument("--cohesion", type=float, default=1e3, help="cohesion [Pa]")
-    group.add_argument("--friction-angle", type=float, default=25.0, help="friction angle [degrees]")
-    group.add_argument("--dilation-angle", type=float, default=0.0, help="dilation angle [degrees]")
+def add_slope_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the slope's geometry, mesh and soil; the defaults are the paper's, section 6."""
+    add_number(parser, "--height", 1.0, "m", "height of the slope", above=0)
+    add_number(parser, "--angle", 45.0, "degrees", "inclination of the slope", above=0, at_most=90)
+    add_number(parser, "--crest", 1.1, "m", "length of the level crest", above=0)
+    add_number(parser, "--runout-length", 2.0, "m", "background mesh beyond the toe", above=0)
+    add_number(parser, "--cell-size", 0.1, "m", "side of the squares or of the triangles", above=0)
+    add_choice(parser, "--mesh", "crossed", ("crossed", "gmsh"), "squares cut by their diagonals, or unstructured")
+    add_count(parser, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
+    add_number(parser, "--young", 200e3, "Pa", "Young's modulus", above=0)
+    add_number(parser, "--poisson", 0.33, "-", "Poisson's ratio", above=-1, below=0.5)
+    add_number(parser, "--cohesion", 1e3, "Pa", "cohesion", at_least=0)
+    add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0, below=90)
+    add_number(parser, "--dilation-angle", 0.0, "degrees", "dilation angle, at most the friction angle", at_least=0)
 
 
 @dataclass
@@ -49,6 +49,18 @@ class SlopeCase:
     def toe(self) -> float:
         """Abscissa of the toe before the slide [m]."""
         return self.args.crest + self.args.height / np.tan(np.radians(self.args.angle))
+
+    def scene(self) -> Scene | None:
+        """The whole background mesh for pictures, on the first rank; None on the others. Collective."""
+        comm, mesh = self.model.comm, self.model.mesh
+        n = mesh.owned_cells
+        corners = comm.gather(mesh.points[mesh.cells[:n]])
+        tags = comm.gather(mesh.cell_tags[:n])
+        if comm.rank != 0:
+            return None
+        corners = np.concatenate(corners)
+        points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+        return Scene(points, cells.reshape(-1, 3), np.concatenate(tags) == bridge.SOIL)
 
     @property
     def surface(self) -> np.ndarray:
@@ -71,8 +83,6 @@ def soil_of(args: argparse.Namespace) -> mpm.MohrCoulomb:
 def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
     """Mesh, particles, supports and gravity; no stresses yet. Collective."""
     soil = soil_of(args)
-    if not args.unit_weight > 0:
-        raise mpm.InputError(f"unit_weight is {args.unit_weight} N/m3, expected a positive number")
     domain, cell_tags, facet_tags = bridge.slope_mesh(
         comm,
         height=args.height,
@@ -99,7 +109,7 @@ def fem_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
 
 
 def initialise(case: SlopeCase, kind: str, unit_weight: float) -> float:
-    """Give the particles their initial stresses: from FEM, by K0, or none.
+    """Give the particles their initial stresses: "fem", "k0" or "zero".
 
     Returns the ratio of out-of-balance to external force under that unit weight [-]; 1 without stresses. Collective.
     """
@@ -109,6 +119,4 @@ def initialise(case: SlopeCase, kind: str, unit_weight: float) -> float:
     elif kind == "k0":
         k0 = bridge.k0_elastic(case.soil.poisson)
         particles.set("stress", bridge.k0_stress(particles.position, case.surface, unit_weight, k0))
-    elif kind != "zero":
-        raise mpm.InputError(f"initial is {kind!r}, expected fem, k0 or zero")
     return case.model.out_of_balance((0.0, -GRAVITY * unit_weight / case.args.unit_weight))

@@ -1,0 +1,188 @@
+"""What the studies share: options, results folder, summary, history, interruption, progress, pictures and films."""
+
+import argparse
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from studies.common import animation, plots
+from studies.common.history import History
+from studies.common.interrupt import Interrupt
+from studies.common.options import add_choice, add_count, add_number, add_switch, check, study_parser
+from studies.common.progress import Progress
+from studies.common.summary import OutputError, results_folder, versions, write_summary
+
+
+def example_parser():
+    parser = study_parser("An example.")
+    add_number(parser, "--height", 1.0, "m", "height of the slope", above=0.0)
+    add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0.0, below=90.0)
+    add_count(parser, "--ppc", 10, "particles in each cell", choices=(1, 3, 10))
+    add_count(parser, "--steps", 5, "number of steps")
+    add_choice(parser, "--mesh", "crossed", ("crossed", "gmsh"), "background mesh")
+    add_switch(parser, "--nmd", True, "nodal mixed discretisation")
+    return parser
+
+
+def test_options_have_their_defaults():
+    options = example_parser().parse_args([])
+    assert (options.height, options.friction_angle, options.ppc, options.steps) == (1.0, 25.0, 10, 5)
+    assert (options.mesh, options.nmd, options.output) == ("crossed", True, None)
+
+
+def test_help_says_units_and_defaults():
+    text = " ".join(example_parser().format_help().split())
+    assert "height of the slope [m] (default: 1)" in text
+    assert "friction angle [degrees] (default: 25)" in text
+    assert "--no-nmd" in text
+
+
+BAD_OPTIONS = [
+    (["--height", "0"], "argument --height: is '0', expected a number above 0 m"),
+    (["--height", "tall"], "argument --height: is 'tall', expected a number above 0 m"),
+    (["--height", "nan"], "argument --height: is 'nan', expected a number above 0 m"),
+    (["--friction-angle", "90"], "argument --friction-angle: is '90', expected a number at least 0 and below 90 degrees"),
+    (["--ppc", "2"], "argument --ppc: is '2', expected one of 1, 3, 10"),
+    (["--steps", "0"], "argument --steps: is '0', expected a whole number from 1 on"),
+    (["--steps", "1.5"], "argument --steps: is '1.5', expected a whole number from 1 on"),
+    (["--mesh", "square"], "argument --mesh: is 'square', expected one of crossed, gmsh"),
+    (["--hight", "1"], "--hight"),
+]
+
+
+@pytest.mark.parametrize("arguments, message", BAD_OPTIONS)
+def test_bad_options_are_named_with_what_was_expected(capsys, arguments, message):
+    with pytest.raises(SystemExit) as ended:
+        example_parser().parse_args(arguments)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_options_that_do_not_fit_together(capsys):
+    with pytest.raises(SystemExit):
+        check(example_parser(), False, "--dilation-angle is 30, expected at most --friction-angle")
+    assert "--dilation-angle is 30" in capsys.readouterr().err
+
+
+def test_results_folder_is_made_and_can_be_written(tmp_path):
+    folder = results_folder("slope", tmp_path / "a" / "b")
+    assert folder == tmp_path / "a" / "b"
+    assert list(folder.iterdir()) == []
+
+
+def test_results_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=f"cannot write results to {tmp_path}/file/results: Not a directory"):
+        results_folder("slope", tmp_path / "file" / "results")
+
+
+def test_summary_holds_parameters_versions_and_results(tmp_path):
+    options = argparse.Namespace(height=1.0, output=Path("somewhere"))
+    write_summary(tmp_path, options, {"crest_displacement_m": np.float64(0.42), "counts": {"cells": np.int64(640)}})
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["parameters"] == {"height": 1.0, "output": "somewhere"}
+    assert summary["crest_displacement_m"] == 0.42 and summary["counts"]["cells"] == 640 and summary["ranks"] == 1
+    assert set(versions()) == set(summary["versions"]) >= {"program", "dolfinx", "petsc", "compiler", "git_revision"}
+    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_history_is_on_disk_after_each_row(tmp_path):
+    with History(tmp_path / "history.csv", ["time_s", "energy_J"]) as history:
+        for k in range(3):
+            history.add(energy_J=10.0 * k, time_s=0.1 * k)
+            with open(tmp_path / "history.csv", newline="") as file:
+                rows = list(csv.DictReader(file))
+            assert [float(row["energy_J"]) for row in rows] == [10.0 * i for i in range(k + 1)]
+        np.testing.assert_allclose(history["time_s"], [0.0, 0.1, 0.2])
+        with pytest.raises(ValueError, match="columns are time_s, expected time_s, energy_J"):
+            history.add(time_s=1.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_signal_sets_a_flag(number, capsys):
+    before = signal.getsignal(number)
+    with Interrupt() as interrupt:
+        assert not interrupt.requested() and interrupt.exit_code == 0
+        os.kill(os.getpid(), number)
+        assert interrupt.requested()
+        assert signal.getsignal(number) == before
+    assert interrupt.exit_code == 128 + number
+    assert "ending after this step" in capsys.readouterr().err
+
+
+def test_the_second_signal_ends_the_program():
+    script = "import time\nfrom studies.common.interrupt import Interrupt\n"
+    script += "with Interrupt():\n  print('ready', flush=True)\n  while True: time.sleep(0.01)"
+    child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "ready\n"
+    child.send_signal(signal.SIGTERM)
+    assert "ending after this step" in (child.stderr.readline() + child.stderr.readline())
+    assert child.poll() is None
+    child.send_signal(signal.SIGTERM)
+    assert child.wait(timeout=10) == -signal.SIGTERM
+
+
+def test_progress_without_a_terminal_prints_lines(capsys):
+    with Progress("sliding", until=2.0, pause=0.05) as progress:
+        progress.show(0.5, 10, crest="0.10 m")
+        assert capsys.readouterr().err == ""
+        time.sleep(0.06)
+        progress.show(1.0, 20, crest="0.20 m")
+        line = capsys.readouterr().err
+        assert line.startswith("sliding: 1 of 2 s, ") and "steps/s, crest 0.20 m" in line
+        progress.show(2.0, 40, crest="0.30 m")
+    assert "sliding: 2 of 2 s, 0 s left" in capsys.readouterr().err
+
+
+POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+CELLS = np.array([[0, 1, 2], [1, 3, 2]])
+POSITION = np.array([[0.2, 0.2], [0.5, 0.3], [0.3, 0.5]])
+VOLUME = np.full(3, 0.1)
+
+
+def scene():
+    return plots.Scene(POINTS, CELLS, np.array([True, False]))
+
+
+def test_boundary_edges_belong_to_one_triangle():
+    assert sorted(map(tuple, plots.boundary_edges(CELLS))) == [(0, 1), (0, 2), (1, 3), (2, 3)]
+
+
+def test_colour_limits_hold_over_time_and_are_round():
+    frames = [np.linspace(-13e3, 0.0, 1000), np.linspace(-79.3e3, 1.0, 1000), np.zeros(0)]
+    assert plots.colour_limits(plots.VERTICAL_STRESS, frames) == (-80.0, 0.0)
+    assert plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[0] < plots.colour_limits(
+        plots.DISPLACEMENT, [np.zeros(5)]
+    )[1]
+
+
+def has_colour(path):
+    picture = imread(path)[..., :3]
+    return picture.shape[1] > 500 and np.ptp(picture, axis=2).max() > 0.3
+
+
+def test_pictures_are_drawn(tmp_path):
+    plots.save_mesh(tmp_path / "mesh.png", scene(), POSITION, VOLUME)
+    plots.save_particles(tmp_path / "u.png", scene(), POSITION, VOLUME, np.arange(3.0), plots.DISPLACEMENT, title="now")
+    plots.save_history(tmp_path / "h.png", np.arange(3.0), {"a": np.arange(3.0), "b": np.ones(3)}, "Value [m]")
+    assert all(has_colour(tmp_path / name) for name in ("mesh.png", "u.png", "h.png"))
+
+
+@pytest.mark.parametrize("has_ffmpeg", [True, False])
+def test_films_have_their_frames(tmp_path, monkeypatch, has_ffmpeg):
+    if not has_ffmpeg:
+        monkeypatch.setattr(animation.shutil, "which", lambda _: None)
+    elif not animation.shutil.which("ffmpeg"):
+        pytest.skip("needs ffmpeg")
+    frames = [animation.Frame(0.1 * k, POSITION + 0.1 * k, VOLUME, np.full(3, 0.1 * k)) for k in range(4)]
+    path = animation.save_animation(tmp_path / "slide", scene(), frames, plots.DISPLACEMENT, seconds=1.0)
+    assert path.suffix == (".mp4" if has_ffmpeg else ".gif")
+    assert path.stat().st_size > 2000
