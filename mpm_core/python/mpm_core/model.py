@@ -122,7 +122,7 @@ class Model:
         if cell_tag is not None:
             self.mesh.require_tag("cell", cell_tag)
         density = _positive("density", density, "kg/m3")
-        if isinstance(per_cell, bool) or int(per_cell) != per_cell:
+        if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
             raise InputError(f"per_cell is {per_cell}, expected a whole number")
         material = self._material(material)
         cells = self.comm.allreduce(int(np.max(self.mesh.cells.shape[0], initial=0)))
@@ -214,8 +214,9 @@ class Model:
 
     def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
         """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
-        self._core.gravity = floats("gravity", gravity, (self.mesh.dim,)).tolist()
+        components = floats("gravity", gravity, (self.mesh.dim,)).tolist()
         self._core.gravity_ramp = _positive("ramp", ramp, "s", zero=True)
+        self._core.gravity = components
 
     # --- runs ----------------------------------------------------------------------------------------------------
 
