@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import DIMS, box, by_id, run
+from core_cases import DIMS, box, by_id, moduli, run
 
 import mpm_core as mpm
 
@@ -50,3 +50,42 @@ def test_gravity_rises_linearly_over_its_ramp(dim):
     assert np.allclose(model.particles.velocity, ramped, rtol=0, atol=1e-12)
     run(model, 0.3, dt=dt)
     assert np.allclose(model.particles.velocity, ramped + gravity * 0.1, rtol=0, atol=1e-12)
+
+
+def spinning_block(dim, cells, omega):
+    """A square block in the middle of its mesh, some ``cells`` from its axis to its corners, turning about z."""
+    across = 4.0 / (4 * cells) * 6
+    size = np.array([4.0, 4.0, across][:dim])
+    half = np.array([0.75, 0.75, across / 6][:dim])
+    body = (size / 2 - half, size / 2 + half)
+    model = mpm.Model(box([4 * cells] * 2 + [6] * (dim - 2), size, body=body), ELASTIC)
+    model.seed(density=DENSITY, per_cell={2: 12, 3: 10}[dim], cell_tag=1)
+    x = model.particles.position - size / 2
+    velocity = np.zeros_like(x)
+    velocity[:, 0], velocity[:, 1] = -omega * x[:, 1], omega * x[:, 0]
+    model.particles.set("velocity", velocity)
+    return model
+
+
+def turned_and_stretched(before, after):
+    """Angle about z [rad] and principal stretches of the affine map nearest to the motion."""
+    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
+    gradient = np.linalg.lstsq(a, b, rcond=None)[0].T
+    left, stretches, right = np.linalg.svd(gradient)
+    rotation = left @ right
+    return np.arctan2(rotation[1, 0], rotation[0, 0]) % (2 * np.pi), stretches
+
+
+@pytest.mark.parametrize(("dim", "cells", "turns", "lag"), [(2, 12, 0.98, 0.02), (3, 6, 0.25, 0.05)])
+def test_spinning_block_keeps_its_shape_without_stress(dim, cells, turns, lag):
+    # omega R / c = 0.05. The block is under the stress of its spin, of the order rho omega^2 R^2, and its strains are of
+    # the order (omega R / c)^2 = 0.0025. Were stresses and strains not those of the turned body, they would be of order 1.
+    _, _, confined = moduli(ELASTIC.young, ELASTIC.poisson)
+    omega = 0.05 * np.sqrt(confined / DENSITY)
+    model = spinning_block(dim, cells, omega)
+    start = by_id(model, "position")
+    report = run(model, turns * 2 * np.pi / omega)
+    angle, stretches = turned_and_stretched(start, by_id(model, "position"))
+    assert angle == pytest.approx(turns * 2 * np.pi, rel=lag)  # the lumped mass of few cells costs spin
+    assert stretches == pytest.approx(1, abs=0.01)
+    assert np.abs(model.particles.stress).mean(axis=0).max() < DENSITY * omega**2
