@@ -26,9 +26,10 @@ def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="cro
 
     height, crest: [m], angle: of the slope [degrees], above 0 and up to 90
     cell_size: [m] edge of the squares, or of the triangles of an unstructured mesh
-    kind: "crossed", squares cut in four by their diagonals (angle 45 or 90), or "gmsh", unstructured
+    kind: "crossed", squares cut in four by their diagonals (angle 45 or 90; height and crest whole cells);
+        "fitted", the same with the squares stretched to fit any slope; "gmsh", unstructured
     runout: length of the background past the toe [m]; headroom: its height above the crest [m], None for one cell.
-        A crossed mesh rounds both up to whole cells.
+        All but "gmsh" round both up to whole cells.
     Returns (domain, cell_tags, facet_tags): cells SOIL and EMPTY; facets LEFT, BASE, RIGHT, TOP on the sides of the
     background, SLOPE and CREST on the free surface of the soil (CREST also where it is a side of the background).
     Raises InputError, on all ranks, for dimensions that do not fit. Collective.
@@ -37,11 +38,10 @@ def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="cro
 
     def arrays():
         shape = _checked(height, angle, crest, cell_size, runout, headroom)
-        if kind == "crossed":
-            return _crossed(*shape)
-        if kind == "gmsh":
-            return _unstructured(*shape)
-        raise InputError(f"kind: got {kind!r}, expected 'crossed' or 'gmsh'")
+        makers = {"crossed": _crossed, "fitted": _fitted, "gmsh": _unstructured}
+        if kind not in makers:
+            raise InputError(f"kind: got {kind!r}, expected one of {', '.join(makers)}")
+        return makers[kind](*shape)
 
     result = on_root(comm, arrays)
     return distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
@@ -70,28 +70,49 @@ def _multiple(name, value, cell_size):
 
 
 def _crossed(height, crest, base, size, runout, headroom):
-    rows, columns = _multiple("height", height, size), _multiple("crest", crest, size)
+    _require_multiple("height", height, size)
+    _require_multiple("crest", crest, size)
     run = base - crest
-    slope_columns = round(run / size)
     if min(abs(run - height), run) > 1e-9 * height:
-        angle = math.degrees(math.atan2(height, run))
-        raise InputError(f"angle: got {angle:.6g} degrees; kind='crossed' has cell edges at 45 and 90 degrees only, "
-                         "use kind='gmsh'")
-    nx = columns + slope_columns + math.ceil(runout / size - 1e-9)
-    ny = rows + math.ceil(headroom / size - 1e-9)
-    points, cells = _crossed_squares(nx, ny)
+        raise InputError(f"angle: got {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
+                         "degrees only, use kind='fitted' or 'gmsh'")
+    return _fitted(height, crest, base, size, runout, headroom)
+
+
+def _require_multiple(name, value, cell_size):
+    if abs(round(value / cell_size) * cell_size - value) > 1e-9 * value:
+        raise InputError(f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
+                         "needs; use kind='fitted' or 'gmsh'")
+
+
+def _angle(height, run):
+    return math.degrees(math.atan2(height, run))
+
+
+def _fitted(height, crest, base, size, runout, headroom):
+    """Rectangles cut in four; under the slope there are as many columns as rows, so that it runs along diagonals."""
+    run = base - crest
+    if run > 0 and not 0.2 <= height / run <= 5:
+        raise InputError(f"angle: got {_angle(height, run):.6g} degrees; kind='fitted' would need cells that are too "
+                         "long, expected 11.4 to 78.6, or 90, degrees; use kind='gmsh'")
+    rows, columns = round(height / size), round(crest / size)
+    slope_columns = rows if run > 0 else 0
+    x = np.concatenate([np.linspace(0, crest, columns + 1), np.linspace(crest, base, slope_columns + 1)[1:],
+                        base + size * np.arange(1, math.ceil(runout / size - 1e-9) + 1)])
+    y = np.concatenate([np.linspace(0, height, rows + 1),
+                        height + size * np.arange(1, math.ceil(headroom / size - 1e-9) + 1)])
+    points, cells = _crossed_rectangles(x, y)
     centroids = points[cells].mean(axis=1)
-    surface = columns + (slope_columns * (rows - centroids[:, 1]) / rows)
-    soil = (centroids[:, 1] < rows) & (centroids[:, 0] < surface)
-    facets, values = _tagged_edges(points, cells, soil, (columns, rows, nx, ny))
-    return MeshArrays(points * size, cells, np.where(soil, SOIL, EMPTY).astype(np.int32), facets, values)
+    soil = (centroids[:, 1] < height) & (centroids[:, 0] < crest + run * (1 - centroids[:, 1] / height))
+    facets, values = _tagged_edges(points, cells, soil, crest)
+    return MeshArrays(points, cells, np.where(soil, SOIL, EMPTY).astype(np.int32), facets, values)
 
 
-def _crossed_squares(nx, ny):
-    """nx by ny unit squares, each cut in four: corner nodes first, then the centres."""
-    x, y = np.meshgrid(np.arange(nx + 1.0), np.arange(ny + 1.0))
-    cx, cy = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
-    points = np.vstack([np.column_stack([x.ravel(), y.ravel()]), np.column_stack([cx.ravel(), cy.ravel()])])
+def _crossed_rectangles(x, y):
+    """The rectangles of a grid, each cut in four by its diagonals: corner nodes first, then the centres."""
+    centres = 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:])
+    points = np.vstack([np.column_stack([a.ravel() for a in np.meshgrid(*axes)]) for axes in ((x, y), centres)])
+    nx, ny = len(x) - 1, len(y) - 1
     i, j = (a.ravel() for a in np.meshgrid(np.arange(nx), np.arange(ny)))
     corner = j * (nx + 1) + i
     ring = np.stack([corner, corner + 1, corner + nx + 2, corner + nx + 1])
@@ -100,18 +121,18 @@ def _crossed_squares(nx, ny):
     return points, np.stack(cells, axis=1).reshape(-1, 3)
 
 
-def _tagged_edges(points, cells, soil, extent):
-    """Edges of the outer boundary and of the soil's free surface with their tags; lengths in cells."""
-    columns, rows, nx, ny = extent
+def _tagged_edges(points, cells, soil, crest):
+    """Edges of the outer boundary and of the soil's free surface, (k, 2) nodes, with their tags."""
     edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, inverse, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     soil_sides = np.bincount(inverse.ravel(), weights=np.repeat(soil, 3))
-    middle = points[edges].mean(axis=1)
-    x, y = middle.T
+    x, y = points[edges].mean(axis=1).T
+    right, top = points.max(axis=0)
     outer = count == 1
-    free = (soil_sides == 1) & (~outer | (y == ny))
+    free = (soil_sides == 1) & (~outer | (y == top))
+    level = points[edges[:, 0], 1] == points[edges[:, 1], 1]
     values = np.select(
-        [free & (y == rows) & (x < columns), free, outer & (x == 0), outer & (y == 0), outer & (x == nx), outer],
+        [free & level & (x < crest), free, outer & (x == 0), outer & (y == 0), outer & (x == right), outer],
         [CREST, SLOPE, LEFT, BASE, RIGHT, TOP], 0).astype(np.int32)
     return edges[values > 0], values[values > 0]
 

@@ -28,7 +28,8 @@ def test_the_papers_slope_has_640_triangles():
     assert soil_cells(bridge.slope_mesh(COMM)) == 640
 
 
-@pytest.mark.parametrize(("kind", "angle"), [("crossed", 45), ("crossed", 90), ("gmsh", 45), ("gmsh", 63), ("gmsh", 90)])
+@pytest.mark.parametrize(("kind", "angle"), [("crossed", 45), ("crossed", 90), ("fitted", 30), ("fitted", 63),
+                                              ("fitted", 90), ("gmsh", 45), ("gmsh", 63), ("gmsh", 90)])
 @pytest.mark.parametrize("headroom", [0.0, None])
 def test_slope_has_the_area_and_the_tags_of_its_outline(kind, angle, headroom):
     domain, cell_tags, facet_tags = bridge.slope_mesh(COMM, angle=angle, kind=kind, headroom=headroom, runout=1.5)
@@ -61,6 +62,7 @@ def test_slope_has_the_area_and_the_tags_of_its_outline(kind, angle, headroom):
         ({"crest": 1.13}, "crest.*1.13.*multiple.*gmsh"),
         ({"angle": 60}, "angle.*60.*gmsh"),
         ({"angle": 89.99}, "angle.*89.99.*gmsh"),
+        ({"angle": 80, "kind": "fitted"}, "angle.*80.*gmsh"),
         ({"angle": 0}, "angle.*0 degrees"),
         ({"angle": 91}, "angle.*91 degrees"),
         ({"height": -1.0}, "height.*-1"),
