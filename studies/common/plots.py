@@ -72,7 +72,7 @@ class Quantity:
 
 
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
-SHEAR_STRAIN = Quantity("Accumulated shear strain", "-", colours="inferno")
+SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
 VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="cividis")
 SPEED = Quantity("Speed", "m/s", colours="plasma")
 

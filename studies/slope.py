@@ -1,0 +1,267 @@
+"""The paper's slope: initial stresses by FEM, then failure and slide by MPM with the explicit scheme.
+
+The soil body is solved in DOLFINx under its initial unit weight; its stresses go to the particles; the unit weight is raised at
+once, and the slope slides until its geometry has changed enough to carry it. The defaults are those of the paper's
+section 6; --paper repeats it exactly, with zero initial stress and a time step of 1e-4 s.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import perf_counter
+
+import mpm_core as mpm
+import numpy as np
+from common.animation import Frame, save_animation
+from common.history import History
+from common.interrupt import Interrupt
+from common.options import add_choice, add_count, add_number, add_switch, check, study_parser
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
+from common.progress import Progress
+from common.slope_case import SlopeCase, add_slope_options, build_slope, initialise
+from common.summary import OutputError, results_folder, write_summary
+from mpi4py import MPI
+from mpm_core.output import MeshOutput, ParticleOutput
+
+comm = MPI.COMM_WORLD
+COLUMNS = [
+    "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unbalanced_ratio", "plastic_share", "dt_s"
+]  # fmt: skip
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_slope_options(p)
+    add_choice(p, "--initial", "fem", ("fem", "k0", "zero"), "initial stresses")
+    add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
+    add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
+    add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
+    add_count(p, "--frames", 120, "times at which particles are stored and drawn")
+    add_switch(p, "--paper", False, "the paper exactly: zero initial stress, time step 1e-4 s")
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check(p, options.dilation_angle <= options.friction_angle,
+          lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, "
+                  f"{options.friction_angle:g} degrees")  # fmt: skip
+    if options.paper:
+        options.initial, options.dt = "zero", 1e-4
+    return options
+
+
+# --- 2. What is looked at over time ----------------------------------------------------------------------------------
+
+
+class Watch:
+    """The particle at the crest, the farthest particle, and frames of all particles for the pictures."""
+
+    def __init__(self, case: SlopeCase) -> None:
+        self.model = case.model
+        start = self.model.particles.initial_position
+        distance = np.hypot(start[:, 0] - case.args.crest, start[:, 1] - case.args.height)
+        nearest = np.argmin(distance) if len(distance) else None
+        own = (np.inf, -1) if nearest is None else (distance[nearest], int(self.model.particles.id[nearest]))
+        self.crest_id = min(comm.allgather(own))[1]
+        self.first_toe = comm.allreduce(start[:, 0].max(initial=-np.inf), MPI.MAX)
+        self.frames: list[dict[str, np.ndarray]] = []
+
+    def fields(self) -> dict[str, np.ndarray]:
+        p = self.model.particles
+        return {
+            "position": p.position, "displacement": p.displacement, "velocity": p.velocity, "stress": p.stress,
+            "deviatoric_strain": p.deviatoric_strain, "plastic_strain": p.plastic_strain, "volume": p.volume,
+            "id": p.id, "material": p.material,
+        }  # fmt: skip
+
+    def crest_displacement(self, fields: dict[str, np.ndarray]) -> float:
+        """Length of the displacement of the particle that started at the crest [m]. Collective."""
+        mine = fields["displacement"][fields["id"] == self.crest_id]
+        return comm.allreduce(float(np.linalg.norm(mine)))
+
+    def runout(self, fields: dict[str, np.ndarray]) -> float:
+        """Advance of the farthest particle past where the farthest one started [m]. Collective."""
+        return comm.allreduce(fields["position"][:, 0].max(initial=-np.inf), MPI.MAX) - self.first_toe
+
+    def keep(self, time: float, fields: dict[str, np.ndarray]) -> None:
+        """Store a frame for the pictures, on the first rank. Collective."""
+        shown = {
+            "position": fields["position"], "volume": fields["volume"],
+            "displacement": np.linalg.norm(fields["displacement"], axis=1),
+            # Plastic, because elastic oscillations during the long creep add up in the total.
+            "shear_strain": fields["plastic_strain"], "vertical_stress": fields["stress"][:, 1],
+        }  # fmt: skip
+        parts = comm.gather({name: values.astype(np.float32) for name, values in shown.items()})
+        if parts is not None:
+            frame = {name: np.concatenate([part[name] for part in parts]) for name in shown}
+            self.frames.append({"time": np.float64(time), **frame})
+
+
+# --- 3. The slide ----------------------------------------------------------------------------------------------------
+
+
+class Files:
+    """Particles and background mesh over time, for ParaView."""
+
+    def __init__(self, case: SlopeCase, folder: Path) -> None:
+        self.model, mesh = case.model, case.model.mesh
+        self.particles = ParticleOutput(folder / "particles", comm)
+        self.mesh = MeshOutput(folder / "mesh", comm, mesh.points, mesh.cells[: mesh.owned_cells])
+        self.tags = mesh.cell_tags[: mesh.owned_cells]
+
+    def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
+        """Add a frame. Collective."""
+        self.particles.write(time, fields)
+        nodes = {name: self.model.nodal(name) for name in ("mass", "velocity", "internal_force")}
+        self.mesh.write(time, nodes, {"tag": self.tags})
+
+    def __enter__(self) -> Files:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.particles.close()
+        self.mesh.close()
+
+
+def slide(case: SlopeCase, watch: Watch, history: History, files: Files, interrupt: Interrupt) -> dict:
+    """Run to the end or to an interruption, and store frames; returns what is to be told about it."""
+    a, model = case.args, case.model
+    loop = {"seconds": 0.0, "stopped": None}
+    energy_scale = 0.0
+
+    def look(report: mpm.Report) -> None:
+        fields = watch.fields()
+        crest, runout = watch.crest_displacement(fields), watch.runout(fields)
+        history.add(
+            time_s=report.time, crest_displacement_m=crest, runout_m=runout, kinetic_energy_J_per_m=report.kinetic_energy,
+            unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share, dt_s=report.dt,
+        )  # fmt: skip
+        files.write(report.time, fields)
+        watch.keep(report.time, fields)
+        progress.show(report.time, report.steps, crest=f"{crest:.4f} m")
+
+    with Progress("slide", a.time, comm) as progress:
+        report = model.report()
+        look(report)
+        run = model.explicit(a.time, every=a.time / a.frames, dt=a.dt, damping=a.damping, pic=a.pic, nmd=a.nmd)
+        started = perf_counter()
+        try:
+            for report in run:
+                loop["seconds"] += perf_counter() - started
+                energy_scale = max(energy_scale, abs(report.external_work), report.kinetic_energy)
+                look(report)
+                if interrupt.requested():
+                    loop["stopped"] = f"interrupted at {report.time:g} s"
+                    break
+                started = perf_counter()
+        except mpm.RunError as error:
+            loop["stopped"] = str(error)
+            report = model.report()
+    work = report.external_work + report.support_work - report.internal_work - report.damping_work
+    loop["energy_balance_error"] = abs(work - report.kinetic_energy) / energy_scale if energy_scale else 0.0
+    return {**loop, "report": report}
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
+    """Figures 2 to 6 of the paper and a film, from the stored frames; on the first rank."""
+    scene = case.scene()
+    if scene is None:
+        return
+    first, last = watch.frames[0], watch.frames[-1]
+    save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"])
+    drawn = [
+        ("figure_3_displacement", "displacement", DISPLACEMENT),
+        ("figure_4_shear_strain", "shear_strain", SHEAR_STRAIN),
+        ("figure_5_vertical_stress", "vertical_stress", VERTICAL_STRESS),
+    ]
+    title = f"$t$ = {last['time']:.1f} s"
+    for name, key, quantity in drawn:
+        limits = colour_limits(quantity, [frame[key] for frame in watch.frames])
+        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+                       limits=limits, title=title)  # fmt: skip
+    save_history(folder / "figure_6_crest.png", history["time_s"], {"crest": history["crest_displacement_m"]},
+                 "Displacement of the particle at the crest [m]",
+                 limits=(0, max(0.5, 1.05 * history["crest_displacement_m"].max())))  # fmt: skip
+    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in watch.frames]
+    save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    clock = {"start": perf_counter()}
+    folder = results_folder("slope", a.output, comm)
+    case = build_slope(a, comm)
+    clock["mesh_and_particles"] = perf_counter()
+    ratio = initialise(case, a.initial, a.initial_unit_weight)
+    clock["initial_stress"] = perf_counter()
+    if comm.rank == 0:
+        print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): out-of-balance ratio {ratio:.2e}")
+
+    watch = Watch(case)
+    with (
+        Interrupt(comm) as interrupt,
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        Files(case, folder) as files,
+    ):
+        loop = slide(case, watch, history, files, interrupt)
+        clock["slide"] = perf_counter()
+        draw(case, watch, history, folder)
+        clock["pictures"] = perf_counter()
+
+    names = list(clock)
+    report = loop["report"]
+    summary = {
+        "finished_run": loop["stopped"] is None,
+        "stopped_because": loop["stopped"],
+        "time_s": report.time,
+        "steps": report.steps,
+        "cells": comm.allreduce(case.model.mesh.owned_cells),
+        "soil_cells": comm.allreduce(int((case.model.mesh.cell_tags[: case.model.mesh.owned_cells] == 1).sum())),
+        "particles": report.particles,
+        "initial_out_of_balance_ratio": ratio,
+        "crest_displacement_m": history["crest_displacement_m"][-1],
+        "runout_m": history["runout_m"][-1],
+        "energy_balance_error": loop["energy_balance_error"],
+        "particle_steps_per_second": report.particle_steps / loop["seconds"] if loop["seconds"] else 0.0,
+        "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
+    }
+    write_summary(folder, a, summary, comm)
+    if comm.rank == 0:
+        tell(summary, folder)
+    return interrupt.exit_code or (1 if loop["stopped"] else 0)
+
+
+def tell(summary: dict, folder: Path) -> None:
+    print(
+        f"crest displacement {summary['crest_displacement_m']:.4f} m, run-out {summary['runout_m']:.3f} m at "
+        f"{summary['time_s']:g} s; {summary['particle_steps_per_second'] / 1e6:.1f} million particle-steps per second"
+    )
+    if summary["stopped_because"]:
+        print(f"the run ended early: {summary['stopped_because']}; what there is has been written", file=sys.stderr)
+    print(f"results in {folder}")
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except (mpm.InputError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run slope: {error}", file=sys.stderr)
+        sys.exit(2)
