@@ -169,8 +169,6 @@ choose_launcher() {
   launch=(mpirun -n "$1")
   [[ $(mpirun --version 2>/dev/null) == *"Open MPI"* ]] || return 0
   [[ $(id -u) != 0 ]] || export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-  # After Ctrl-C the ranks get a minute to write their results instead of a second.
-  launch+=(--mca odls_base_sigkill_timeout 60)
   # Open MPI counts cores, not hardware threads.
   local cores
   cores=$(lscpu -p=Core,Socket 2>/dev/null | grep -v '^#' | sort -u | wc -l)

@@ -1,4 +1,8 @@
-"""Ctrl-C and SIGTERM end a run cleanly: the loop sees a flag, and the results so far are written."""
+"""Ctrl-C and SIGTERM end a run cleanly: the loop sees a flag, and the results so far are written.
+
+So does SIGUSR1, which mpirun hands on to its ranks; `studies/run --ranks` turns Ctrl-C into it, since mpirun itself kills
+its ranks a second after Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,11 @@ from types import FrameType
 
 from mpi4py import MPI
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+
 
 class Interrupt:
-    """Catches the first Ctrl-C or SIGTERM while the context lasts; a second one ends the program at once.
+    """Catches the first of these signals while the context lasts; a second one ends the program at once.
 
     Example:
         >>> with Interrupt() as interrupt:
@@ -29,8 +35,7 @@ class Interrupt:
         self._signal = number
         self._restore()  # so that the next one has its usual effect
         if self._comm.rank == 0:
-            name = signal.Signals(number).name
-            print(f"\n{name}: ending after this step and writing what there is; again to end at once", file=sys.stderr)
+            print("\ninterrupted: ending after this step and writing what there is; again to end at once", file=sys.stderr)
 
     def requested(self) -> bool:
         """Whether the run should end; true on all ranks once a signal came on any.
@@ -52,7 +57,7 @@ class Interrupt:
         self._before = {}
 
     def __enter__(self) -> Interrupt:
-        self._before = {number: signal.signal(number, self._catch) for number in (signal.SIGINT, signal.SIGTERM)}
+        self._before = {number: signal.signal(number, self._catch) for number in SIGNALS}
         return self
 
     def __exit__(self, *_: object) -> None:

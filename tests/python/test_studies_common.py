@@ -106,7 +106,7 @@ def test_history_is_on_disk_after_each_row(tmp_path):
             history.add(time_s=1.0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
 def test_the_first_signal_sets_a_flag(number, capsys):
     before = signal.getsignal(number)
     with Interrupt() as interrupt:
