@@ -9,6 +9,7 @@ from fenics_bridge.elastic import ElasticSolution, solve_elastic
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
+from fenics_bridge.handover import Handover, initialise
 from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_stress
 from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
@@ -20,9 +21,9 @@ from fenics_bridge.soil import soil_mesh
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 __all__ = [
-    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "ElasticSolution", "InputError",
-    "Load", "LoadStep", "NewtonReport", "PointSearch", "QuasiStatic", "Support", "background_arrays",
-    "background_mesh", "collapse_load", "evaluate_at", "factor_of_safety", "fixed", "k0_elastic", "k0_jaky",
-    "k0_stress", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh", "reduced_strength",
-    "roller", "slope_mesh", "soil_mesh", "solve_elastic",
+    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "ElasticSolution", "Handover",
+    "InputError", "Load", "LoadStep", "NewtonReport", "PointSearch", "QuasiStatic", "Support", "background_arrays",
+    "background_mesh", "collapse_load", "evaluate_at", "factor_of_safety", "fixed", "initialise", "k0_elastic",
+    "k0_jaky", "k0_stress", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
+    "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic",
 ]

@@ -41,7 +41,9 @@ def background_mesh(domain, cell_tags=None, facet_tags=None):
     """`mpm_core.Mesh` of a DOLFINx mesh with its tags and partition. Collective."""
     import mpm_core as mpm
 
-    return mpm.Mesh(**background_arrays(domain, cell_tags, facet_tags), comm=domain.comm)
+    mesh = mpm.Mesh(**background_arrays(domain, cell_tags, facet_tags), comm=domain.comm)
+    mesh.domain = domain  # it owns the communicator
+    return mesh
 
 
 def original_cells(domain):

@@ -20,6 +20,7 @@ class PointSearch:
     """
 
     def __init__(self, domain, points):
+        self._domain = domain  # it owns the communicator
         self._comm, dim = domain.comm, domain.geometry.dim
         points = np.ascontiguousarray(points, dtype=float)
         good = points.ndim == 2 and points.shape[1] == dim and np.all(np.isfinite(points))

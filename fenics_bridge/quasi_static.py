@@ -9,7 +9,7 @@ from dolfinx import fem, la
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
-from fenics_bridge.fields import assembled, strain
+from fenics_bridge.fields import assembled, nodal_average, strain
 from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
@@ -106,9 +106,14 @@ class QuasiStatic:
         return self.domain.comm.allreduce(out_of_balance.reshape(-1, dim)[mine].sum(axis=0))
 
     def stress(self, smooth=False):
-        """Stress [Pa] as a function that is linear (smooth; degree 2 only) or constant (its mean) in each cell."""
-        degree = 1 if smooth and self.degree == 2 else 0
-        return self.points.cell_function(self.points.stress, "stress", degree)
+        """Stress [Pa] as a function that is constant in each cell: the mean of its points.
+
+        smooth: linear in each cell, through its points (degree 2), or averaged at the nodes (degree 1). Collective.
+        """
+        if smooth and self.degree == 2:
+            return self.points.cell_function(self.points.stress, "stress", 1)
+        mean = self.points.cell_function(self.points.stress, "stress", 0)
+        return nodal_average(mean) if smooth else mean
 
     def state(self):
         """State variables of the law as a function that is constant in each cell."""
@@ -117,7 +122,7 @@ class QuasiStatic:
     def evaluate_at(self, points, smooth=False):
         """Dictionary of `displacement` (n, D) [m], `stress` (n, S) [Pa], `state` (n, n_state) at points on any rank.
 
-        The cells' mean stress is admissible; with `smooth` it is linear in each cell, which may exceed the strength.
+        The cells' mean stress is admissible; the one with `smooth`, as for `stress`, may exceed the strength.
         Raises InputError, on all ranks, naming a point outside the body. Collective.
         """
         return evaluate_at(points, displacement=self.displacement, stress=self.stress(smooth), state=self.state())

@@ -12,7 +12,8 @@ import fenics_bridge as bridge
 from fenics_bridge.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
-from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points, slope_model  # noqa: E402
+from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points,  # noqa: E402
+                          slope_model, slope_particles)
 
 COMM = MPI.COMM_WORLD
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
@@ -122,3 +123,12 @@ def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
     factors = [bridge.factor_of_safety(slope_model(comm=comm), bridge.Load(unit_weight=20e3)).value
                for comm in (COMM, MPI.COMM_SELF)]
     assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails
+
+
+def test_hand_over_between_different_partitions():
+    fem = slope_model(dilation_angle=0.0)
+    fem.solve(bridge.Load(unit_weight=18e3))
+    same = bridge.initialise(slope_particles(18e3), fem)
+    assert same.unbalanced_ratio < 1e-10 and same.returned_share == 0
+    other = bridge.initialise(slope_particles(18e3, cell_size=0.05), fem, smooth=True)
+    assert other.settled_ratio < 1e-3 and other.yielded_share < 0.01

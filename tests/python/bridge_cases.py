@@ -64,3 +64,14 @@ def excess_of_strength(stress, cohesion, friction_angle):
     phi = np.radians(friction_angle)
     low, high = principal[:, 0], principal[:, 2]
     return (0.5 * (high - low) + 0.5 * (high + low) * np.sin(phi) - cohesion * np.cos(phi)) / cohesion
+
+
+def slope_particles(unit_weight, cell_size=0.1, kind="crossed", law=None, comm=MPI.COMM_WORLD):
+    """`mpm_core.Model` of the paper's slope with particles, supports and gravity."""
+    law = law or mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0)
+    model = mpm.Model(bridge.background_mesh(*bridge.slope_mesh(comm, cell_size=cell_size, kind=kind)), law)
+    model.seed(density=unit_weight / 9.81, per_cell=10, cell_tag=bridge.SOIL)
+    model.roller(bridge.LEFT, (1, 0))
+    model.fix(bridge.BASE)
+    model.set_gravity((0, -9.81))
+    return model

@@ -1,0 +1,100 @@
+"""From finite elements to particles: stress, state and displacement of an equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+from fenics_bridge.evaluate import PointSearch
+from fenics_bridge.quasi_static import QuasiStatic
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What a hand-over did; sums are over all ranks.
+
+    unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
+    settled_ratio: the same after the equilibration [-]; None when there was none
+    returned_share: share of the particles whose stress had to be brought back inside the strength [-]
+    yielded_share: share of the particles that yielded in the equilibration where the finite elements did not [-]
+    """
+
+    unbalanced_ratio: float
+    settled_ratio: float | None
+    returned_share: float
+    yielded_share: float
+
+
+def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate=True):
+    """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
+
+    Particles stay where they are; each takes the stress and the state of the finite elements there, is returned to the
+    yield surface should it be outside, and loses its velocity. The model's gravity must be that of the equilibrium.
+
+    model: `mpm_core.Model` with particles; fem: QuasiStatic, solved and converged, or ElasticSolution; the meshes and
+        their partitions may differ
+    count_displacement: displacements of particles include those of the finite elements; otherwise they start from zero
+    smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
+        equilibrium as it is; with other cells the smooth stress is far nearer to it.
+    equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads
+    Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh, for laws that
+    do not match, and for finite elements that did not converge. Collective.
+    """
+    plastic = isinstance(fem, QuasiStatic)
+    particles = model.particles
+    if plastic:
+        agree(model.comm, _first_mistake(model, fem))
+    search = PointSearch(fem.displacement.function_space.mesh, particles.position)
+    search.require_all("particles")
+    stress, state = _values(fem, search, plastic, smooth, particles)
+    returned = _returned(model.laws, particles.material, stress, state)
+    particles.set("stress", stress)
+    particles.set("state", state)
+    particles.set("velocity", np.zeros_like(particles.velocity))
+    if count_displacement:
+        particles.set("initial_position", particles.position - search.values(fem.displacement))
+    before = model.out_of_balance()
+    had_yielded = int(np.sum(state[:, 0] > 0))
+    settled = model.equilibrate().unbalanced_ratio if equilibrate else None
+    yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
+    count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
+    return Handover(before, settled, returned / count, yielded / count)
+
+
+def _values(fem, search, plastic, smooth, particles):
+    """Stress (n, S) [Pa] and state (n, n_state) at the particles."""
+    if not plastic:
+        return search.values(fem.smooth_stress() if smooth else fem.stress), np.zeros_like(particles.state)
+    return search.values(fem.stress(smooth)), search.values(fem.state())
+
+
+def _returned(laws, material, stress, state):
+    """Bring stresses inside the strength, in place; the number of those that were outside."""
+    outside = 0
+    for number, law in enumerate(laws):
+        rows = np.flatnonzero(material == number)
+        inside, unchanged = np.ascontiguousarray(stress[rows]), np.ascontiguousarray(state[rows])
+        law.update(np.zeros_like(inside), inside, unchanged, None)
+        moved = np.abs(inside - stress[rows]).max(axis=1, initial=0.0)
+        outside += int(np.sum(moved > 1e-9 * np.abs(stress).max(initial=0.0)))
+        stress[rows] = inside  # the state stays that of the finite elements
+    return outside
+
+
+def _first_mistake(model, fem):
+    if not fem.converged:
+        return "fem: it has not been solved, or its last solution did not converge"
+    for number in np.unique(model.particles.material):
+        law = model.laws[number]
+        if type(law) is not type(fem.law):
+            return f"fem: its law is {type(fem.law).__name__}, that of material {number} is {type(law).__name__}"
+        for name in _PARAMETERS:
+            here, there = getattr(law, name, None), getattr(fem.law, name, None)
+            if here != there:
+                return f"fem: its law has {name}={there!r}, that of material {number} has {name}={here!r}"
+    return None
+
+
+_PARAMETERS = ("young", "poisson", "cohesion", "friction_angle", "dilation_angle", "tension_cutoff")
