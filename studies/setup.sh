@@ -11,7 +11,7 @@ log=$build/setup.log
 
 # What a study needs. ninja, git and ffmpeg could be done without, but make it faster or nicer.
 packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev pkg-config pybind11-dev python3-dev
-  libgtest-dev libeigen3-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py python3-numpy
+  libgtest-dev libgmock-dev libeigen3-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py python3-numpy
   python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.
 test_packages=(python3-pytest python3-hypothesis python3-h5py python3-meshio python3-scipy python3-vtk9)
