@@ -72,9 +72,10 @@ TYPED_TEST(MeshTest, NeighboursShareAFacet)
       const Index other = mesh.neighbours[c][k];
       EXPECT_EQ(other == none, mesh.facet_tags[c][k] != none); // the box tags its whole boundary
       boundary += other == none;
-      if (other != none)
-        for (Index node : facet_nodes<D>(mesh.cells[c], k))
-          EXPECT_NE(std::find(mesh.cells[other].begin(), mesh.cells[other].end(), node), mesh.cells[other].end());
+      if (other == none)
+        continue;
+      for (Index node : facet_nodes<D>(mesh.cells[c], k))
+        EXPECT_THAT(mesh.cells[other], testing::Contains(node));
     }
   EXPECT_EQ(boundary, D == 2 ? 4 * 3 : 6 * 9 * 2);
 }
@@ -82,7 +83,7 @@ TYPED_TEST(MeshTest, NeighboursShareAFacet)
 TYPED_TEST(MeshTest, SearchFindsTheCellFromAnywhere)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(D == 2 ? 24 : 8, 0.3).mesh();
+  const Mesh<D> mesh = D == 2 ? test::box<D>(24, 0.3).mesh() : test::box<D>(8, 0.15).mesh();
   std::mt19937 random(5);
   std::uniform_int_distribution<Index> any_cell(0, mesh.n_cells() - 1);
   for (int n = 0; n < 2000; ++n)
