@@ -10,7 +10,7 @@ namespace mpm
 enum class StressUpdate
 {
   modified_last, ///< MUSL: last, with velocities mapped back from the moved particles (19)
-  last,          ///< USL: last, with v_i + dt a_i
+  last,          ///< USL: last, with v_i + dt a_i; needs a smaller step where nodes carry little mass, f_int / m_i being large
   first          ///< USF: before the momentum equation, with the velocities at the step's start
 };
 
