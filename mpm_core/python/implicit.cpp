@@ -105,11 +105,17 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
 
 void bind_implicit(py::module_& m)
 {
+  py::class_<GhostOptions>(m, "GhostOptions")
+      .def(py::init<>())
+      .def_readwrite("stiffness", &GhostOptions::stiffness)
+      .def_readwrite("mass", &GhostOptions::mass)
+      .def_readwrite("filled", &GhostOptions::filled);
   py::class_<ImplicitOptions>(m, "ImplicitOptions")
       .def(py::init<>())
       .def_readwrite("damping", &ImplicitOptions::damping)
       .def_readwrite("pic_share", &ImplicitOptions::pic_share)
       .def_readwrite("mixed_discretisation", &ImplicitOptions::mixed_discretisation)
+      .def_readwrite("ghost", &ImplicitOptions::ghost)
       .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);
   bind_implicit_step<2>(m, "2");
   bind_implicit_step<3>(m, "3");

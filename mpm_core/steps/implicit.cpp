@@ -25,11 +25,34 @@ void find_active(Model<D>& model, ImplicitStep<D>& step)
   std::transform(filled.begin(), filled.end(), step.active.begin(), [](double f) { return f > 0 ? 1 : 0; });
 }
 
-/// f_int (14) of the trial's stresses, at the nodes.
+/// Forces of the ghost penalty for the iterate.
 template <int D>
-void find_internal_force(Model<D>& model, const ImplicitStep<D>& step, std::vector<Vector<D>>& internal)
+void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
 {
-  internal.assign(model.mesh.points.size(), {});
+  const Workspace<D>& work = model.work;
+  const double inertia = step.options.quasi_static ? 0 : 1 / step.dt;
+  for (const GhostFacet<D>& facet : step.ghosts)
+  {
+    const Vector<D> jump = jump_over(facet,
+                                     [&](Index i)
+                                     {
+                                       Vector<D> value;
+                                       for (int a = 0; a < D; ++a)
+                                         value[a] = facet.stiffness * step.dt * work.velocity[i][a] +
+                                                    facet.mass * inertia * (work.velocity[i][a] - work.start_velocity[i][a]);
+                                       return value;
+                                     });
+    for (int k = 0; k < D + 2; ++k)
+      for (int a = 0; a < D; ++a)
+        step.forces[facet.nodes[k]].ghost[a] += facet.share[k] * facet.jump[k] * jump[a];
+  }
+}
+
+/// Forces of the trial's stresses (14) and of the ghost penalty, at the nodes.
+template <int D>
+void find_forces(Model<D>& model, ImplicitStep<D>& step)
+{
+  step.forces.assign(model.mesh.points.size(), {});
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
   {
     if (model.work.moments[c].volume == 0)
@@ -38,15 +61,16 @@ void find_internal_force(Model<D>& model, const ImplicitStep<D>& step, std::vect
     {
       const Vector<D> force = internal_force<D>(step.stress[c], model.mesh.shapes[c].gradient[k]);
       for (int a = 0; a < D; ++a)
-        internal[model.mesh.cells[c][k]][a] += force[a];
+        step.forces[model.mesh.cells[c][k]].internal[a] += force[a];
     }
   }
-  sum_shared(model.exchange, internal.data()->data(), D);
-  for (std::size_t i = 0; i < internal.size(); ++i)
-    model.work.nodes[i].internal = internal[i];
+  add_ghost_forces(model, step);
+  sum_shared(model.exchange, step.forces.data()->internal.data(), 2 * D);
+  for (std::size_t i = 0; i < step.forces.size(); ++i)
+    model.work.nodes[i].internal = step.forces[i].internal;
 }
 
-/// Work done in the step: forces act at its end, over its whole displacement.
+/// Work done in the step: forces act at its end, over its whole displacement. That of the ghost penalty counts as damping.
 template <int D>
 void tally(Model<D>& model, const ImplicitStep<D>& step)
 {
@@ -62,7 +86,8 @@ void tally(Model<D>& model, const ImplicitStep<D>& step)
       const double u = step.dt * work.velocity[i][a];
       const double unbalanced = step.external[i][a] - work.nodes[i].internal[a];
       const double inertia = work.nodes[i].mass * work.acceleration[i][a];
-      const double reaction = inertia_force(model, step, static_cast<Index>(i), a).force - unbalanced;
+      const double damped_inertia = inertia_force(model, step, static_cast<Index>(i), a).force;
+      const double reaction = damped_inertia + step.forces[i].ghost[a] - unbalanced;
       totals.external_work += step.external[i][a] * u;
       totals.internal_work += work.nodes[i].internal[a] * u;
       totals.support_work += reaction * u;
@@ -94,6 +119,11 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   find_active(model, step);
   if (options.quasi_static)
     std::fill(work.start_velocity.begin(), work.start_velocity.end(), Vector<D>{});
+  if (model.exchange.size > 1 && !step.halos_ready)
+    step.halos = make_halos(model.mesh, model.exchange.comm);
+  step.halos_ready = true;
+  update(step.halos.nodes, work.start_velocity.data()->data(), D);
+  step.ghosts = find_ghost_facets(model, step.halos, options.ghost);
   work.velocity = work.start_velocity;
   for (const Support<D>& support : model.supports)
     if (step.active[support.node])
@@ -109,18 +139,20 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
 template <int D>
 TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
 {
+  update(step.halos.nodes, model.work.velocity.data()->data(), D);
   if (step.options.mixed_discretisation)
     average_strains(model, step.dt);
   const TrialCount count = try_stresses(model, step, tangents);
-  find_internal_force<D>(model, step, step.residual);
+  find_forces(model, step);
 
   std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
+  step.residual.resize(step.forces.size());
   for (std::size_t i = 0; i < step.residual.size(); ++i)
     for (int a = 0; a < D; ++a)
     {
-      const double external = step.external[i][a], internal = step.residual[i][a];
+      const double external = step.external[i][a], internal = step.forces[i].internal[a];
       const double inertia = inertia_force(model, step, static_cast<Index>(i), a).force;
-      step.residual[i][a] = external - internal - inertia;
+      step.residual[i][a] = external - internal - step.forces[i].ghost[a] - inertia;
       if (!model.exchange.owned[i])
         continue;
       sums[1] += external * external;

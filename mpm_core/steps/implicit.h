@@ -8,8 +8,8 @@
 /// first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite elements.
 /// A trial leaves the particles as they are: only sums over cells are kept of it.
 
+#include "steps/implicit_ghost.h"
 #include "steps/implicit_inertia.h"
-#include "steps/model.h"
 
 namespace mpm
 {
@@ -18,6 +18,7 @@ struct ImplicitOptions
   double damping = 0;       ///< local damping alpha, in [0, 1); not used in quasi-static steps
   double pic_share = 0;     ///< in [0, 1]
   bool mixed_discretisation = false;
+  GhostOptions ghost;        ///< of the remedy for nodes with hardly any mass
   bool quasi_static = false; ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
 };
 
@@ -40,7 +41,15 @@ struct TrialReport
   std::int64_t failed = 0;       ///< particles whose law failed, and those of cells that would lose their volume
 };
 
-/// A step under way. The iterate v1 is `work.velocity` of the model, f_int is in `work.nodes`.
+/// What the cells of a trial give a node [N], summed over ranks.
+template <int D>
+struct TrialForces
+{
+  Vector<D> internal; ///< f_int (14)
+  Vector<D> ghost;    ///< of the ghost penalty
+};
+
+/// A step under way. The iterate v1 is `work.velocity` of the model, f_int is in `work.nodes` too.
 template <int D>
 struct ImplicitStep
 {
@@ -50,6 +59,10 @@ struct ImplicitStep
   std::vector<Vector<D>> residual;                       ///< zero along supported directions
   std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
   std::vector<CellTangent<D>> tangents;                  ///< of each owned cell
+  std::vector<TrialForces<D>> forces;
+  std::vector<GhostFacet<D>> ghosts;                     ///< stabilised facets
+  Halos halos;                                           ///< of the mesh, for those between ranks; made by the first step
+  bool halos_ready = false;
   std::vector<unsigned char> active;                     ///< per node: 1 where a filled cell touches it
 };
 

@@ -103,6 +103,24 @@ std::array<Matrix<D>, D + 1> projectors(const Model<D>& model, const ImplicitSys
     p[k] = projector(model, system, model.mesh.cells[c][k]);
   return p;
 }
+/// Rows of the nodes to whose forces this rank adds; the same from both sides of a rank boundary.
+template <int D>
+void add_ghost_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+                       const GhostFacet<D>& facet, Writer& writer)
+{
+  const double factor = facet.stiffness + (step.options.quasi_static ? 0 : facet.mass / (step.dt * step.dt));
+  for (int k = 0; k < D + 2; ++k)
+    for (int l = 0; l < D + 2; ++l)
+    {
+      if (facet.share[k] == 0)
+        continue;
+      Matrix<D> block = product<D>(projector(model, system, facet.nodes[k]), projector(model, system, facet.nodes[l]));
+      for (auto& row : block)
+        for (double& value : row)
+          value *= facet.share[k] * factor * facet.jump[k] * facet.jump[l];
+      writer.add_block<D>(system.number[facet.nodes[k]], system.number[facet.nodes[l]], block);
+    }
+}
 } // namespace
 
 template <int D>
@@ -114,7 +132,10 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
   for (Index i = 0; i < n; ++i)
     if (exchange.owned[i] && step.active[i])
       owned.push_back(i);
-  int changed = owned != system.owned || cells != system.cells;
+  std::vector<std::array<Index, 2>> ghosts;
+  for (const GhostFacet<D>& facet : step.ghosts)
+    ghosts.push_back({facet.nodes[D], facet.nodes[D + 1]});
+  int changed = owned != system.owned || cells != system.cells || ghosts != system.ghosts;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
   const auto count = static_cast<GlobalIndex>(owned.size());
@@ -138,14 +159,16 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
     }
   }
   sum_shared(exchange, sums.data()->data(), 2);
+  update(step.halos.nodes, sums.data()->data(), 2);
 
   system.owned = std::move(owned);
   system.cells = std::move(cells);
+  system.ghosts = std::move(ghosts);
   system.number.resize(sums.size());
   system.diagonal.resize(sums.size());
   for (std::size_t i = 0; i < sums.size(); ++i)
   {
-    system.number[i] = step.active[i] ? static_cast<GlobalIndex>(sums[i][0]) : none;
+    system.number[i] = sums[i][1] > 0 ? static_cast<GlobalIndex>(sums[i][0]) : none;
     system.diagonal[i] = sums[i][1];
   }
   system.support.assign(sums.size(), none);
@@ -171,6 +194,8 @@ void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const
                             product<D>(p[k], product<D>(block, p[l])));
       }
   }
+  for (const GhostFacet<D>& facet : step.ghosts)
+    add_ghost_entries(model, step, system, facet, writer);
   for (Index node : system.owned)
   {
     const Matrix<D> p = projector(model, system, node);

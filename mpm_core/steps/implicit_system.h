@@ -16,6 +16,7 @@ struct ImplicitSystem
   std::vector<GlobalIndex> number;   ///< per node: its number over all ranks, or `none` where it is not active
   std::vector<Index> owned;          ///< nodes whose rows this rank has, by rising number
   std::vector<Index> cells;          ///< filled cells of this rank
+  std::vector<std::array<Index, 2>> ghosts; ///< opposite nodes of the stabilised facets
   std::vector<Index> support;        ///< per node: its support, or `none`
   std::vector<double> diagonal;      ///< per node: elastic stiffness, the scale of its entries [N/m]
   GlobalIndex total = 0;             ///< nodes over all ranks

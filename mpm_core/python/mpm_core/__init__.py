@@ -7,6 +7,7 @@ dimensions; shear strain is engineering shear. Angles are in degrees where the n
 from ._core import InputError, LinearElastic, MohrCoulomb, RunError, StressUpdate
 from ._core import compiler as compiler
 from ._core import version as __version__
+from .ghost import GhostPenalty
 from .mesh import Mesh
 from .model import Model
 from .newton import Newton
@@ -14,6 +15,7 @@ from .particles import Particles
 from .report import ImplicitReport, Report
 
 __all__ = [
+    "GhostPenalty",
     "ImplicitReport",
     "InputError",
     "LinearElastic",

@@ -1,7 +1,6 @@
 """A model: background mesh, particles, laws, loads and supports; and the explicit scheme over it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,43 +10,12 @@ from numpy.typing import ArrayLike
 from . import _core
 from ._core import InputError, StressUpdate
 from .collective import collectively
+from .ghost import GhostPenalty
+from .implicit import run_implicit, settle
 from .mesh import Mesh, floats
+from .newton import Newton
 from .particles import Particles
-
-
-@dataclass(frozen=True)
-class Report:
-    """Where a run stands; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
-
-    time: float
-    """Time [s]"""
-    steps: int
-    """Steps since the model was made"""
-    dt: float
-    """Length of the last step [s]"""
-    particles: int
-    mass: float
-    """[kg]"""
-    momentum: tuple[float, ...]
-    """[kg m/s]"""
-    kinetic_energy: float
-    external_work: float
-    """Work of gravity and tractions since the model was made"""
-    internal_work: float
-    """Work of the stresses"""
-    damping_work: float
-    """Energy taken out by local damping"""
-    support_work: float
-    """Work of prescribed velocities"""
-    plastic_share: float
-    """Share of the particles that yielded in the last step"""
-    unbalanced_ratio: float
-    """Out-of-balance over external force in the last step, Euclidean norms over the nodes"""
-    outflow_particles: int
-    """Particles that left through outflow facets"""
-    outflow_mass: float
-    particle_steps: int
-    """Sum over steps of the number of particles"""
+from .report import ImplicitReport, Report
 
 
 def _positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
@@ -308,3 +276,84 @@ class Model:
             while self.time < run.until:
                 self._core.run_explicit(options, run)
             yield self.report()
+
+    def implicit(
+        self,
+        until: float,
+        *,
+        dt: float,
+        solver: Newton | None = None,
+        every: float | None = None,
+        quasi_static: bool = False,
+        damping: float = 0.0,
+        pic: float = 0.0,
+        nmd: bool = False,
+        ghost: GhostPenalty | None = None,
+    ) -> Iterator[ImplicitReport]:
+        """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
+
+        A step that does not converge is tried again with half its length; the length grows again when it is easy.
+
+        Args:
+            until: time to reach [s].
+            dt: longest time step [s].
+            solver: what solves each step; Newton's method by default.
+            every: time between reports [s]; by default after each step.
+            quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
+            damping: local damping alpha, in [0, 1). Acts on the out-of-balance force of the step's end; not in
+                quasi-static runs.
+            pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
+            nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+
+        Raises:
+            InputError: an argument out of its range.
+            RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
+                particles are as after the last step that converged.
+        """
+        options = self._implicit_options(damping, pic, nmd, quasi_static, ghost)
+        longest = _positive("dt", dt, "s")
+        interval = None if every is None else _positive("every", every, "s")
+        if not (np.isfinite(until) and until >= self.time):
+            raise InputError(f"until is {until} s, expected a time not before the present, {self.time} s")
+        return run_implicit(self, solver or Newton(), options, until=until, dt=longest, interval=interval)
+
+    def equilibrate(
+        self,
+        *,
+        solver: Newton | None = None,
+        nmd: bool = False,
+        ghost: GhostPenalty | None = None,
+        tolerance: float = 1e-6,
+        max_steps: int = 20,
+    ) -> ImplicitReport:
+        """Bring the particles to equilibrium under the present loads, by quasi-static steps of no duration.
+
+        Needed after an imported initial state, and after convection, where the particles' stresses no longer balance the
+        loads. Velocities become zero.
+
+        Args:
+            solver: what solves each step; Newton's method by default.
+            nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+            tolerance: |f_ext - f_int| / |f_ext| to reach, at nodes and particles as they are after a step.
+            max_steps: steps after which to give up.
+
+        Raises:
+            RunError: no equilibrium within ``max_steps``, or a step that did not converge.
+        """
+        options = self._implicit_options(0.0, 0.0, nmd, True, ghost)
+        return settle(self, solver or Newton(), options, _positive("tolerance", tolerance, "(a ratio)"), max_steps)
+
+    def _implicit_options(
+        self, damping: float, pic: float, nmd: bool, quasi_static: bool, ghost: GhostPenalty | None
+    ) -> Any:
+        options = _core.ImplicitOptions()
+        options.damping = _within("damping", damping, 0, 1, open_above=True)
+        options.pic_share = _within("pic", pic, 0, 1)
+        options.mixed_discretisation = bool(nmd)
+        options.quasi_static = bool(quasi_static)
+        options.ghost = (ghost or GhostPenalty()).options()
+        if self.comm.allreduce(len(self.particles)) == 0:
+            raise InputError("the model has no particles, seed some first")
+        return options

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from .linear import Tangent
 from .solution import Solution, relative
 
+MOST_GROWTH = 5.0
+"""of |r| in an iteration whose correction does not lower it"""
+
 
 @dataclass(frozen=True)
 class Newton:
@@ -67,7 +70,7 @@ class NewtonSolver:
             solution.linear_iterations.append(self._tangent.iterations)
             report = self._search(step, correction, report)
             if report is None:
-                solution.reason = f"no part of the correction lowers |r| = {solution.residuals[-1]:.2e}"
+                solution.reason = f"every part of the correction makes |r| = {solution.residuals[-1]:.2e} much larger"
                 return solution
             solution.residuals.append(relative(report))
         solution.converged = not report["failed"]
@@ -83,14 +86,24 @@ class NewtonSolver:
         return None if du is None else du / dt
 
     def _search(self, step: Any, correction: NDArray[np.float64], before: dict) -> dict | None:
-        """Move by the largest of 1, 1/2, 1/4, ... of the correction that lowers |r|; None when none does."""
+        """Move by the largest of 1, 1/2, 1/4, ... of the correction that lowers |r|.
+
+        Where none does, |r| has a kink in between, as plastic points begin to yield or change their edge; the one with
+        the least |r| leads over it. None when all fail or |r| becomes much larger.
+        """
         start = step.velocity
+        tried: list[tuple[float, float]] = []
         for halvings in range(self._options.max_halvings + 1):
             share = 0.5**halvings
             step.velocity = start + share * correction
             report = step.trial(tangents=halvings == 0)
-            if not report["failed"] and report["residual"] < (1 - 1e-4 * share) * before["residual"]:
+            if report["failed"]:
+                continue
+            lower = report["residual"] < (1 - 1e-4 * share) * before["residual"]
+            if lower or relative(report) <= self._options.tolerance:
                 return report if halvings == 0 else step.trial(tangents=True)
-            if not report["failed"] and relative(report) <= self._options.tolerance:
-                return report
-        return None
+            tried.append((report["residual"], share))
+        if not tried or min(tried)[0] > MOST_GROWTH * before["residual"]:
+            return None
+        step.velocity = start + min(tried)[1] * correction
+        return step.trial(tangents=True)

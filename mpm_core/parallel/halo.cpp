@@ -1,0 +1,108 @@
+#include "parallel/halo.h"
+
+#include "parallel/migration.h"
+
+#include <algorithm>
+#include <map>
+
+namespace mpm
+{
+namespace
+{
+/// Local corners of a cell by rising global number of their nodes: an order that all ranks agree on.
+template <int D>
+std::array<Index, D + 1> corners_by_number(const Mesh<D>& mesh, Index cell)
+{
+  std::array<Index, D + 1> nodes = mesh.cells[cell];
+  std::sort(nodes.begin(), nodes.end(), [&](Index a, Index b) { return mesh.global_nodes[a] < mesh.global_nodes[b]; });
+  return nodes;
+}
+
+/// Sends each rank a list of numbers and returns the lists that came, by rank.
+std::map<int, std::vector<GlobalIndex>> exchange_lists(const std::map<int, std::vector<GlobalIndex>>& lists, MPI_Comm comm)
+{
+  int size;
+  MPI_Comm_size(comm, &size);
+  std::vector<int> send(static_cast<std::size_t>(size), 0), receive(send);
+  for (const auto& [rank, list] : lists)
+    send[static_cast<std::size_t>(rank)] = static_cast<int>(list.size());
+  MPI_Alltoall(send.data(), 1, MPI_INT, receive.data(), 1, MPI_INT, comm);
+  std::map<int, std::vector<GlobalIndex>> came;
+  std::vector<MPI_Request> requests;
+  for (int rank = 0; rank < size; ++rank)
+    if (const int n = receive[static_cast<std::size_t>(rank)])
+    {
+      came[rank].resize(static_cast<std::size_t>(n));
+      MPI_Irecv(came[rank].data(), n, MPI_INT64_T, rank, 3, comm, &requests.emplace_back());
+    }
+  for (const auto& [rank, list] : lists)
+    MPI_Isend(list.data(), static_cast<int>(list.size()), MPI_INT64_T, rank, 3, comm, &requests.emplace_back());
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+  return came;
+}
+} // namespace
+
+template <int D>
+Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm)
+{
+  Halos halos;
+  halos.cells.comm = halos.nodes.comm = comm;
+  std::vector<bool> known(mesh.points.size(), false);
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+    for (Index node : mesh.cells[c])
+      known[node] = true;
+
+  std::map<int, Halo::Link> cells, nodes;
+  std::map<int, std::vector<GlobalIndex>> cells_asked, corners_asked;
+  for (Index c = mesh.owned_cells; c < mesh.n_cells(); ++c)
+  {
+    const int owner = mesh.cell_owners[c];
+    cells[owner].take.push_back(c);
+    cells_asked[owner].push_back(mesh.global_cells[c]);
+    const auto corners = corners_by_number(mesh, c);
+    for (int k = 0; k <= D; ++k)
+      if (!known[corners[k]])
+      {
+        known[corners[k]] = true;
+        nodes[owner].take.push_back(corners[k]);
+        corners_asked[owner].push_back(mesh.global_cells[c] * (D + 1) + k);
+      }
+  }
+  const auto numbers = owned_cell_numbers(mesh);
+  for (const auto& [rank, asked] : exchange_lists(cells_asked, comm))
+    for (GlobalIndex cell : asked)
+      cells[rank].give.push_back(numbers.at(cell));
+  for (const auto& [rank, asked] : exchange_lists(corners_asked, comm))
+    for (GlobalIndex corner : asked)
+      nodes[rank].give.push_back(corners_by_number(mesh, numbers.at(corner / (D + 1)))[corner % (D + 1)]);
+  for (auto& [rank, link] : cells)
+    halos.cells.links.push_back({rank, std::move(link.give), std::move(link.take)});
+  for (auto& [rank, link] : nodes)
+    halos.nodes.links.push_back({rank, std::move(link.give), std::move(link.take)});
+  return halos;
+}
+
+void update(const Halo& halo, double* values, int width)
+{
+  const auto w = static_cast<std::size_t>(width);
+  std::vector<MPI_Request> requests;
+  std::vector<std::vector<double>> given(halo.links.size()), taken(halo.links.size());
+  for (std::size_t l = 0; l < halo.links.size(); ++l)
+  {
+    const auto& [rank, give, take] = halo.links[l];
+    taken[l].resize(take.size() * w);
+    MPI_Irecv(taken[l].data(), static_cast<int>(taken[l].size()), MPI_DOUBLE, rank, 4, halo.comm, &requests.emplace_back());
+    for (Index entry : give)
+      given[l].insert(given[l].end(), values + static_cast<std::size_t>(entry) * w,
+                      values + (static_cast<std::size_t>(entry) + 1) * w);
+    MPI_Isend(given[l].data(), static_cast<int>(given[l].size()), MPI_DOUBLE, rank, 4, halo.comm, &requests.emplace_back());
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+  for (std::size_t l = 0; l < halo.links.size(); ++l)
+    for (std::size_t k = 0; k < halo.links[l].take.size(); ++k)
+      std::copy_n(&taken[l][k * w], w, values + static_cast<std::size_t>(halo.links[l].take[k]) * w);
+}
+
+template Halos make_halos(const Mesh<2>&, MPI_Comm);
+template Halos make_halos(const Mesh<3>&, MPI_Comm);
+} // namespace mpm

@@ -1,0 +1,37 @@
+#pragma once
+/// @file
+/// Values at ghost cells, and at those of their nodes that no owned cell touches, from the ranks that own the cells.
+
+#include "mesh/mesh.h"
+
+#include <mpi.h>
+
+namespace mpm
+{
+/// Who gives whom which entries of an array; a link has the same length on both sides.
+struct Halo
+{
+  struct Link
+  {
+    int rank;
+    std::vector<Index> give, take;
+  };
+  MPI_Comm comm = MPI_COMM_SELF;
+  std::vector<Link> links; ///< by rising rank
+};
+
+/// Halos of a mesh: entries are cells, or nodes.
+struct Halos
+{
+  Halo cells, nodes;
+};
+
+/// @note Collective
+template <int D>
+Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm);
+
+/// Replaces the values that this rank takes by those of the ranks that give them.
+/// @param values  (entries, width) row-major
+/// @note Collective over neighbours
+void update(const Halo& halo, double* values, int width);
+} // namespace mpm

@@ -1,0 +1,44 @@
+"""The remedy of the implicit scheme for nodes that carry hardly any mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._core import InputError
+
+
+@dataclass(frozen=True)
+class GhostPenalty:
+    """Penalty on the jump of gradients between badly filled cells and their neighbours.
+
+    Where the body's boundary cuts a cell, its outer nodes hang on a few particles, which makes the tangent nearly
+    singular. The penalty ties the gradient in such a cell to that of its neighbour (Burman 2010; in implicit MPM Coombs
+    2023). Affine motion feels nothing of it, and a body whose cells are all filled does not either.
+
+    Raises:
+        InputError: a number below zero, or ``filled`` above one.
+    """
+
+    stiffness: float = 0.1
+    """gamma_K, relative to the shear modulus [-]; acts on the step's displacement"""
+    mass: float = 0.1
+    """gamma_M, relative to the density [-]; acts on the acceleration"""
+    filled: float = 0.5
+    """Cells filled less than this share of their volume are stabilised; 0 for none"""
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "mass", "filled"):
+            value = getattr(self, name)
+            most = 1.0 if name == "filled" else np.inf
+            if not (np.isfinite(value) and 0 <= value <= most):
+                raise InputError(f"{name} is {value}, expected a number from 0 to {most}")
+
+    def options(self) -> Any:
+        """As the core takes it."""
+        options = _core.GhostOptions()
+        options.stiffness, options.mass, options.filled = self.stiffness, self.mass, self.filled
+        return options
