@@ -30,8 +30,8 @@ def column(request):
 
 
 def test_stresses_of_the_column(column):
-    # sigma_v = gamma (H - y), sigma_h = nu / (1 - nu) sigma_v. Each linear cell has one stress; equilibrium asks a row of
-    # cells for the weight above the row's middle.
+    # sigma_v = gamma (H - y), sigma_h = nu / (1 - nu) sigma_v. Each linear cell has one stress; equilibrium asks a row
+    # of cells for the weight above the row's middle.
     dim = column.mesh.dim
     stress, y = by_id(column, "stress"), by_id(column, "initial_position")[:, -1]
     row = np.floor(y / HEIGHT * ROWS).astype(int)

@@ -7,8 +7,8 @@ from core_cases import box
 import mpm_core as mpm
 
 # Young's modulus and the shear traction of the benchmark; its answer at (48, 52) is 16.44 with nu = 0.499999975. The
-# displacement of a nearly incompressible body differs from the incompressible one by the order of G / K = 0.002 with nu = 0.499, for
-# which the critical time step is not yet tiny. The load is scaled down, so that displacements stay small.
+# displacement of a nearly incompressible body differs from the incompressible one by the order of G / K = 0.002 with
+# nu = 0.499, for which the critical time step is not yet tiny. The load is scaled down: displacements stay small.
 YOUNG, POISSON, TRACTION, SCALE = 1.12499998125, 0.499, 1 / 16, 1e-3
 MID_EDGE, BENCHMARK = (48.0, 52.0), 16.44
 

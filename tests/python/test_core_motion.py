@@ -78,8 +78,8 @@ def turned_and_stretched(before, after):
 
 @pytest.mark.parametrize(("dim", "cells", "turns", "lag"), [(2, 12, 0.98, 0.02), (3, 6, 0.25, 0.05)])
 def test_spinning_block_keeps_its_shape_without_stress(dim, cells, turns, lag):
-    # omega R / c = 0.05. The block is under the stress of its spin, of the order rho omega^2 R^2, and its strains are of
-    # the order (omega R / c)^2 = 0.0025. Were stresses and strains not those of the turned body, they would be of order 1.
+    # omega R / c = 0.05. The block is under the stress of its spin, of the order rho omega^2 R^2, and its strains are
+    # of the order (omega R / c)^2 = 0.0025; those of a scheme that takes turning for strain would be of order 1.
     _, _, confined = moduli(ELASTIC.young, ELASTIC.poisson)
     omega = 0.05 * np.sqrt(confined / DENSITY)
     model = spinning_block(dim, cells, omega)

@@ -35,7 +35,8 @@ def test_block_slides_on_an_inclined_roller_with_g_sin_a(dim, nmd):
     # The roller gives no force along the plane, whatever the block does on it: M g sin(a) t
     assert report.momentum @ along == pytest.approx(report.mass * GRAVITY * 0.5 * 0.5, rel=1e-12)
     slid = (model.particles.mass @ model.particles.position @ along - start) / report.mass
-    assert slid == pytest.approx(GRAVITY * 0.5 * 0.5 * (0.5 + report.dt) / 2, rel=1e-3)  # symplectic: dt^2 n (n + 1) / 2
+    # velocities first: dt^2 n (n + 1) / 2
+    assert slid == pytest.approx(GRAVITY * 0.5 * 0.5 * (0.5 + report.dt) / 2, rel=1e-3)
     height = model.particles.position @ normal
     assert height.min() > 0 and height.max() < 0.26
 
@@ -76,7 +77,7 @@ def test_prescribed_velocity_takes_a_block_along_from_rest(dim):
 
 @pytest.mark.parametrize("dim", DIMS)
 def test_rollers_that_meet_hold_the_corner(dim):
-    # Every side is a roller: corner nodes are fixed, edge nodes slide along their edge, and the weight is carried evenly.
+    # Every side is a roller: it keeps to its plane, edges where two meet keep to both, corners are fixed.
     model = mpm.Model(box([3] * dim), ELASTIC)
     model.seed(density=DENSITY, per_cell=4)
     for axis in range(dim):

@@ -43,8 +43,8 @@ def test_critical_time_step_is_the_smallest_altitude_over_the_wave_speed(dim):
 
 @pytest.mark.parametrize("dim", DIMS)
 def test_only_filled_cells_and_their_own_law_and_density_count(dim):
-    model = soil_block(dim, [ELASTIC, mpm.MohrCoulomb(young=9 * YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30)],
-                       body=([0.0] * dim, [0.5] * dim))
+    stiff_soil = mpm.MohrCoulomb(young=9 * YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0)
+    model = soil_block(dim, [ELASTIC, stiff_soil], body=([0.0] * dim, [0.5] * dim))
     filled = model.mesh.cell_tags == 1
     soft = altitudes(model.mesh)[filled].min() / SPEED
     assert model.critical_time_step() == pytest.approx(soft, rel=1e-12)
@@ -70,7 +70,8 @@ def test_default_step_is_half_the_critical_one_and_meets_the_end(dim):
 def test_step_above_the_critical_one_is_refused_with_both_numbers(dim):
     model = soil_block(dim)
     critical = model.critical_time_step()
-    with pytest.raises(mpm.InputError, match=f"dt is {1.01 * critical:.6g} s, above the critical time step {critical:.6g} s"):
+    numbers = f"dt is {1.01 * critical:.6g} s, above the critical time step {critical:.6g} s"
+    with pytest.raises(mpm.InputError, match=numbers):
         run(model, 1.0, dt=1.01 * critical)
     assert (model.time, model.report().steps) == (0.0, 0)
     assert run(model, 10 * critical, dt=critical).dt == pytest.approx(critical)
