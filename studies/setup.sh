@@ -10,9 +10,9 @@ build=$root/build
 log=$build/setup.log
 
 # What a study needs. ninja, git and ffmpeg could be done without, but make it faster or nicer.
-packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev pkg-config pybind11-dev python3-dev
-  libgtest-dev libgmock-dev libeigen3-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py python3-numpy
-  python3-matplotlib python3-pil python3-tqdm ffmpeg)
+packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev pkg-config pybind11-dev
+  python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
+  python3-numpy python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.
 test_packages=(python3-pytest python3-hypothesis python3-h5py python3-meshio python3-scipy python3-vtk9)
 
@@ -112,6 +112,8 @@ can_import_dolfinx() {
 
 # --- packages ---
 
+installed_packages() { dpkg-query -W -f '${db:Status-Status} ${Package}\n' 2>/dev/null | sed -n 's/^installed //p'; }
+
 # Installs those of the packages that Debian's package list says are not there. A Python that is not Debian's own but
 # has DOLFINx belongs to another stack (conda, a module system), which brings its own compiler and libraries.
 install_missing() {
@@ -122,8 +124,7 @@ install_missing() {
     return 0
   fi
   local missing
-  missing=$(comm -13 <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' 2>/dev/null | sed -n 's/^installed //p' | sort -u) \
-    <(printf '%s\n' "${packages[@]}" "$@" | sort -u))
+  missing=$(comm -13 <(installed_packages | sort -u) <(printf '%s\n' "${packages[@]}" "$@" | sort -u))
   [[ -n $missing ]] || return 0
   local as_root=(env)
   if [[ $(id -u) != 0 ]]; then
