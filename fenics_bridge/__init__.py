@@ -5,12 +5,14 @@ What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
+from fenics_bridge.comparison import Difference, compare
 from fenics_bridge.elastic import ElasticSolution, solve_elastic
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
 from fenics_bridge.handover import Handover, initialise
 from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_stress
+from fenics_bridge.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
 from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
@@ -21,9 +23,10 @@ from fenics_bridge.soil import soil_mesh
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 __all__ = [
-    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "ElasticSolution", "Handover",
-    "InputError", "Load", "LoadStep", "NewtonReport", "PointSearch", "QuasiStatic", "Support", "background_arrays",
-    "background_mesh", "collapse_load", "evaluate_at", "factor_of_safety", "fixed", "initialise", "k0_elastic",
-    "k0_jaky", "k0_stress", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
+    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
+    "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "NewtonReport", "PointSearch", "QuasiStatic",
+    "Support", "background_arrays", "background_mesh", "collapse_load", "compare", "evaluate_at",
+    "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_stress", "log_spiral",
+    "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic",
 ]

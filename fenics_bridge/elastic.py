@@ -24,18 +24,17 @@ class ElasticSolution:
     def __init__(self, displacement, stress):
         self.displacement, self.stress = displacement, stress
 
-    def smooth_stress(self):
-        """Stress averaged at the nodes, as a continuous function. Collective."""
-        return nodal_average(self.stress)
+    def stress_function(self, smooth=False):
+        """The cells' own stress or, `smooth`, its average at the nodes as a continuous function. Collective."""
+        return nodal_average(self.stress) if smooth else self.stress
 
     def evaluate_at(self, points, smooth=False):
         """Dictionary with `displacement` (n, D) [m] and `stress` (n, S) [Pa] at points, on any rank.
 
-        smooth: take the nodally averaged stress instead of the cells' own.
+        smooth: as for `stress_function`.
         Raises InputError, on all ranks, naming a point outside the body. Collective.
         """
-        stress = self.smooth_stress() if smooth else self.stress
-        return evaluate_at(points, displacement=self.displacement, stress=stress)
+        return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth))
 
 
 def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, degree=1, options_prefix="elastic_"):

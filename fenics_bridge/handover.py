@@ -44,11 +44,11 @@ def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate
     """
     plastic = isinstance(fem, QuasiStatic)
     particles = model.particles
-    if plastic:
-        agree(model.comm, _first_mistake(model, fem))
+    agree(model.comm, _first_mistake(model, fem) if plastic else None)
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
-    stress, state = _values(fem, search, plastic, smooth, particles)
+    stress = search.values(fem.stress_function(smooth))
+    state = search.values(fem.state_function()) if plastic else np.zeros_like(particles.state)
     returned = _returned(model.laws, particles.material, stress, state)
     particles.set("stress", stress)
     particles.set("state", state)
@@ -61,13 +61,6 @@ def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
     return Handover(before, settled, returned / count, yielded / count)
-
-
-def _values(fem, search, plastic, smooth, particles):
-    """Stress (n, S) [Pa] and state (n, n_state) at the particles."""
-    if not plastic:
-        return search.values(fem.smooth_stress() if smooth else fem.stress), np.zeros_like(particles.state)
-    return search.values(fem.stress(smooth)), search.values(fem.state())
 
 
 def _returned(laws, material, stress, state):

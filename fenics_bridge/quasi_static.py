@@ -105,7 +105,7 @@ class QuasiStatic:
         mine = nodes[nodes < space.dofmap.index_map.size_local]
         return self.domain.comm.allreduce(out_of_balance.reshape(-1, dim)[mine].sum(axis=0))
 
-    def stress(self, smooth=False):
+    def stress_function(self, smooth=False):
         """Stress [Pa] as a function that is constant in each cell: the mean of its points.
 
         smooth: linear in each cell, through its points (degree 2), or averaged at the nodes (degree 1). Collective.
@@ -115,17 +115,18 @@ class QuasiStatic:
         mean = self.points.cell_function(self.points.stress, "stress", 0)
         return nodal_average(mean) if smooth else mean
 
-    def state(self):
+    def state_function(self):
         """State variables of the law as a function that is constant in each cell."""
         return self.points.cell_function(self.points.state, "state", 0)
 
     def evaluate_at(self, points, smooth=False):
         """Dictionary of `displacement` (n, D) [m], `stress` (n, S) [Pa], `state` (n, n_state) at points on any rank.
 
-        The cells' mean stress is admissible; the one with `smooth`, as for `stress`, may exceed the strength.
+        The cells' mean stress is admissible; the one with `smooth`, as for `stress_function`, may exceed the strength.
         Raises InputError, on all ranks, naming a point outside the body. Collective.
         """
-        return evaluate_at(points, displacement=self.displacement, stress=self.stress(smooth), state=self.state())
+        return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth),
+                           state=self.state_function())
 
 
 class _Step:

@@ -1,0 +1,97 @@
+"""Collapse of a slope by limit analysis: the reference for finite elements."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_bridge.errors import InputError
+
+
+@dataclass(frozen=True)
+class LogSpiral:
+    """Rotational mechanism through the toe of a slope: the soil above a logarithmic spiral turns about its pole.
+
+    unit_weight: at collapse [N/m3]; pole: (2,) [m]; curve: (k, 2) [m], the slip surface from the crest to the toe;
+    coordinates as in `slope_mesh`, with the shoulder of the slope at (crest, height)
+    """
+
+    unit_weight: float
+    pole: np.ndarray
+    curve: np.ndarray
+
+
+def log_spiral(height, angle, cohesion, friction_angle, crest=0.0):
+    """Least upper bound of the collapse load over all spirals through the toe, with associated flow.
+
+    Equates the work of the weight with the dissipation along the spiral (Chen 1975, Limit Analysis and Soil Plasticity,
+    ch. 9). The ground below the toe is taken as rigid.
+    height, crest: [m]; angle: of the slope, friction_angle: [degrees], angle > friction_angle; cohesion: [Pa]
+    Returns a LogSpiral.
+    """
+    if not 0 <= friction_angle < angle <= 90:
+        raise InputError(f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
+                         "0 <= friction_angle < angle <= 90")
+    if not (height > 0 and cohesion > 0):
+        raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
+    shape = (math.radians(angle), math.tan(math.radians(friction_angle)))
+    start, end = _best_angles(*shape)
+    spiral, moment, dissipation = _mechanism(start, end, *shape)
+    size = height / (spiral[0, 1] - spiral[-1, 1])
+    toe = np.array([crest + height / math.tan(shape[0]) if angle < 90 else crest, 0.0])
+    pole = toe - size * spiral[-1]
+    return LogSpiral(cohesion * dissipation / (moment * size), pole, pole + size * spiral)
+
+
+def log_spiral_safety(height, angle, cohesion, friction_angle, unit_weight):
+    """Factor of safety of a slope by the same mechanism: the strength divided by it just fails at the unit weight."""
+    low, high = 1e-2, 1e2
+    for _ in range(24):
+        factor = math.sqrt(low * high)
+        reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
+        stands = reduced >= angle or log_spiral(height, angle, cohesion / factor, reduced).unit_weight > unit_weight
+        low, high = (factor, high) if stands else (low, factor)
+    return factor
+
+
+def _best_angles(slope, tangent):
+    """Start and end angle of the spiral with the least collapse load: a grid search, refined around its best point."""
+    centre, half = np.array([0.5 * np.pi / 2, 0.6 * np.pi]), np.array([0.5 * np.pi / 2, 0.4 * np.pi])
+    for _ in range(16):
+        grid = [np.linspace(c - h, c + h, 7) for c, h in zip(centre, half)]
+        loads = [[_load(start, end, slope, tangent) for end in grid[1]] for start in grid[0]]
+        i, j = np.unravel_index(np.argmin(loads), (7, 7))
+        centre, half = np.array([grid[0][i], grid[1][j]]), half * 0.5
+    return centre
+
+
+def _load(start, end, slope, tangent):
+    """Dimensionless collapse load, gamma H / c; infinite where the angles make no mechanism."""
+    if not 0 < start < end < np.pi:
+        return np.inf
+    spiral, moment, dissipation = _mechanism(start, end, slope, tangent)
+    height = spiral[0, 1] - spiral[-1, 1]
+    behind = _shoulder(spiral, slope)[0] - spiral[0, 0]
+    return dissipation * height / moment if moment > 0 and height > 0 and behind >= 0 else np.inf
+
+
+def _mechanism(start, end, slope, tangent):
+    """Spiral (k, 2) about the pole, with radius 1 at its start; first moment of the soil's area; dissipation over c."""
+    angles = np.linspace(start, end, 101)
+    radius = np.exp((angles - start) * tangent)
+    spiral = -radius[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    x, y = np.vstack([spiral, _shoulder(spiral, slope)]).T
+    x_next, y_next = np.roll(x, -1), np.roll(y, -1)
+    moment = -np.sum((x + x_next) * (x * y_next - x_next * y)) / 6  # the soil to the left of the pole goes down
+    swept = end - start
+    dissipation = (radius[-1] ** 2 - 1) / (2 * tangent) if tangent > 0 else swept
+    return spiral, moment, dissipation
+
+
+def _shoulder(spiral, slope):
+    """Where the slope from the spiral's end, the toe, meets the level of its start."""
+    height = spiral[0, 1] - spiral[-1, 1]
+    back = height / math.tan(slope) if slope < math.pi / 2 else 0.0
+    return np.array([spiral[-1, 0] - back, spiral[0, 1]])

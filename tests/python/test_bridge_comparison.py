@@ -1,0 +1,71 @@
+"""Finite elements and particles side by side; limit analysis."""
+
+import mpm_core as mpm
+import numpy as np
+import pytest
+from bridge_cases import POISSON, YOUNG, slope_model, slope_particles
+
+import fenics_bridge as bridge
+
+
+@pytest.mark.parametrize("cell_size", [0.1, 0.05])
+def test_first_quasi_static_step_of_the_particles_is_the_finite_element_solution(cell_size):
+    """On the same linear cells, all of the soil's filled, both solve the same equations."""
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    fem = slope_model(cell_size, degree=1)
+    fem.equilibrate(bridge.Load(unit_weight=10e3), law)
+    model = slope_particles(10e3, cell_size, law=law)
+    for _ in model.implicit(until=1.0, dt=1.0, quasi_static=True):
+        pass
+    difference = bridge.compare(fem, model)
+    assert difference["displacement"].l2 < 1e-9 and difference["displacement"].maximum < 1e-9
+    # the particles' stress turns with the body, that of small strains does not
+    assert difference["stress"].l2 < 0.02
+
+
+def test_difference_is_relative_to_the_finite_elements():
+    fem = slope_model(dilation_angle=0.0)
+    fem.solve(bridge.Load(unit_weight=15e3))
+    model = slope_particles(15e3)
+    bridge.initialise(model, fem, equilibrate=False)
+    places = model.particles.position
+    same = bridge.compare(fem, model, places=places)
+    assert same["displacement"].l2 < 1e-12 and same["stress"].maximum < 1e-12
+    model.particles.set("stress", 1.1 * model.particles.stress)
+    more = bridge.compare(fem, model, places=places)
+    assert more["stress"].l2 == pytest.approx(0.1) and more["stress"].maximum == pytest.approx(0.1)
+
+
+def test_particle_that_started_outside_is_named():
+    fem = slope_model(dilation_angle=0.0)
+    model = slope_particles(15e3)
+    model.seed_points([[3.0, 0.5]], [1e-3], density=2000.0)
+    with pytest.raises(bridge.InputError, match=r"particles: point .* at \(3, 0.5\) m is outside"):
+        bridge.compare(fem, model)
+
+
+@pytest.mark.parametrize(
+    ("angle", "friction_angle", "number"),
+    [(45, 25, 22.9), (90, 30, 6.69), (90, 0, 3.83), (60, 20, 10.39), (30, 25, 119.9)],
+)
+def test_log_spiral_gives_the_stability_numbers_of_the_literature(angle, friction_angle, number):
+    """gamma H / c after Chen (1975), table 9.1."""
+    spiral = bridge.log_spiral(2.0, angle, 1e3, friction_angle, crest=1.0)
+    assert spiral.unit_weight * 2.0 / 1e3 == pytest.approx(number, rel=2e-3)
+    run = 2.0 / np.tan(np.radians(angle))
+    assert np.allclose(spiral.curve[-1], (1.0 + run, 0.0)) and spiral.curve[0, 1] == pytest.approx(2.0)
+    assert spiral.curve[0, 0] < 1.0
+    radius = np.linalg.norm(spiral.curve - spiral.pole, axis=1)
+    assert radius[-1] >= radius[0] * (1 - 1e-12)
+
+
+def test_factor_of_safety_of_the_log_spiral():
+    assert bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 20e3) == pytest.approx(1.053, rel=1e-3)
+    at_collapse = bridge.log_spiral(1.0, 45, 1e3, 25.0).unit_weight
+    assert bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, at_collapse) == pytest.approx(1.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("arguments", [(1.0, 20, 1e3, 25.0), (1.0, 95, 1e3, 25.0), (0.0, 45, 1e3, 25.0), (1.0, 45, 0.0, 25.0)])
+def test_slope_without_a_mechanism_is_refused(arguments):
+    with pytest.raises(bridge.InputError, match="angle|height"):
+        bridge.log_spiral(*arguments)
