@@ -150,10 +150,17 @@ build_release() {
   else
     say "Python: $python"
   fi
-  # One line is said when there is something to compile, none when there is not.
-  (set -o pipefail; cmake --build "$build" 2>&1 | tee "$log" |
-    awk '/Building|Linking/ && !said { print "'"$program"': building (a few minutes the first time)"; fflush(); said = 1 }' >&2) ||
-    die_with_log "the build failed"
+  (set -o pipefail; cmake --build "$build" 2>&1 | tee "$log" | say_when_building) || die_with_log "the build failed"
+}
+
+# Says one line when there is something to compile, none when there is not.
+say_when_building() {
+  local line said=
+  while read -r line; do
+    [[ -z $said && $line == *Building* ]] || continue
+    say "building (a few minutes the first time)"
+    said=1
+  done
 }
 
 configure() {
