@@ -12,7 +12,7 @@ struct LinearElastic
   /// Poisson's ratio [-], in (-1, 0.5)
   double poisson;
 
-  static constexpr int n_state = 1;
+  static constexpr std::array state_names{"plastic_strain"};
 };
 
 /// Throws InputError when a parameter is out of its range.

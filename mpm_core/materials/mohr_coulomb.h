@@ -29,7 +29,7 @@ struct MohrCoulomb
   /// Largest principal stress allowed [Pa], >= 0; without effect from c cot(phi) upwards
   double tension_cutoff = std::numeric_limits<double>::infinity();
 
-  static constexpr int n_state = 1;
+  static constexpr std::array state_names{"plastic_strain"};
 };
 
 /// Throws InputError when a parameter is out of its range.

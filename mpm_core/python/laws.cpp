@@ -1,137 +1,30 @@
 #include "python/bindings.h"
-
-#include "materials/law.h"
-#include "python/arrays.h"
-
-#include <algorithm>
-#include <array>
+#include "python/law_binding.h"
 
 namespace mpm::python
 {
 namespace
 {
-/// Points that are transposed at once from NumPy's rows to the law's columns: small enough for the first-level cache.
-constexpr Index block = 256;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// The law on rows of NumPy arrays, in place.
-template <int D, class L>
-BatchReport update_rows(const L& law, const double* strain, double* stress, double* state, double* tangent, Index size)
+void bind_elastic(py::module_& m)
 {
-  constexpr int S = n_stress<D>, n_state = L::n_state;
-  std::array<std::array<double, block>, S> strain_columns, stress_columns;
-  std::array<std::array<double, block>, n_state> state_columns;
-  PointBatch<D> points;
-  std::array<double*, n_state> state_pointers;
-  for (int k = 0; k < S; ++k)
-  {
-    points.strain_increment[k] = strain_columns[k].data();
-    points.stress[k] = stress_columns[k].data();
-  }
-  for (int k = 0; k < n_state; ++k)
-    state_pointers[k] = state_columns[k].data();
-  points.state = state_pointers.data();
-
-  BatchReport total;
-  for (Index first = 0; first < size; first += block)
-  {
-    points.size = std::min(block, size - first);
-    for (Index p = 0; p < points.size; ++p)
-    {
-      const auto row = static_cast<std::size_t>(first + p);
-      for (int k = 0; k < S; ++k)
-      {
-        strain_columns[k][p] = strain[row * S + k];
-        stress_columns[k][p] = stress[row * S + k];
-      }
-      for (int k = 0; k < n_state; ++k)
-        state_columns[k][p] = state[row * n_state + k];
-    }
-    points.tangent = tangent ? tangent + static_cast<std::size_t>(first) * S * S : nullptr;
-    const BatchReport report = update<D>(law, points);
-    for (Index p = 0; p < points.size; ++p)
-    {
-      const auto row = static_cast<std::size_t>(first + p);
-      for (int k = 0; k < S; ++k)
-        stress[row * S + k] = stress_columns[k][p];
-      for (int k = 0; k < n_state; ++k)
-        state[row * n_state + k] = state_columns[k][p];
-    }
-    total.plastic += report.plastic;
-    if (report.failed > 0 && total.failed == 0)
-      total.first_failed = first + report.first_failed;
-    total.failed += report.failed;
-  }
-  return total;
-}
-
-template <class L>
-BatchReport update_arrays(const L& law, const py::array& strain_increment, py::array stress, py::array state,
-                          const py::object& tangent)
-{
-  const py::ssize_t width = strain_increment.ndim() == 2 ? strain_increment.shape(1) : 0;
-  if (width != 4 && width != 6)
-    throw InputError("strain_increment has shape " + shape_text(strain_increment) +
-                     ", expected (n, 4) in plane strain or (n, 6) in three dimensions");
-  const py::ssize_t n = strain_increment.shape(0);
-  check_array<double>("strain_increment", strain_increment, {n, width});
-  check_array<double>("stress", stress, {n, width});
-  check_array<double>("state", state, {n, L::n_state});
-  double* tangent_data = nullptr;
-  if (!tangent.is_none())
-  {
-    auto array = py::cast<py::array>(tangent);
-    check_array<double>("tangent", array, {n, width, width});
-    tangent_data = mutable_values<double>("tangent", array).data();
-  }
-  const double* strain = values<double>(strain_increment).data();
-  double* const stress_data = mutable_values<double>("stress", stress).data();
-  double* const state_data = mutable_values<double>("state", state).data();
-  py::gil_scoped_release release;
-  return width == 4 ? update_rows<2>(law, strain, stress_data, state_data, tangent_data, static_cast<Index>(n))
-                    : update_rows<3>(law, strain, stress_data, state_data, tangent_data, static_cast<Index>(n));
-}
-
-/// What every law has in Python, beside its parameters.
-template <class L>
-py::class_<L> bind_law(py::module_& m, const char* name)
-{
-  return py::class_<L>(m, name)
-      .def_property_readonly("n_state", [](const L&) { return L::n_state; })
-      .def_property_readonly("p_wave_modulus", [](const L& law) { return p_wave_modulus(law); })
-      .def("update", &update_arrays<L>, py::arg("strain_increment"), py::arg("stress"), py::arg("state"),
-           py::arg("tangent") = py::none());
-}
-
-template <class L>
-L checked(const L& law)
-{
-  check(law);
-  return law;
-}
-} // namespace
-
-void bind_laws(py::module_& m)
-{
-  py::class_<BatchReport>(m, "BatchReport")
-      .def_readonly("plastic", &BatchReport::plastic)
-      .def_readonly("failed", &BatchReport::failed)
-      .def_readonly("first_failed", &BatchReport::first_failed);
-
   bind_law<LinearElastic>(m, "LinearElastic")
       .def(py::init([](double young, double poisson) { return checked(LinearElastic{young, poisson}); }),
            py::kw_only(), py::arg("young"), py::arg("poisson"))
       .def_readonly("young", &LinearElastic::young)
       .def_readonly("poisson", &LinearElastic::poisson);
+}
 
+void bind_mohr_coulomb(py::module_& m)
+{
   bind_law<MohrCoulomb>(m, "MohrCoulomb")
       .def(py::init(
                [](double young, double poisson, double cohesion, double friction_angle, double dilation_angle,
                   std::optional<double> tension_cutoff)
                {
-                 MohrCoulomb law{young, poisson, cohesion, friction_angle, dilation_angle};
-                 if (tension_cutoff)
-                   law.tension_cutoff = *tension_cutoff;
-                 return checked(law);
+                 return checked(MohrCoulomb{young, poisson, cohesion, friction_angle, dilation_angle,
+                                            tension_cutoff.value_or(infinity)});
                }),
            py::kw_only(), py::arg("young"), py::arg("poisson"), py::arg("cohesion"), py::arg("friction_angle"),
            py::arg("dilation_angle") = 0.0, py::arg("tension_cutoff") = py::none())
@@ -141,5 +34,44 @@ void bind_laws(py::module_& m)
       .def_readonly("friction_angle", &MohrCoulomb::friction_angle)
       .def_readonly("dilation_angle", &MohrCoulomb::dilation_angle)
       .def_readonly("tension_cutoff", &MohrCoulomb::tension_cutoff);
+}
+
+void bind_drucker_prager(py::module_& m)
+{
+  py::enum_<ConeMatch>(m, "ConeMatch")
+      .value("OUTER", ConeMatch::outer)
+      .value("INNER", ConeMatch::inner)
+      .value("PLANE_STRAIN", ConeMatch::plane_strain);
+  m.def("cone_slope", &cone_slope, py::arg("angle"), py::arg("match"));
+  m.def("cone_strength", &cone_strength, py::arg("cohesion"), py::arg("friction_angle"), py::arg("match"));
+  bind_law<DruckerPrager>(m, "DruckerPrager")
+      .def(py::init(
+               [](double young, double poisson, double strength, double friction, double dilation,
+                  std::optional<double> tension_cutoff)
+               {
+                 return checked(
+                     DruckerPrager{young, poisson, strength, friction, dilation, tension_cutoff.value_or(infinity)});
+               }),
+           py::kw_only(), py::arg("young"), py::arg("poisson"), py::arg("strength"), py::arg("friction") = 0.0,
+           py::arg("dilation") = 0.0, py::arg("tension_cutoff") = py::none())
+      .def_readonly("young", &DruckerPrager::young)
+      .def_readonly("poisson", &DruckerPrager::poisson)
+      .def_readonly("strength", &DruckerPrager::strength)
+      .def_readonly("friction", &DruckerPrager::friction)
+      .def_readonly("dilation", &DruckerPrager::dilation)
+      .def_readonly("tension_cutoff", &DruckerPrager::tension_cutoff);
+}
+} // namespace
+
+void bind_laws(py::module_& m)
+{
+  py::class_<BatchReport>(m, "BatchReport")
+      .def_readonly("plastic", &BatchReport::plastic)
+      .def_readonly("failed", &BatchReport::failed)
+      .def_readonly("first_failed", &BatchReport::first_failed);
+  m.attr("law_types") = py::list();
+  bind_elastic(m);
+  bind_mohr_coulomb(m);
+  bind_drucker_prager(m);
 }
 } // namespace mpm::python

@@ -1,6 +1,5 @@
 #include "steps/implicit_trial.h"
 
-#include "materials/elasticity.h"
 #include "steps/batches.h"
 #include "transfer/kinematics.h"
 
@@ -13,16 +12,13 @@ namespace
 /// Part of a cell's volume below which an increment is refused.
 constexpr double least_growth = 0.1;
 
-constexpr int longest_state = 16;
-
 /// Copies of a batch: what a law reads and writes.
 template <int D>
 struct TrialScratch
 {
   alignas(64) double strain[n_stress<D>][batch_size];
-  alignas(64) double start[n_stress<D>][batch_size]; ///< stress at the start, turned with the material
-  alignas(64) double stress[n_stress<D>][batch_size];
-  alignas(64) double state[longest_state][batch_size];
+  alignas(64) double stress[n_stress<D>][batch_size]; ///< at the start, turned with the material; then at the end
+  alignas(64) double state[max_states][batch_size];
   std::vector<double> tangent;
 };
 
@@ -82,23 +78,24 @@ SymTensor<D> turned_by(const Matrix<D>& omega, const SymTensor<D>& stress)
   return turned;
 }
 
-/// Elastic strain that goes with a stress.
+/// The same of a strain with engineering shear.
 template <int D>
-SymTensor<D> elastic_strain(const ElasticModuli& moduli, const SymTensor<D>& stress)
+SymTensor<D> turned_strain(const Matrix<D>& omega, SymTensor<D> strain)
 {
-  const double mean = (stress[0] + stress[1] + stress[2]) / 3;
-  const double volumetric = mean / (3 * moduli.lambda + 2 * moduli.shear);
-  SymTensor<D> strain;
-  for (int k = 0; k < n_stress<D>; ++k)
-    strain[k] = k < 3 ? (stress[k] - mean) / (2 * moduli.shear) + volumetric : stress[k] / moduli.shear;
-  return strain;
+  for (int k = 3; k < n_stress<D>; ++k)
+    strain[k] /= 2;
+  SymTensor<D> turned = turned_by<D>(omega, strain);
+  for (int k = 3; k < n_stress<D>; ++k)
+    turned[k] *= 2;
+  return turned;
 }
 
-/// Adds V d sigma / d grad u of one particle: the law's tangent C acts on the strain, and on the strain that would turn
-/// the start's stress as the rotation does, since laws begin at an elastic trial.
+/// Adds V d sigma / d grad u of one particle: the law's tangent C acts on the strain. To the rotation goes what follows
+/// from isotropy: had the strain turned along with the start's stress, the result would have, too; so it changes by
+/// (Omega sigma - sigma Omega) - C (Omega de - de Omega).
 template <int D>
-void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& start, const ElasticModuli& moduli,
-                 double volume, bool averaged, CellTangent<D>& tangent)
+void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& stress, double volume, bool averaged,
+                 CellTangent<D>& tangent)
 {
   constexpr int S = n_stress<D>;
   for (int b = 0; b < D; ++b)
@@ -107,13 +104,14 @@ void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& s
         tangent.by_gradient[k][b * D + m] += volume * c[stress_component<D>[k] * S + stress_component<D>[symmetric_index<D>(b, m)]];
   for (std::size_t s = 0; s < turn.spin.size(); ++s)
   {
-    const SymTensor<D> strain = elastic_strain<D>(moduli, turned_by<D>(turn.spin[s], start));
+    const SymTensor<D> with_stress = turned_by<D>(turn.spin[s], stress);
+    const SymTensor<D> with_strain = turned_strain<D>(turn.spin[s], turn.strain.increment);
     const auto [b, m] = spin_pairs<D>[s];
     for (int k = 0; k < n_symmetric<D>; ++k)
     {
-      double turned = 0;
+      double turned = with_stress[stress_component<D>[k]];
       for (int j = 0; j < S; ++j)
-        turned += c[stress_component<D>[k] * S + j] * strain[j];
+        turned -= c[stress_component<D>[k] * S + j] * with_strain[j];
       tangent.by_gradient[k][b * D + m] += volume * turned;
       tangent.by_gradient[k][m * D + b] -= volume * turned;
     }
@@ -130,11 +128,6 @@ void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& s
     }
 }
 
-ElasticModuli moduli_of(const Law& law)
-{
-  return std::visit([](const auto& l) { return elastic_moduli(l.young, l.poisson); }, law);
-}
-
 /// Copies one run's stresses and states to the scratch and prepares its strains. @returns strain and rotation of the cell
 template <int D>
 CellStrain<D> load_run(const Model<D>& model, const ImplicitStep<D>& step, const Run& run, Index at,
@@ -148,14 +141,12 @@ CellStrain<D> load_run(const Model<D>& model, const ImplicitStep<D>& step, const
   for (int k = 0; k < n_stress<D>; ++k)
   {
     std::fill_n(scratch.strain[k] + at, size, strain.increment[k]);
-    std::copy_n(model.particles.stress[k].data() + run.first, size, scratch.start[k] + at);
+    std::copy_n(model.particles.stress[k].data() + run.first, size, scratch.stress[k] + at);
   }
   SymmetricColumns<D> columns;
   for (int k = 0; k < n_symmetric<D>; ++k)
-    columns[k] = scratch.start[stress_component<D>[k]];
+    columns[k] = scratch.stress[stress_component<D>[k]];
   rotate<D>(columns, at, at + size, strain.rotation);
-  for (int k = 0; k < n_stress<D>; ++k)
-    std::copy_n(scratch.start[k] + at, size, scratch.stress[k] + at);
   for (std::size_t k = 0; k < model.particles.state.size(); ++k)
     std::copy_n(model.particles.state[k].data() + run.first, size, scratch.state[k] + at);
   return strain;
@@ -171,8 +162,8 @@ BatchReport update_scratch(const Law& law, Index size, bool tangents, TrialScrat
     points.strain_increment[k] = scratch.strain[k];
     points.stress[k] = scratch.stress[k];
   }
-  std::array<double*, longest_state> state;
-  for (int k = 0; k < longest_state; ++k)
+  std::array<double*, max_states> state;
+  for (int k = 0; k < max_states; ++k)
     state[k] = scratch.state[k];
   points.state = state.data();
   points.tangent = tangents ? scratch.tangent.data() : nullptr;
@@ -194,13 +185,12 @@ void sum_tangents(const Model<D>& model, ImplicitStep<D>& step, const Run& run, 
                   const TrialScratch<D>& scratch)
 {
   const CellTurn<D> turn = cell_turn<D>(strain);
-  const ElasticModuli moduli = moduli_of(model.laws[run.material]);
   for (Index p = 0; p < run.last - run.first; ++p)
   {
-    SymTensor<D> start;
+    SymTensor<D> stress;
     for (int k = 0; k < n_stress<D>; ++k)
-      start[k] = scratch.start[k][at + p];
-    add_tangent<D>(&scratch.tangent[static_cast<std::size_t>((at + p) * n_stress<D> * n_stress<D>)], turn, start, moduli,
+      stress[k] = scratch.stress[k][at + p];
+    add_tangent<D>(&scratch.tangent[static_cast<std::size_t>((at + p) * n_stress<D> * n_stress<D>)], turn, stress,
                    model.particles.volume[run.first + p], step.options.mixed_discretisation, step.tangents[run.cell]);
   }
 }

@@ -50,7 +50,7 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
     points.strain_increment[k] = scratch.column[k];
     points.stress[k] = particles.stress[k].data() + batch.first;
   }
-  std::array<double*, 16> state;
+  std::array<double*, max_states> state;
   for (std::size_t k = 0; k < particles.state.size(); ++k)
     state[k] = particles.state[k].data() + batch.first;
   points.state = state.data();

@@ -4,10 +4,20 @@ Conventions: SI units; tension positive; components ``xx yy zz xy`` in plane str
 dimensions; shear strain is engineering shear. Angles are in degrees where the name says ``angle``.
 """
 
-from ._core import InputError, LinearElastic, MohrCoulomb, RunError, StressUpdate
+from ._core import (
+    ConeMatch,
+    DruckerPrager,
+    InputError,
+    LinearElastic,
+    MohrCoulomb,
+    RunError,
+    StressUpdate,
+)
 from ._core import compiler as compiler
 from ._core import version as __version__
 from .ghost import GhostPenalty
+from .element import ElementTest
+from .laws import matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
 from .newton import Newton
@@ -15,6 +25,9 @@ from .particles import Particles
 from .report import ImplicitReport, Report
 
 __all__ = [
+    "ConeMatch",
+    "DruckerPrager",
+    "ElementTest",
     "GhostPenalty",
     "ImplicitReport",
     "InputError",
@@ -28,4 +41,7 @@ __all__ = [
     "RunError",
     "StressUpdate",
     "__version__",
+    "matched_drucker_prager",
+    "tresca",
+    "von_mises",
 ]

@@ -49,7 +49,7 @@ class Model:
         self.comm: MPI.Comm = mesh.comm
         self.laws = list(laws) if isinstance(laws, (list, tuple)) else [laws]
         for law in self.laws:
-            if not isinstance(law, (_core.LinearElastic, _core.MohrCoulomb)):
+            if not isinstance(law, tuple(_core.law_types)):
                 raise InputError(f"laws has {law!r}, expected constitutive laws such as MohrCoulomb(...)")
         if not self.laws:
             raise InputError("laws is empty, expected at least one constitutive law")

@@ -1,0 +1,64 @@
+#pragma once
+/// @file
+/// The list of laws that stand for themselves, and what can be asked of any law. A new law is one file beside the others
+/// and one entry here.
+
+#include "materials/drucker_prager.h"
+#include "materials/linear_elastic.h"
+#include "materials/mohr_coulomb.h"
+
+#include <string>
+#include <variant>
+
+namespace mpm
+{
+/// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
+template <class... Wrapper>
+using LawList = std::variant<LinearElastic, MohrCoulomb, DruckerPrager, Wrapper...>;
+
+/// Number of state variables of a law
+template <class L>
+  requires requires { L::state_names; }
+int n_state(const L&)
+{
+  return static_cast<int>(L::state_names.size());
+}
+
+/// Names of a law's state variables, in their order; the first is `plastic_strain` in every law
+template <class L>
+  requires requires { L::state_names; }
+std::vector<std::string> state_names(const L&)
+{
+  return {L::state_names.begin(), L::state_names.end()};
+}
+
+template <class... L>
+int n_state(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return n_state(l); }, law);
+}
+
+template <class... L>
+std::vector<std::string> state_names(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return state_names(l); }, law);
+}
+
+template <class... L>
+void check(const std::variant<L...>& law)
+{
+  std::visit([](const auto& l) { check(l); }, law);
+}
+
+template <class... L>
+double p_wave_modulus(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return p_wave_modulus(l); }, law);
+}
+
+template <int D, class... L>
+BatchReport update(const std::variant<L...>& law, const PointBatch<D>& points)
+{
+  return std::visit([&](const auto& l) { return update<D>(l, points); }, law);
+}
+} // namespace mpm

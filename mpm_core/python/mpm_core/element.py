@@ -1,0 +1,74 @@
+"""Laboratory tests on a single point of a law: some components of strain are driven, the stress of the others is kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import InputError, RunError
+from .mesh import floats
+
+MAX_ITERATIONS = 50
+
+
+class ElementTest:
+    """One point of a law under mixed control of strain and stress.
+
+    Args:
+        law: any law.
+        stress: at the start [Pa], tension positive, shape (4,) in plane strain or (6,).
+        state: state variables at the start, shape (n_state,); zero by default.
+
+    Example:
+        >>> test = mpm.ElementTest(soil, stress=[-100e3] * 3 + [0.0] * 3)
+        >>> for _ in range(100):  # drained triaxial compression along x: sides at 100 kPa
+        ...     test.step([-1e-3, None, None, 0.0, 0.0, 0.0])
+        >>> test.stress
+    """
+
+    def __init__(self, law: Any, stress: ArrayLike, state: ArrayLike | None = None) -> None:
+        self.law = law
+        self.stress = floats("stress", stress, (None,))
+        """Stress [Pa], shape (S,)"""
+        if len(self.stress) not in (4, 6):
+            raise InputError(f"stress has shape {self.stress.shape}, expected (4,) or (6,)")
+        self.state = floats("state", np.zeros(law.n_state) if state is None else state, (law.n_state,))
+        """State variables, shape (n_state,)"""
+        self.strain = np.zeros_like(self.stress)
+        """Strain since the start, engineering shear, shape (S,)"""
+
+    def step(self, strain_increment: ArrayLike, stress: ArrayLike | None = None) -> None:
+        """Drive the point by one increment, by Newton's method with the law's tangent.
+
+        Args:
+            strain_increment: shape (S,), None where the stress is prescribed instead.
+            stress: stress [Pa] to reach in those components, shape (S,); the present one by default.
+
+        Raises:
+            RunError: the law failed, or no strain gives the stresses; with the increment. The point is as it was.
+        """
+        increment = np.array(strain_increment, dtype=float)
+        free = np.isnan(increment)
+        increment[free] = 0.0
+        target = self.stress if stress is None else floats("stress", stress, self.stress.shape)
+        new, state, tangent = self._updated(increment)
+        for _ in range(MAX_ITERATIONS):
+            if np.abs(new - target)[free].max(initial=0.0) <= self._tolerance(new):
+                self.stress, self.state, self.strain = new, state, self.strain + increment
+                return
+            increment[free] -= np.linalg.solve(tangent[np.ix_(free, free)], (new - target)[free])
+            new, state, tangent = self._updated(increment)
+        raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
+
+    def _tolerance(self, stress: NDArray[np.float64]) -> float:
+        return 1e-9 * float(np.abs(stress).max()) + 1e-12 * self.law.p_wave_modulus
+
+    def _updated(self, increment: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
+        size = len(increment)
+        stress, state, tangent = self.stress[None].copy(), self.state[None].copy(), np.zeros((1, size, size))
+        report = self.law.update(np.ascontiguousarray(increment[None]), stress, state, tangent)
+        if report.failed:
+            raise RunError(f"{type(self.law).__name__} failed at the stress {self.stress} Pa, strain increment {increment}")
+        return stress[0], state[0], tangent[0]

@@ -1,0 +1,71 @@
+"""Laws that are special cases of others, under the names that the field knows them by."""
+
+from ._core import ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
+
+
+def _positive(name: str, value: float) -> float:
+    if not value > 0:
+        raise InputError(f"{name} = {value}, but it must be positive [Pa]")
+    return value
+
+
+def tresca(*, young: float, poisson: float, shear_strength: float) -> MohrCoulomb:
+    """The criterion of Tresca: half the difference of the extreme principal stresses is limited.
+
+    With the undrained shear strength of a clay and a Poisson's ratio near 0.5 it is the analysis in total stresses.
+
+    Args:
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        shear_strength: strength in shear, s_u [Pa].
+    """
+    strength = _positive("shear_strength", shear_strength)
+    return MohrCoulomb(young=young, poisson=poisson, cohesion=strength, friction_angle=0.0)
+
+
+def von_mises(*, young: float, poisson: float, yield_stress: float) -> DruckerPrager:
+    """The criterion of von Mises: sqrt(3 J2) is limited.
+
+    Args:
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        yield_stress: strength in uniaxial tension or compression [Pa]; in pure shear it is 1/sqrt(3) of that.
+    """
+    return DruckerPrager(young=young, poisson=poisson, strength=_positive("yield_stress", yield_stress) / 3**0.5)
+
+
+def matched_drucker_prager(
+    *,
+    young: float,
+    poisson: float,
+    cohesion: float,
+    friction_angle: float,
+    dilation_angle: float = 0.0,
+    match: ConeMatch = ConeMatch.OUTER,
+    tension_cutoff: float | None = None,
+) -> DruckerPrager:
+    """Drucker-Prager law with the strength of a Mohr-Coulomb soil on one of its meridians.
+
+    Args:
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        cohesion: [Pa].
+        friction_angle, dilation_angle: [degrees].
+        match: OUTER: same strength in triaxial compression; INNER: in triaxial extension; PLANE_STRAIN: same collapse load
+            in plane strain, exact with associated flow.
+        tension_cutoff: largest mean stress [Pa]; by default the apex.
+
+    Source:
+        de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, section 6.4.4.
+    """
+    soil = MohrCoulomb(
+        young=young, poisson=poisson, cohesion=cohesion, friction_angle=friction_angle, dilation_angle=dilation_angle
+    )  # names what is wrong with the parameters
+    return DruckerPrager(
+        young=young,
+        poisson=poisson,
+        strength=cone_strength(soil.cohesion, soil.friction_angle, match),
+        friction=cone_slope(soil.friction_angle, match),
+        dilation=cone_slope(soil.dilation_angle, match),
+        tension_cutoff=tension_cutoff,
+    )
