@@ -73,7 +73,7 @@ class Quantity:
 
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
-VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="cividis")
+VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="viridis")
 SPEED = Quantity("Speed", "m/s", colours="plasma")
 
 
@@ -161,8 +161,11 @@ def draw_scene(axes: Axes, scene: Scene) -> None:
 
 
 def disc_diameter(volume: np.ndarray) -> np.ndarray:
-    """Diameter of the discs that just cover the plane when each stands for a square of this area, m."""
-    return np.sqrt(2.0 * volume)
+    """Diameter of discs that cover the plane without gaps where each stands for its volume, m.
+
+    A square packing needs sqrt(2 V); the patterns inside triangles are a little looser.
+    """
+    return 1.15 * np.sqrt(2.0 * volume)
 
 
 def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) -> EllipseCollection:
@@ -224,8 +227,8 @@ def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray
         figure, axes, bar_axes = figure_with_bar(lower - margin, upper + margin)
         bar_axes.remove()
         axes.triplot(*scene.points.T, scene.cells, color=GREY, linewidth=0.35, zorder=1)
-        # Half the diameter, so that the particles stand apart and the mesh shows between them.
-        discs(axes, position, 0.25 * volume, facecolors=SOIL, edgecolors="none", zorder=2)
+        # Less than half the diameter, so that the particles stand apart and the mesh shows between them.
+        discs(axes, position, 0.2 * volume, facecolors=SOIL, edgecolors="none", zorder=2)
         axes.add_collection(LineCollection(scene.boundary, colors="black", linewidths=1.0, zorder=3))
         axes.set_title(
             f"{len(scene.cells)} triangles, {int(np.sum(scene.is_soil)) if scene.is_soil is not None else len(scene.cells)}"
