@@ -2,9 +2,7 @@
 /// @file
 /// A parallel HDF5 file that all ranks write together.
 
-#include "base/types.h"
-
-#include <mpi.h>
+#include "parallel/agreement.h"
 
 #include <filesystem>
 #include <span>
@@ -71,9 +69,4 @@ private:
   std::string _failure;       ///< what failed first on this rank; empty if nothing did
   std::int64_t _reserved = 0; ///< bytes that the file may have come to need
 };
-
-/// The text of the lowest rank that has one, on all ranks; empty if nowhere anything failed.
-/// @param failure  what went wrong on this rank, or nothing
-/// @note Collective
-std::string shared_failure(MPI_Comm comm, const std::string& failure);
 } // namespace mpm

@@ -45,13 +45,15 @@ Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x)
 }
 
 template <int D>
-Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
+Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
 {
   Location location;
   Index c = start;
-  // A straight walk crosses some cells^(1/D) cells; far more than that is a circle, which only bins can end.
-  const int longest_walk = 64;
-  for (int step = 0; c != none && step < longest_walk; ++step)
+  // A straight walk crosses a few cells for each bin on its way; far more than that is a circle, which only bins can end.
+  Index longest_walk = 64;
+  for (Index count : mesh.bins.counts)
+    longest_walk += 4 * count;
+  for (Index step = 0; c != none && step < longest_walk; ++step)
   {
     const auto [value, vertex] = smallest<D>(mesh.shapes[c], x);
     if (value >= -inside_tolerance)
@@ -65,12 +67,22 @@ Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
     location.exit_facet = vertex;
     c = mesh.neighbours[c][vertex];
   }
-  location.cell = find_cell_in_bins<D>(mesh, x);
+  return location;
+}
+
+template <int D>
+Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
+{
+  Location location = walk_to_cell<D>(mesh, x, start);
+  if (location.cell == none && location.exit_cell != none)
+    location.cell = find_cell_in_bins<D>(mesh, x);
   return location;
 }
 
 template Index find_cell_in_bins<2>(const Mesh<2>&, const Vector<2>&);
 template Index find_cell_in_bins<3>(const Mesh<3>&, const Vector<3>&);
+template Location walk_to_cell<2>(const Mesh<2>&, const Vector<2>&, Index);
+template Location walk_to_cell<3>(const Mesh<3>&, const Vector<3>&, Index);
 template Location find_cell<2>(const Mesh<2>&, const Vector<2>&, Index);
 template Location find_cell<3>(const Mesh<3>&, const Vector<3>&, Index);
 } // namespace mpm

@@ -9,11 +9,21 @@
 
 namespace mpm
 {
-/// A particle that now lies in a ghost cell.
+/// A particle that now lies in a cell of another rank.
 struct Leaver
 {
   Index particle;
-  Index ghost_cell;
+  GlobalIndex cell; ///< over all ranks
+  int rank;         ///< that owns the cell
+};
+
+/// All that leaves this rank at once.
+struct Departures
+{
+  std::span<const Leaver> leavers;
+  std::span<const Index> outflow; ///< particles to take out without sending them
+  /// Ranks beyond the neighbours with which particles are exchanged; they must name each other. By rising rank.
+  std::span<const int> far_partners;
 };
 
 /// Local number of each owned cell, by its global number.
@@ -21,14 +31,12 @@ template <int D>
 std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh);
 
 /// Sends leavers, with all their columns, to the ranks that own their cells, takes them out here, and appends those that
-/// arrive. One packed message per neighbour.
-/// @param leavers  sorted by particle
-/// @param outflow  particles to take out without sending them, sorted
+/// arrive, by rising rank. One packed message per neighbour and far partner.
+/// @param cell_numbers  of this rank's owned cells, as `owned_cell_numbers` gives them
+/// @pre The ranks of leavers are neighbours or far partners
 /// @returns number of particles that arrived; they are the last ones
-/// @throws RunError a particle whose cell belongs to a rank that shares no node with this one
-/// @note Collective over neighbours
+/// @note Collective over neighbours and far partners
 template <int D>
-Index migrate(const Mesh<D>& mesh, const std::unordered_map<GlobalIndex, Index>& cell_numbers,
-              const NodeExchange& exchange, std::span<const Leaver> leavers,
-              std::span<const Index> outflow, Particles<D>& particles);
+Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const NodeExchange& exchange,
+              const Departures& departures, Particles<D>& particles);
 } // namespace mpm

@@ -6,6 +6,8 @@
 
 #include <mpi.h>
 
+#include <algorithm>
+
 namespace mpm
 {
 /// Which nodes this rank shares with which others, and the room for their messages.
@@ -26,6 +28,13 @@ struct NodeExchange
   std::vector<double> own;           ///< this rank's share of them during a sum
   std::vector<unsigned char> owned;  ///< per node: 1 on exactly one of the ranks that share it, for global sums
 };
+
+/// Whether a rank is this one or one of its neighbours.
+inline bool is_within_reach(const NodeExchange& exchange, int rank)
+{
+  const auto same = [rank](const NodeExchange::Neighbour& neighbour) { return neighbour.rank == rank; };
+  return rank == exchange.rank || std::any_of(exchange.neighbours.begin(), exchange.neighbours.end(), same);
+}
 
 /// @note Collective. Nodes of ghost cells that no owned cell touches are not exchanged.
 template <int D>

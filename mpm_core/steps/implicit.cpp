@@ -195,6 +195,7 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
     model.particles = start;
     work.leavers.clear();
     work.outflow.clear();
+    work.far_partners.clear();
     work.ready = false;
     return false;
   }

@@ -1,5 +1,7 @@
 #include "steps/model.h"
 
+#include "parallel/agreement.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -37,12 +39,23 @@ void sort_particles(Model<D>& model)
 }
 
 template <int D>
+Inventory taken_inventory(const Model<D>& model)
+{
+  std::array<double, 2> sums{static_cast<double>(model.particles.size() + model.totals.outflow_particles),
+                             model.totals.outflow_mass};
+  for (double mass : model.particles.mass)
+    sums[1] += mass;
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  return {sums[0], sums[1]};
+}
+
+template <int D>
 void prepare(Model<D>& model)
 {
   Workspace<D>& work = model.work;
   if (work.ready)
     return;
-  check_particles(model.particles);
+  collectively(model.exchange.comm, [&] { check_particles(model.particles); });
   const auto nodes = model.mesh.points.size(), cells = static_cast<std::size_t>(model.mesh.owned_cells);
   work.nodes.resize(nodes);
   work.start_velocity.resize(nodes);
@@ -70,27 +83,14 @@ void prepare(Model<D>& model)
   const auto heaviest = std::max_element(model.particles.mass.begin(), model.particles.mass.end());
   work.least_mass = heaviest == model.particles.mass.end() ? 0 : 1e-12 * *heaviest;
   MPI_Allreduce(MPI_IN_PLACE, &work.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+  model.inventory = taken_inventory(model);
   work.ready = true;
-}
-
-template <int D>
-void agree_on_trouble(Model<D>& model)
-{
-  if (model.exchange.size == 1)
-    return;
-  int first = model.work.trouble ? model.exchange.rank : model.exchange.size;
-  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, model.exchange.comm);
-  if (first == model.exchange.size)
-    return;
-  Trouble<D> trouble = model.work.trouble.value_or(Trouble<D>{});
-  MPI_Bcast(&trouble, sizeof(trouble), MPI_BYTE, first, model.exchange.comm);
-  model.work.trouble = trouble;
 }
 
 template void prepare(Model<2>&);
 template void prepare(Model<3>&);
-template void agree_on_trouble(Model<2>&);
-template void agree_on_trouble(Model<3>&);
+template Inventory taken_inventory(const Model<2>&);
+template Inventory taken_inventory(const Model<3>&);
 template void sort_particles(Model<2>&);
 template void sort_particles(Model<3>&);
 } // namespace mpm

@@ -3,6 +3,7 @@
 /// All that a run consists of, as plain data: mesh, particles, laws, loads, supports, and the room that steps work in.
 
 #include "materials/law.h"
+#include "parallel/far_search.h"
 #include "parallel/migration.h"
 #include "transfer/mixed_discretisation.h"
 #include "transfer/nodes.h"
@@ -53,6 +54,13 @@ struct LastStep
   std::int64_t plastic = 0; ///< particles that yielded
 };
 
+/// All particles that there have been, over all ranks: those of the model and those that flowed out.
+struct Inventory
+{
+  double particles = 0;
+  double mass = 0; ///< [kg]
+};
+
 /// Room that steps work in; valid between steps only as far as said.
 template <int D>
 struct Workspace
@@ -70,6 +78,8 @@ struct Workspace
   VolumetricSums volumetric_sums;
   std::vector<Leaver> leavers;
   std::vector<Index> outflow;
+  std::vector<Index> lost;                   ///< particles that no cell known to this rank's neighbourhood holds
+  std::vector<int> far_partners;             ///< ranks beyond the neighbours that exchange particles after this pass
   std::unordered_map<GlobalIndex, Index> owned_cells;
   std::optional<Trouble<D>> trouble;
   double least_mass = 0;                     ///< nodes below this mass are not moved [kg]
@@ -90,6 +100,7 @@ struct Model
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
   double time = 0;         ///< [s]
   Totals totals;
+  Inventory inventory;     ///< when the particles were last changed by anything but a step
   LastStep last;
   Workspace<D> work;
 };
@@ -119,10 +130,20 @@ inline Vector<D> current_gravity(const Model<D>& model)
 template <int D>
 void prepare(Model<D>& model);
 
-/// Makes `work.trouble` known to all ranks: that of the lowest rank that has one.
+/// Notes what stops the run and where, unless something was noted before.
+template <int D>
+void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& strain_increment);
+
+/// Settles with all ranks what became of the particles in `work.lost`: they are in a cell of some rank and leave for it, went
+/// through an outflow facet, or are trouble. Then makes `work.trouble` known to all: that of the lowest rank that has one.
 /// @note Collective
 template <int D>
 void agree_on_trouble(Model<D>& model);
+
+/// The particles on all ranks, those that flowed out included.
+/// @note Collective
+template <int D>
+Inventory taken_inventory(const Model<D>& model);
 
 /// Puts the particles back in cell order and finds their runs.
 template <int D>

@@ -10,14 +10,6 @@ namespace mpm
 {
 namespace
 {
-template <int D>
-void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index p, const SymTensor<D>& strain_increment)
-{
-  if (!model.work.trouble)
-    model.work.trouble = Trouble<D>{kind, model.particles.id[p], at<D>(model.particles.position, p),
-                                    at<D>(model.particles.velocity, p), strain_increment};
-}
-
 /// Strain increments of a batch, one column per component.
 template <int D>
 struct StrainScratch
@@ -61,7 +53,7 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
     SymTensor<D> increment;
     for (int k = 0; k < n_stress<D>; ++k)
       increment[k] = scratch.column[k][report.first_failed];
-    note_trouble(model, Trouble<D>::Kind::law_failed, batch.first + report.first_failed, increment);
+    note_trouble<D>(model, Trouble<D>::Kind::law_failed, batch.first + report.first_failed, increment);
   }
 }
 
@@ -71,20 +63,14 @@ Index new_cell(Model<D>& model, Index p)
 {
   Workspace<D>& work = model.work;
   const Location found = find_cell<D>(model.mesh, at<D>(model.particles.position, p), model.particles.cell[p]);
-  if (found.cell != none && found.cell < model.mesh.owned_cells)
+  if (found.cell == none && found.exit_cell == none)
+    note_trouble<D>(model, Trouble<D>::Kind::not_finite, p, {});
+  else if (found.cell == none || !is_within_reach(model.exchange, model.mesh.cell_owners[found.cell]))
+    work.lost.push_back(p);
+  else if (found.cell < model.mesh.owned_cells)
     return found.cell;
-  if (found.cell != none)
-  {
-    work.leavers.push_back({p, found.cell});
-    return none;
-  }
-  const auto& tags = model.outflow_tags;
-  if (found.exit_cell == none)
-    note_trouble(model, Trouble<D>::Kind::not_finite, p, {});
-  else if (std::find(tags.begin(), tags.end(), model.mesh.facet_tags[found.exit_cell][found.exit_facet]) != tags.end())
-    work.outflow.push_back(p);
   else
-    note_trouble(model, Trouble<D>::Kind::left_mesh, p, {});
+    work.leavers.push_back({p, model.mesh.global_cells[found.cell], model.mesh.cell_owners[found.cell]});
   return none;
 }
 
@@ -159,7 +145,7 @@ void particle_pass(Model<D>& model, const PassOptions& options)
         gather_run<D>(model, run.first, run.last, run.cell);
     }
   }
-  if (work.strays != strays_before && work.leavers.empty() && work.outflow.empty())
+  if (work.strays != strays_before && work.leavers.empty() && work.lost.empty())
     find_runs<D>(model.particles, batch_size, work.runs);
 }
 
@@ -172,9 +158,10 @@ void settle_particles(Model<D>& model)
     model.totals.outflow_mass += model.particles.mass[p];
   model.totals.outflow_particles += static_cast<std::int64_t>(work.outflow.size());
   const Index arrived =
-      migrate<D>(model.mesh, work.owned_cells, model.exchange, work.leavers, work.outflow, model.particles);
+      migrate<D>(work.owned_cells, model.exchange, {work.leavers, work.outflow, work.far_partners}, model.particles);
   work.leavers.clear();
   work.outflow.clear();
+  work.far_partners.clear();
   for (Index p = model.particles.size() - arrived; p < model.particles.size(); ++p)
     gather_run<D>(model, p, p + 1, model.particles.cell[p]);
   work.strays += arrived;

@@ -1,5 +1,7 @@
 #include "steps/run.h"
 
+#include "parallel/agreement.h"
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -85,6 +87,39 @@ std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const
   return done;
 }
 
+namespace
+{
+/// Each particle must be in exactly one cell's sums, and none may have been lost or doubled between ranks.
+/// @throws RunError on all ranks
+template <int D>
+void check_conservation(const Model<D>& model, const Diagnostics& local)
+{
+  const Inventory now = taken_inventory(model);
+  std::ostringstream out;
+  out.precision(17);
+  if (now.particles != model.inventory.particles || std::abs(now.mass - model.inventory.mass) > 1e-9 * now.mass)
+    out << "the ranks hold " << now.particles << " particles of " << now.mass << " kg, those that flowed out included; "
+        << "there were " << model.inventory.particles << " of " << model.inventory.mass << " kg";
+  std::array<double, 4> cells{};
+  double scale = 0;
+  for (const CellMoments<D>& moments : model.work.moments)
+  {
+    cells[0] += moments.mass;
+    for (int i = 0; i < D; ++i)
+      cells[static_cast<std::size_t>(i) + 1] += moments.momentum[i];
+  }
+  for (Index p = 0; p < model.particles.size(); ++p)
+    scale += model.particles.mass[p] * norm<D>(at<D>(model.particles.velocity, p));
+  const std::array<double, 4> particles{local.mass, local.momentum[0], local.momentum[1], local.momentum[2]};
+  for (std::size_t k = 0; k < 4; ++k)
+    if (std::abs(cells[k] - particles[k]) > 1e-9 * (k == 0 ? local.mass : scale))
+      out << "the cells of rank " << model.exchange.rank << " hold " << cells[k] << (k == 0 ? " kg" : " N s")
+          << ", its particles " << particles[k];
+  if (const std::string text = shared_failure(model.exchange.comm, out.str()); !text.empty())
+    throw RunError("particles were lost or counted twice: " + text);
+}
+} // namespace
+
 template <int D>
 Diagnostics diagnostics(const Model<D>& model)
 {
@@ -99,6 +134,8 @@ Diagnostics diagnostics(const Model<D>& model)
       d.momentum[i] += particles.mass[p] * v[i];
     d.kinetic_energy += 0.5 * particles.mass[p] * dot<D>(v, v);
   }
+  if (!model.work.trouble)
+    check_conservation(model, d);
   d.external_work = model.totals.external_work;
   d.internal_work = model.totals.internal_work;
   d.damping_work = model.totals.damping_work;

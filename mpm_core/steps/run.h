@@ -49,6 +49,7 @@ struct Diagnostics
   double unbalanced_ratio;  ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
 };
 
+/// @throws RunError on all ranks: particles, mass or momentum were lost or counted twice
 /// @note Collective
 template <int D>
 Diagnostics diagnostics(const Model<D>& model);

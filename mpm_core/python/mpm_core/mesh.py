@@ -116,6 +116,9 @@ class Mesh:
         """Node numbers of each cell, shape (cells, D + 1); owned cells first."""
         self.cell_tags: NDArray[np.int32] = self._core.cell_tags
         self.facets: NDArray[np.int32] = np.array(facets, dtype=np.int32).reshape(-1, self.dim)
+        numbers = np.asarray(global_cells) if np.size(global_cells) else np.arange(len(self.cells))
+        self.cell_numbers: int = 1 + comm.allreduce(int(numbers.max(initial=-1)), MPI.MAX)
+        """One more than the highest number that a cell has over all ranks."""
         self._tags = {
             "cell": set().union(*comm.allgather(set(self.cell_tags.tolist()))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),

@@ -87,17 +87,16 @@ class Model:
         Raises:
             InputError: a density that is not positive, a number that does not fill a cell evenly, an unknown tag or law.
         """
-        if cell_tag is not None:
-            self.mesh.require_tag("cell", cell_tag)
-        density = _positive("density", density, "kg/m3")
-        if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
-            raise InputError(f"per_cell is {per_cell}, expected a whole number")
-        material = self._material(material)
-        cells = self.comm.allreduce(int(np.max(self.mesh.cells.shape[0], initial=0)))
-        added = collectively(
-            self.comm, lambda: self._core.seed_cells(cell_tag, int(per_cell), material, density, self._next_id)
-        )
-        return self._seeded(added, cells * int(per_cell))
+
+        def place() -> int:
+            if cell_tag is not None:
+                self.mesh.require_tag("cell", cell_tag)
+            rho = _positive("density", density, "kg/m3")
+            if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
+                raise InputError(f"per_cell is {per_cell}, expected a whole number")
+            return self._core.seed_cells(cell_tag, int(per_cell), self._material(material), rho, self._next_id)
+
+        return self._seeded(collectively(self.comm, place), self.mesh.cell_numbers * int(per_cell))
 
     def seed_points(self, points: ArrayLike, volumes: ArrayLike, *, density: float, material: int = 0) -> int:
         """Place one particle at each given point. Every rank gives the same points.
@@ -144,9 +143,12 @@ class Model:
         Returns:
             Area of the loaded facets [m^(D-1)] over all ranks.
         """
-        self.mesh.require_tag("facet", facet_tag)
-        t = floats("traction", traction, (self.mesh.dim,))
-        area = self.comm.allreduce(self._core.load_facets(facet_tag, t.tolist()))
+
+        def load() -> float:
+            self.mesh.require_tag("facet", facet_tag)
+            return self._core.load_facets(facet_tag, floats("traction", traction, (self.mesh.dim,)).tolist())
+
+        area = self.comm.allreduce(collectively(self.comm, load))
         if area == 0:
             raise InputError(f"facet_tag {facet_tag} has no filled cell behind it to carry the traction")
         return area
@@ -156,8 +158,11 @@ class Model:
     def _support(
         self, facet_tag: int, whole: bool, vector: ArrayLike, name: str, *, replaced: Any = None
     ) -> tuple[int, bool, list[float]]:
-        self.mesh.require_tag("facet", facet_tag)
-        wish = (facet_tag, whole, floats(name, vector, (self.mesh.dim,)).tolist())
+        def checked() -> tuple[int, bool, list[float]]:
+            self.mesh.require_tag("facet", facet_tag)
+            return facet_tag, whole, floats(name, vector, (self.mesh.dim,)).tolist()
+
+        wish = collectively(self.comm, checked)
         wishes = [*(other for other in self._wishes if other is not replaced), wish]
         collectively(self.comm, lambda: self._core.set_supports(wishes))
         self._wishes = wishes

@@ -1,0 +1,121 @@
+"""Particles on several ranks: the same motion whoever owns the cells, and none lost on the way."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
+
+import mpm_core as mpm
+
+FLIGHT = dict(lengths=(4.0, 0.4), counts=(40, 4), body=((0.1, 0.1), (0.3, 0.3)))
+
+
+def block(comm, velocity, owners_of=bands, keep=None):
+    """A small block without weight in a long box, all of it with one velocity."""
+    mesh = spread_box(FLIGHT["counts"], FLIGHT["lengths"], comm, owners_of, keep, body=FLIGHT["body"])
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.2))
+    model.seed(density=1000.0, per_cell=3, cell_tag=1)
+    model.particles.set("velocity", np.tile(velocity, (len(model.particles), 1)).astype(float).reshape(-1, 2))
+    return model
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_thousand_steps_are_the_same_on_any_partition(comm, owners_of):
+    # Sums over particles are taken in another order, and nothing else differs. Without damping round-off does not grow.
+    model, alone = sliding_slope(comm, owners_of), sliding_slope(MPI.COMM_SELF)
+    for each in (model, alone):
+        *_, report = each.explicit(1.0, dt=1e-3, pic=0.01)
+    assert report.steps == 1000
+    moved = all_by_id(model)
+    assert moved["displacement"][:, 0].min() > 0.5 and moved["state"].max() > 0.1
+    assert_same(moved, all_by_id(alone))
+
+
+def test_one_partition_twice_is_the_same_to_the_last_bit(comm):
+    results = []
+    for _ in range(2):
+        model = sliding_slope(comm, scattered)
+        *_, report = model.explicit(0.1, dt=1e-3, damping=0.5)
+        results.append((all_by_id(model), report))
+    for name in results[0][0]:
+        np.testing.assert_array_equal(results[0][0][name], results[1][0][name])
+    assert results[0][1] == results[1][1]
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+@pytest.mark.parametrize("jump", [0.05, 0.3, 1.1, 3.5])
+def test_particles_find_their_owner_however_far_they_jump(comm, owners_of, jump):
+    # A body that flies is not strained, so each particle is where its velocity took it.
+    dt = 1e-4
+    model = block(comm, (jump / dt, 0.1), owners_of)
+    start = all_by_id(model)["position"]
+    steps = int(3.6 / jump)
+    *_, report = model.explicit(steps * dt, dt=dt, allow_unstable=True)
+    position = all_by_id(model)["position"]
+    np.testing.assert_allclose(position, start + np.array([jump / dt, 0.1]) * steps * dt, atol=1e-8)
+    inside = model.mesh.cells_of(model.particles.position)
+    np.testing.assert_array_equal(inside < model.mesh.owned_cells, True)
+    np.testing.assert_array_equal(inside, model.particles.cell)
+
+
+def test_a_jump_out_of_the_mesh_stops_all_ranks_with_its_place(comm):
+    model = block(comm, (5.0 / 1e-4, 0.0))
+    with pytest.raises(mpm.RunError, match=r"particle \d+ at \(5\.\d+, .*left the background mesh") as raised:
+        for _ in model.explicit(1e-4, dt=1e-4, allow_unstable=True):
+            pass
+    assert len(set(comm.allgather(str(raised.value)))) == 1
+
+
+def test_a_jump_through_an_outflow_on_another_rank_is_counted(comm):
+    model = block(comm, (5.0 / 1e-4, 0.0))
+    model.outflow(2)
+    start = model.report()
+    *_, report = model.explicit(1e-4, dt=1e-4, allow_unstable=True)
+    assert (report.particles, report.outflow_particles) == (0, start.particles)
+    assert report.outflow_mass == pytest.approx(start.mass)
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_a_jump_across_a_gap_in_the_mesh(comm, owners_of):
+    # No walk over neighbours leads from one part of the mesh to the other.
+    model = block(comm, (3.0 / 1e-4, 0.0), owners_of, keep=lambda centres: abs(centres[:, 0] - 2.0) > 0.5)
+    start = all_by_id(model)["position"]
+    *_, report = model.explicit(1e-4, dt=1e-4, allow_unstable=True)
+    np.testing.assert_allclose(all_by_id(model)["position"], start + np.array([3.0, 0.0]), atol=1e-8)
+
+
+PHASES = ["mesh", "material", "seed", "state", "run"]
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_an_error_on_one_rank_is_raised_on_all(comm, phase):
+    # The last rank alone has something wrong in this phase; all must hear of it, and none may wait.
+    wrong = comm.rank == comm.size - 1
+    expected = {
+        "mesh": "is nan at index",
+        "material": "material is 9",
+        "seed": "density",
+        "state": "mass and volume of particle",
+        "run": "law that failed|left the background mesh",
+    }
+    model = block(comm, (0.0, 0.0), one_does_all)
+    with pytest.raises((mpm.InputError, mpm.RunError), match=expected[phase]) as raised:
+        if phase == "mesh":
+            points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, np.nan if wrong else 1.0]])
+            numbers = 3 * comm.rank + np.arange(3)
+            mpm.Mesh(points, [[0, 1, 2]], global_nodes=numbers, global_cells=[comm.rank],
+                     cell_owners=np.array([comm.rank], dtype=np.int32), comm=comm)  # fmt: skip
+        elif phase == "material":
+            model.seed(density=1.0, per_cell=3, material=9 if wrong else 0)
+        elif phase == "seed":
+            model.seed(density=-1.0 if wrong else 1.0, per_cell=3)
+        elif phase == "state":
+            if wrong:
+                model.particles.set("volume", np.full(len(model.particles), -1.0))
+            model.report()
+        else:
+            if wrong:
+                model.particles.set("velocity", np.full((len(model.particles), 2), 1e9))
+            for _ in model.explicit(1e-4, dt=1e-4, allow_unstable=True):
+                pass
+    assert len(set(comm.allgather(str(raised.value)))) == 1
