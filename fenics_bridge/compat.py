@@ -107,7 +107,8 @@ def function_space(domain, family, degree, size=None):
 def quadrature_space(domain, degree, size):
     """Space whose values live at the points of the quadrature rule of the given degree, `size` of them per point."""
     if basix_ufl is not None:
-        element = basix_ufl.quadrature_element(domain.basix_cell(), value_shape=(size,), scheme="default", degree=degree)
+        cell = domain.basix_cell()
+        element = basix_ufl.quadrature_element(cell, value_shape=(size,), scheme="default", degree=degree)
         return fem.functionspace(domain, element)
     element = ufl.VectorElement("Quadrature", domain.ufl_cell(), degree, dim=size, quad_scheme="default")
     return fem.FunctionSpace(domain, element)

@@ -58,10 +58,11 @@ def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, deg
     u.x.array[constraints.dofs] = constraints.values
     r = assembled(fem.form(residual), space)
     r.array[constraints.dofs] = 0.0
-    solver = LinearSolver(fem.form(_internal(du, v, stiffness)), space, constraints, options_prefix)
-    solver.assemble()
+    matrix = fem.petsc.assemble_matrix(fem.form(_internal(du, v, stiffness)), bcs=constraints.bcs)
+    matrix.assemble()
+    matrix.setBlockSize(dim)
     increment = fem.Function(space)
-    if not solver.solve(r, increment):
+    if not LinearSolver(space, options_prefix).solve(matrix, r, increment):
         raise RuntimeError("solve_elastic: the linear solver failed; do the supports hold the body?")
     u.x.array[:] += increment.x.array
     stress = cell_function(domain, elastic_stress(strain(u), *stiffness), degree - 1, "stress")

@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 
 class NewtonReport(NamedTuple):
-    """How an iteration went. residuals: relative to the forces at work, one before each iteration and one at the end."""
+    """How an iteration went.
+
+    residuals: relative to the forces at work, one before each iteration and one at the end
+    """
 
     converged: bool
     residuals: list

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 
 from fenics_bridge import compat
+from fenics_bridge.averaged import AveragedKinematics
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
-from fenics_bridge.fields import assembled, nodal_average, strain
+from fenics_bridge.fields import nodal_average
+from fenics_bridge.kinematics import Kinematics
 from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
@@ -26,27 +27,25 @@ class QuasiStatic:
     Every stage starts from the equilibrium before it; a step that fails leaves that equilibrium untouched.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, degree=2, options_prefix="fem_"):
+    def __init__(self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_"):
         """
         law: of `mpm_core`; facet_tags, supports: as for `solve_elastic`; degree: 1 or 2 of the displacement
+        nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1
         options_prefix: of the PETSc options of the linear solver
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
         agree(domain.comm, None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2")
+        agree(domain.comm, f"nmd: averages strains of degree=1, got degree={degree}" if nmd and degree != 1 else None)
         space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
         self.domain, self.law, self.facet_tags, self.degree = domain, law, facet_tags, degree
         self.displacement = fem.Function(space, name="displacement")
         self.increment = fem.Function(space, name="increment")
         self._constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags)
-        self.points = QuadraturePoints(self.increment, law.n_state, max(1, 2 * (degree - 1)))
+        self.points = QuadraturePoints(domain, law.n_state, max(1, 2 * (degree - 1)))
         self.load, self.converged = Load(), False
-        dx = ufl.dx(metadata={"quadrature_degree": self.points.degree})
-        test, trial = ufl.TestFunction(space), ufl.TrialFunction(space)
-        self._internal = fem.form(ufl.inner(self.points.stress_function, strain(test)) * dx)
-        tangent = ufl.inner(ufl.dot(self.points.tangent_matrix(), strain(trial)), strain(test)) * dx
-        self._solver = LinearSolver(fem.form(tangent), space, self._constraints, options_prefix)
-        self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+        self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, self._constraints)
+        self._solver = LinearSolver(space, options_prefix)
 
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
@@ -98,8 +97,7 @@ class QuasiStatic:
         Collective.
         """
         space, dim = self.displacement.function_space, self.domain.geometry.dim
-        self.points.write_stress(self.points.stress)
-        out_of_balance = self._loads.forces(self.load) - assembled(self._internal, space, self._forces).array
+        out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         facets = self.facet_tags.indices[self.facet_tags.values == facet_tag]
         nodes = fem.locate_dofs_topological(space, dim - 1, facets)
         mine = nodes[nodes < space.dofmap.index_map.size_local]
@@ -151,19 +149,18 @@ class _Step:
         increment.x.array[:] = 0.0
         increment.x.array[self._fixed] = self._moved
         self._base[:] = increment.x.array
-        spread = points.strain_increment()
+        spread = self._model._kinematics.strain_increment()
         points.update(self._law, np.zeros_like(spread))
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def correction(self):
-        self._model.points.write_tangent()
-        self._model._solver.assemble()
-        return self._model._solver.solve(self._residual_vector, self._correction)
+        matrix = self._model._kinematics.stiffness()
+        return self._model._solver.solve(matrix, self._residual_vector, self._correction)
 
     def move(self, step):
         model, points = self._model, self._model.points
         model.increment.x.array[:] = self._base + step * self._correction.x.array
-        report = points.update(self._law, points.strain_increment())
+        report = points.update(self._law, model._kinematics.strain_increment())
         if self._comm.allreduce(report.failed):
             return np.inf
         return self._residual(points.trial_stress)
@@ -185,8 +182,7 @@ class _Step:
         return self._norm(forces.array) / self._scale if self._scale > 0 else 0.0
 
     def _out_of_balance(self, stress):
-        self._model.points.write_stress(stress)
-        forces = assembled(self._model._internal, self._space, self._model._forces)
+        forces = self._model._kinematics.internal_forces(stress)
         forces.array[:] = self._external - forces.array
         return forces
 

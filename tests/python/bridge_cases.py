@@ -47,13 +47,13 @@ def interior_points(n, dim, seed=0):
     return np.random.default_rng(seed).random((n, dim)) * (*width, 1.0)
 
 
-def slope_model(cell_size=0.1, dilation_angle=25.0, comm=MPI.COMM_WORLD, degree=2):
+def slope_model(cell_size=0.1, dilation_angle=25.0, comm=MPI.COMM_WORLD, **options):
     """QuasiStatic of the paper's slope."""
     domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=cell_size))
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0,
                           dilation_angle=dilation_angle)
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
-    return bridge.QuasiStatic(domain, law, facet_tags, supports, degree)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, **options)
 
 
 def excess_of_strength(stress, cohesion, friction_angle):

@@ -65,7 +65,9 @@ def test_factor_of_safety_of_the_log_spiral():
     assert bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, at_collapse) == pytest.approx(1.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("arguments", [(1.0, 20, 1e3, 25.0), (1.0, 95, 1e3, 25.0), (0.0, 45, 1e3, 25.0), (1.0, 45, 0.0, 25.0)])
+@pytest.mark.parametrize(
+    "arguments", [(1.0, 20, 1e3, 25.0), (1.0, 95, 1e3, 25.0), (0.0, 45, 1e3, 25.0), (1.0, 45, 0.0, 25.0)]
+)
 def test_slope_without_a_mechanism_is_refused(arguments):
     with pytest.raises(bridge.InputError, match="angle|height"):
         bridge.log_spiral(*arguments)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, interior_points)
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import fenics_bridge as bridge
 
@@ -57,6 +58,18 @@ def test_bad_arguments_are_named(change, words):
     arguments = {"supports": supports, "young": YOUNG, "poisson": POISSON, "unit_weight": UNIT_WEIGHT} | change
     with pytest.raises(bridge.InputError, match=words):
         bridge.solve_elastic(domain, facet_tags, **arguments)
+
+
+def test_options_of_petsc_choose_the_solver():
+    domain, facet_tags, supports, _ = column(2)
+    options = PETSc.Options("iterative_")
+    options["ksp_type"], options["pc_type"], options["ksp_rtol"] = "cg", "jacobi", 1e-4
+    point = np.array([[0.2, 1.0]])
+    rough = bridge.solve_elastic(domain, facet_tags, supports, YOUNG, POISSON, UNIT_WEIGHT,
+                                 options_prefix="iterative_").evaluate_at(point)["displacement"]
+    exact = bridge.solve_elastic(domain, facet_tags, supports, YOUNG, POISSON, UNIT_WEIGHT).evaluate_at(point)
+    error = np.abs(rough - exact["displacement"]).max()
+    assert 1e-12 < error / column_settlement() * -1 < 1e-2  # close, but not by a direct solver
 
 
 def test_roller_across_no_axis_is_refused():
