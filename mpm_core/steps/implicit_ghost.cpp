@@ -3,7 +3,6 @@
 #include "materials/elasticity.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace mpm
 {
@@ -63,6 +62,33 @@ GhostFacet<D> facet_between(const Mesh<D>& mesh, Index cell, int k, Index other)
   facet.share[D + 1] = shared ? 0 : 1;
   return facet;
 }
+/// A facet of a cell without filled neighbours: the jump is to a gradient of zero, as a lone particle has none.
+template <int D>
+GhostFacet<D> outer_facet(const Mesh<D>& mesh, Index cell, int k)
+{
+  GhostFacet<D> facet{};
+  const auto on_facet = facet_nodes<D>(mesh.cells[cell], k);
+  std::copy(on_facet.begin(), on_facet.end(), facet.nodes.begin());
+  facet.nodes[D] = facet.nodes[D + 1] = mesh.cells[cell][k];
+  const Vector<D> normal = mesh.shapes[cell].gradient[k];
+  for (int l = 0, at = 0; l <= D; ++l)
+    facet.jump[l == k ? D : at++] = dot<D>(normal, mesh.shapes[cell].gradient[l]) / norm<D>(normal);
+  facet.share.fill(1);
+  facet.share[D + 1] = 0;
+  return facet;
+}
+
+/// Weights of a facet of cell c, opposite to vertex k; h is the mean of both altitudes over it.
+template <int D>
+void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const CellContents& both,
+                 const GhostOptions& options, GhostFacet<D>& facet)
+{
+  // |grad N_k| is one over the altitude, so the facet's measure is D times the volume times that.
+  const double area = D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
+  const double h = D * volumes / (2 * area);
+  facet.stiffness = options.stiffness * both.shear / both.volume * h * area;
+  facet.mass = options.mass * both.mass / both.volume * h * h * h * area;
+}
 } // namespace
 
 template <int D>
@@ -74,24 +100,32 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos&
   const Mesh<D>& mesh = model.mesh;
   const auto contents = cell_contents(model, halos.cells);
   const auto bad = [&](Index c) { return contents[c].volume < options.filled * mesh.shapes[c].volume; };
+  const auto filled = [&](Index c) { return c != none && contents[c].volume > 0; };
   for (Index c = 0; c < mesh.owned_cells; ++c)
+  {
+    if (!filled(c))
+      continue;
+    const bool lone = bad(c) && std::none_of(mesh.neighbours[c].begin(), mesh.neighbours[c].end(), filled);
     for (int k = 0; k <= D; ++k)
     {
       const Index other = mesh.neighbours[c][k];
+      if (lone)
+      {
+        GhostFacet<D> facet = outer_facet(mesh, c, k);
+        set_weights(mesh, c, k, mesh.shapes[c].volume, contents[c], options, facet);
+        facets.push_back(facet);
+      }
       // Each facet once: from the lower of two owned cells, and from the owned cell where the other is a ghost.
-      if (other == none || (other < mesh.owned_cells && other < c) || contents[c].volume == 0 ||
-          contents[other].volume == 0 || !(bad(c) || bad(other)))
-        continue;
-      GhostFacet<D> facet = facet_between(mesh, c, k, other);
-      const CellContents both{contents[c].volume + contents[other].volume, contents[c].mass + contents[other].mass,
-                              contents[c].shear + contents[other].shear};
-      // |grad N_k| is one over the altitude, so the facet's measure is D times the volume times that.
-      const double area = D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
-      const double h = D * (mesh.shapes[c].volume + mesh.shapes[other].volume) / (2 * area);
-      facet.stiffness = options.stiffness * both.shear / both.volume * h * area;
-      facet.mass = options.mass * both.mass / both.volume * h * h * h * area;
-      facets.push_back(facet);
+      else if (filled(other) && (bad(c) || bad(other)) && (other > c || other >= mesh.owned_cells))
+      {
+        GhostFacet<D> facet = facet_between(mesh, c, k, other);
+        const CellContents both{contents[c].volume + contents[other].volume, contents[c].mass + contents[other].mass,
+                                contents[c].shear + contents[other].shear};
+        set_weights(mesh, c, k, mesh.shapes[c].volume + mesh.shapes[other].volume, both, options, facet);
+        facets.push_back(facet);
+      }
     }
+  }
   return facets;
 }
 

@@ -9,7 +9,7 @@
 ///
 /// of the step's displacement u and acceleration a = (v1 - v0)/dt (Burman 2010; Sticko & Kreiss 2016 for the mass; Coombs
 /// 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly filled cells have it, so a body whose
-/// cells are filled is not touched.
+/// cells are filled is not touched. A cell that has no filled neighbour is tied to a gradient of zero instead.
 
 #include "parallel/halo.h"
 #include "steps/model.h"
