@@ -11,7 +11,7 @@ from fenics_bridge.background import global_numbers
 
 
 class AveragedKinematics:
-    """Strain of linear simplices whose volumetric part is averaged over nodes (section 5 of the paper; Detournay, Dzik).
+    """Strain of linear simplices whose volumetric part is averaged over nodes (paper, section 5; Detournay, Dzik).
 
     With theta_c = div u in a cell, theta_i the mean over the cells around a node by volume, and thetabar_c the mean of
     theta_i over a cell's nodes, the in-plane normal strains (all three in 3D) are raised by (thetabar_c - theta_c) / d.
@@ -71,7 +71,7 @@ class AveragedKinematics:
         return matrix
 
     def _cells(self):
-        """Global nodes (m, D + 1), gradients of shape functions (m, D + 1, D) [1/m], volumes (m,) of this rank's cells."""
+        """Global nodes (m, D + 1), gradients of shape functions (m, D + 1, D) [1/m], volumes (m,) of owned cells."""
         dim = self._space.mesh.geometry.dim
         local = compat.cell_dofs(self._space)[self._points.cells]
         corners = self._space.tabulate_dof_coordinates()[local][:, :, :dim]
@@ -114,7 +114,7 @@ def _strain_rows(gradients):
 
 
 def _matrix(comm, local_size, columns, values):
-    """Sparse matrix with this rank's rows, each with as many entries: columns (rows, k), global, and values (rows, k)."""
+    """Sparse matrix of this rank's rows, each with k entries: global columns and values, both (rows, k)."""
     matrix = PETSc.Mat().create(comm)
     matrix.setSizes([(n, None) for n in local_size])
     matrix.setType("aij")
