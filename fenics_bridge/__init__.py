@@ -6,7 +6,7 @@ What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
 from fenics_bridge.comparison import Difference, compare
-from fenics_bridge.elastic import ElasticSolution, solve_elastic
+from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
@@ -28,5 +28,5 @@ __all__ = [
     "Support", "background_arrays", "background_mesh", "collapse_load", "compare", "evaluate_at",
     "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_stress", "log_spiral",
     "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
-    "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic",
+    "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]

@@ -104,6 +104,18 @@ def function_space(domain, family, degree, size=None):
     return fem.VectorFunctionSpace(domain, (family, degree), dim=size)
 
 
+def taylor_hood_space(domain):
+    """Displacement, continuous and quadratic, with pressure, continuous and linear."""
+    dim = domain.geometry.dim
+    if basix_ufl is not None:
+        cell = domain.basix_cell()
+        parts = [basix_ufl.element("Lagrange", cell, 2, shape=(dim,)), basix_ufl.element("Lagrange", cell, 1)]
+        return fem.functionspace(domain, basix_ufl.mixed_element(parts))
+    cell = domain.ufl_cell()
+    parts = [ufl.VectorElement("Lagrange", cell, 2), ufl.FiniteElement("Lagrange", cell, 1)]
+    return fem.FunctionSpace(domain, ufl.MixedElement(parts))
+
+
 def quadrature_space(domain, degree, size):
     """Space whose values live at the points of the quadrature rule of the given degree, `size` of them per point."""
     if basix_ufl is not None:

@@ -11,6 +11,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import assembled, cell_function, elastic_stress, nodal_average, strain
 from fenics_bridge.linear_solver import LinearSolver
+from fenics_bridge.loads import elastic_load
 from fenics_bridge.supports import Constraints
 
 
@@ -37,47 +38,85 @@ class ElasticSolution:
         return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth))
 
 
-def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, degree=1, options_prefix="elastic_"):
+def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, degree=1, traction=None,
+                  options_prefix="elastic_"):
     """Small-strain equilibrium of a linear elastic body (plane strain or 3D) under its weight and its supports.
 
     supports: from `fixed`, `roller`, `prescribed`; at least enough of them to hold the body
     young: [Pa], poisson: [-], unit_weight: [N/m3], acting against the last axis; degree: 1 or 2 of the displacement
+    traction: force per area (D,) [Pa] by facet tag, or None
     options_prefix: of the PETSc options of the linear solver
     Returns an ElasticSolution. Raises InputError for bad arguments, RuntimeError when the linear solver fails.
     Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, degree))
-    dim = domain.geometry.dim
-    space = compat.function_space(domain, "Lagrange", degree, dim)
+    space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
     constraints = Constraints(space, facet_tags, supports)
-    u, v, du = fem.Function(space, name="displacement"), ufl.TestFunction(space), ufl.TrialFunction(space)
-    weight = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-float(unit_weight)]))
+    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
     stiffness = [fem.Constant(domain, float(value)) for value in (young, poisson)]
-    residual = ufl.inner(weight, v) * ufl.dx - _internal(u, v, stiffness)
 
-    u.x.array[constraints.dofs] = constraints.values
-    r = assembled(fem.form(residual), space)
-    r.array[constraints.dofs] = 0.0
-    matrix = fem.petsc.assemble_matrix(fem.form(_internal(du, v, stiffness)), bcs=constraints.bcs)
+    def internal(u):
+        return ufl.inner(elastic_stress(strain(u), *stiffness), strain(v)) * ufl.dx
+
+    load = elastic_load(v, domain, facet_tags, unit_weight, traction or {})
+    u = _solved(space, constraints, internal(du), lambda u: load - internal(u), options_prefix)
+    u.name = "displacement"
+    return ElasticSolution(u, cell_function(domain, elastic_stress(strain(u), *stiffness), degree - 1, "stress"))
+
+
+def solve_nearly_incompressible(domain, facet_tags, supports, young, poisson, unit_weight, traction=None,
+                                options_prefix="mixed_"):
+    """The same by Taylor-Hood elements, which do not lock as the Poisson ratio nears 0.5.
+
+    Displacement is quadratic, pressure linear; poisson: above 0. Other arguments, result and errors as for
+    `solve_elastic`. The system is indefinite: by default MUMPS solves it. Collective.
+    """
+    agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
+    agree(domain.comm, None if poisson > 0 else f"poisson: got {poisson!r}, expected more than 0")
+    space = compat.taylor_hood_space(domain)
+    constraints = Constraints(space.sub(0), facet_tags, supports)
+    (v, q), trial = ufl.TestFunctions(space), ufl.TrialFunctions(space)
+    shear = fem.Constant(domain, young / (2 * (1 + poisson)))
+    flexibility = fem.Constant(domain, (1 + poisson) * (1 - 2 * poisson) / (young * poisson))
+
+    def internal(u, p):
+        stress = _mixed_stress(u, p, shear)
+        return (ufl.inner(stress, strain(v)) - q * ufl.div(u) - flexibility * p * q) * ufl.dx
+
+    load = elastic_load(v, domain, facet_tags, unit_weight, traction or {})
+    both = _solved(space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix,
+                   factor="mumps")
+    u = both.sub(0).collapse()
+    u.name = "displacement"
+    return ElasticSolution(u, cell_function(domain, _mixed_stress(*ufl.split(both), shear), 1, "stress"))
+
+
+def _mixed_stress(u, p, shear):
+    """Stress components from displacement and pressure (here lambda times the volume lost, compression positive)."""
+    e = strain(u)
+    return ufl.as_vector([2 * shear * e[i] - p for i in range(3)] + [shear * e[i] for i in range(3, e.ufl_shape[0])])
+
+
+def _solved(space, constraints, tangent, residual_of, options_prefix, factor=None):
+    """Solution of a linear problem: from the supports' displacements, one correction by the tangent."""
+    solution, increment = fem.Function(space), fem.Function(space)
+    solution.x.array[constraints.dofs] = constraints.values
+    residual = assembled(fem.form(residual_of(solution)), space)
+    residual.array[constraints.dofs] = 0.0
+    matrix = fem.petsc.assemble_matrix(fem.form(tangent), bcs=constraints.bcs)
     matrix.assemble()
-    matrix.setBlockSize(dim)
-    increment = fem.Function(space)
-    if not LinearSolver(space, options_prefix).solve(matrix, r, increment):
-        raise RuntimeError("solve_elastic: the linear solver failed; do the supports hold the body?")
-    u.x.array[:] += increment.x.array
-    stress = cell_function(domain, elastic_stress(strain(u), *stiffness), degree - 1, "stress")
-    return ElasticSolution(u, stress)
-
-
-def _internal(u, v, stiffness):
-    return ufl.inner(elastic_stress(strain(u), *stiffness), strain(v)) * ufl.dx
+    matrix.setBlockSize(space.dofmap.index_map_bs)
+    if not LinearSolver(space, options_prefix, factor).solve(matrix, residual, increment):
+        raise RuntimeError("the linear solver failed; do the supports hold the body?")
+    solution.x.array[:] += increment.x.array
+    return solution
 
 
 def _first_mistake(young, poisson, unit_weight, degree):
     if not (np.isfinite(young) and young > 0):
         return f"young: got {young!r} Pa, expected a positive number"
-    if not -1 < poisson < 0.5:
-        return f"poisson: got {poisson!r}, expected more than -1 and below 0.5"
+    if not 0 <= poisson < 0.5:
+        return f"poisson: got {poisson!r}, expected at least 0 and below 0.5"
     if not np.isfinite(unit_weight):
         return f"unit_weight: got {unit_weight!r} N/m3, expected a finite number"
     if degree not in (1, 2):

@@ -14,14 +14,17 @@ class LinearSolver:
     -elastic_ksp_type cg -elastic_pc_type gamg.
     """
 
-    def __init__(self, space, options_prefix):
+    def __init__(self, space, options_prefix, factor=None):
+        """factor: PETSc's name of the package for LU, e.g. "mumps"; by default PETSc's own choice."""
         self._comm = space.mesh.comm
         self._n_owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
         self._ksp = PETSc.KSP().create(self._comm)
         self._ksp.setOptionsPrefix(options_prefix)
         self._ksp.setType("preonly")
         self._ksp.getPC().setType("lu")
-        if self._comm.size == 1:  # half the time of PETSc's default, nested dissection
+        if factor is not None:
+            self._ksp.getPC().setFactorSolverType(factor)
+        elif self._comm.size == 1:  # half the time of PETSc's default, nested dissection
             self._ksp.getPC().setFactorOrdering("amd")
         self._ksp.setFromOptions()
 

@@ -66,3 +66,18 @@ class LoadVectors:
             form = -ufl.inner(ufl.FacetNormal(domain), self._test) * ds(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
+
+
+def elastic_load(test, domain, facet_tags, unit_weight, traction):
+    """Work of weight and tractions on a test displacement, as a UFL form.
+
+    unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag
+    Collective; raises InputError, on all ranks, for a facet tag that does not exist.
+    """
+    down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
+    work = ufl.inner(fem.Constant(domain, np.array(down)), test) * ufl.dx
+    for tag, value in traction.items():
+        require_facet_tag(domain.comm, facet_tags, tag, "traction")
+        ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
+        work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(tag)
+    return work

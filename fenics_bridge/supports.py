@@ -48,6 +48,7 @@ class Constraints:
     """
 
     def __init__(self, space, facet_tags, supports):
+        """space: of the displacement, or that part of a mixed space."""
         domain, dim = space.mesh, space.mesh.geometry.dim
         agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
         domain.topology.create_connectivity(dim - 1, dim)
