@@ -11,7 +11,7 @@ from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
 from fenics_bridge.handover import Handover, initialise
-from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_stress
+from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
 from fenics_bridge.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
 from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
@@ -26,7 +26,7 @@ __all__ = [
     "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
     "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "NewtonReport", "PointSearch", "QuasiStatic",
     "Support", "background_arrays", "background_mesh", "collapse_load", "compare", "evaluate_at",
-    "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_stress", "log_spiral",
-    "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
+    "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
+    "log_spiral", "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
@@ -103,7 +104,7 @@ def _solved(space, constraints, tangent, residual_of, options_prefix, factor=Non
     solution.x.array[constraints.dofs] = constraints.values
     residual = assembled(fem.form(residual_of(solution)), space)
     residual.array[constraints.dofs] = 0.0
-    matrix = fem.petsc.assemble_matrix(fem.form(tangent), bcs=constraints.bcs)
+    matrix = petsc.assemble_matrix(fem.form(tangent), bcs=constraints.bcs)
     matrix.assemble()
     matrix.setBlockSize(space.dofmap.index_map_bs)
     if not LinearSolver(space, options_prefix, factor).solve(matrix, residual, increment):

@@ -22,7 +22,7 @@ def k0_jaky(friction_angle):
 
 
 def k0_stress(points, surface, unit_weight, k0):
-    """Stress of ground at rest: the weight above a point, and K0 times it on both horizontal axes.
+    """Stress of uniform ground at rest: the weight above a point, and K0 times it on both horizontal axes.
 
     Exact for level ground; under a sloping surface it is a start that a solver then brings into equilibrium.
     points: (n, D) [m]; the last axis points up
@@ -31,17 +31,41 @@ def k0_stress(points, surface, unit_weight, k0):
     unit_weight: [N/m3]; k0: ratio of horizontal to vertical stress
     Returns (n, S) [Pa], tension positive; zero above the surface.
     """
+    return k0_layered_stress(points, surface, [(-np.inf, unit_weight, k0)])
+
+
+def k0_layered_stress(points, surface, layers):
+    """The same for ground in level layers.
+
+    layers: (bottom [m], unit_weight [N/m3], k0) of each, from the top down; the last one should reach below all points
+    """
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(f"points: got shape {points.shape}, expected (n, 2) or (n, 3)")
-    if not (np.isfinite(k0) and k0 >= 0):
-        raise InputError(f"k0: got {k0!r}, expected zero or more")
-    dim = points.shape[1]
-    depth = np.maximum(surface_height(surface, points) - points[:, -1], 0.0)
+    bottoms, unit_weights, ratios = _checked_layers(layers)
+    dim, y = points.shape[1], points[:, -1]
+    number = np.sum(y[:, None] < bottoms[:-1], axis=1)  # of the layer around each point
+    tops = np.concatenate([[np.inf], bottoms[:-1]])
+    above = np.minimum(surface_height(surface, points)[:, None], tops) - np.maximum(y[:, None], bottoms)
+    weight = np.maximum(above, 0.0) @ unit_weights
     stress = np.zeros((len(points), 4 if dim == 2 else 6))
-    stress[:, :3] = -(k0 * unit_weight * depth)[:, None]
-    stress[:, dim - 1] = -unit_weight * depth
+    stress[:, :3] = -(ratios[number] * weight)[:, None]
+    stress[:, dim - 1] = -weight
     return stress
+
+
+def _checked_layers(layers):
+    table = np.asarray(layers, dtype=float)
+    if table.ndim != 2 or table.shape[1] != 3 or len(table) == 0 or np.isnan(table).any():
+        raise InputError(f"layers: got {layers!r}, expected rows of (bottom, unit_weight, k0)")
+    bottoms, unit_weights, ratios = table.T
+    if np.any(np.diff(bottoms) >= 0):
+        raise InputError(f"layers: got bottoms {bottoms.tolist()} m, expected them from the top down")
+    if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
+        raise InputError(f"k0: got {ratios.tolist()}, expected zero or more")
+    if not np.isfinite(unit_weights).all():
+        raise InputError(f"unit_weight: got {unit_weights.tolist()} N/m3, expected finite numbers")
+    return bottoms, unit_weights, ratios
 
 
 def surface_height(surface, points):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem, la
+from dolfinx.fem import petsc
 
 from fenics_bridge import compat
 from fenics_bridge.fields import assembled, strain
@@ -29,7 +30,7 @@ class Kinematics:
         self._internal = fem.form(ufl.inner(self._stress, strain(test)) * dx)
         self._stiffness = fem.form(ufl.inner(ufl.dot(matrix, strain(trial)), strain(test)) * dx)
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
-        self._matrix = fem.petsc.create_matrix(self._stiffness)
+        self._matrix = petsc.create_matrix(self._stiffness)
         self._matrix.setBlockSize(self._space.dofmap.index_map_bs)
 
     def strain_increment(self):
@@ -47,7 +48,7 @@ class Kinematics:
         size = self._points.size**2
         self._tangent.x.array.reshape(-1, size)[self._tangent_rows] = self._points.tangent.reshape(-1, size)
         self._matrix.zeroEntries()
-        fem.petsc.assemble_matrix(self._matrix, self._stiffness, bcs=self._constraints.bcs)
+        petsc.assemble_matrix(self._matrix, self._stiffness, bcs=self._constraints.bcs)
         self._matrix.assemble()
         return self._matrix
 

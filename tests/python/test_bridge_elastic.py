@@ -107,6 +107,18 @@ def test_ground_at_rest():
     assert bridge.k0_jaky(30.0) == pytest.approx(0.5)
 
 
+def test_layered_ground_at_rest():
+    """1 m of 16 kN/m3 on 2 m of 20 kN/m3 on the rest of 22 kN/m3."""
+    layers = [(-1.0, 16e3, 0.5), (-3.0, 20e3, 0.6), (-np.inf, 22e3, 0.4)]
+    points = np.array([[0.0, -0.5], [0.0, -2.0], [0.0, -4.0], [0.0, 0.5]])
+    stress = bridge.k0_layered_stress(points, 0.0, layers)
+    vertical = -np.array([8e3, 16e3 + 20e3, 16e3 + 40e3 + 22e3, 0.0])
+    assert np.allclose(stress[:, 1], vertical)
+    assert np.allclose(stress[:, 0], vertical * [0.5, 0.6, 0.4, 0.5]) and np.allclose(stress[:, 2], stress[:, 0])
+    half = bridge.k0_layered_stress(points[1:2], lambda x: -1.5 + 0 * x, layers)  # dug down into the second layer
+    assert half[0, 1] == pytest.approx(-10e3)
+
+
 def test_ground_at_rest_is_the_elastic_column():
     points = interior_points(20, 3)
     at_rest = bridge.k0_stress(points, 1.0, UNIT_WEIGHT, bridge.k0_elastic(POISSON))
@@ -118,7 +130,10 @@ def test_ground_at_rest_is_the_elastic_column():
     [(lambda: bridge.k0_elastic(0.5), "poisson"), (lambda: bridge.k0_jaky(90), "friction_angle"),
      (lambda: bridge.k0_stress(np.zeros(3), 0.0, 1.0, 0.5), "points"),
      (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, 1.0, -1), "k0"),
-     (lambda: bridge.k0_stress(np.zeros((1, 2)), [(1, 0), (0, 0)], 1.0, 0.5), "surface")],
+     (lambda: bridge.k0_stress(np.zeros((1, 2)), [(1, 0), (0, 0)], 1.0, 0.5), "surface"),
+     (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, np.inf, 0.5), "unit_weight"),
+     (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, [(-2, 1, 1), (-1, 1, 1)]), "from the top down"),
+     (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, []), "layers")],
 )
 def test_bad_ground_is_refused(call, words):
     with pytest.raises(bridge.InputError, match=words):
