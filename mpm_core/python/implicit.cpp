@@ -1,5 +1,6 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "steps/implicit_relaxation.h"
 #include "steps/implicit_system.h"
 #include "steps/run.h"
 
@@ -15,6 +16,7 @@ struct Implicit
   ImplicitStep<D> step;
   ImplicitSystem<D> system;
   CooEntries stiffness, volumetric_force, volumetric_strain;
+  Relaxation<D> relaxation;
 };
 
 py::dict as_dict(const TrialReport& report)
@@ -40,7 +42,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
   using I = Implicit<D>;
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
@@ -73,6 +75,22 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
             volumetric_strain_entries(i.model, i.system, i.volumetric_strain);
           },
           Release())
+      .def("start_relaxation",
+           [](I& i, RelaxationKind kind)
+           {
+             py::gil_scoped_release release;
+             i.relaxation = start_relaxation(i.model, i.step, kind);
+             py::gil_scoped_acquire acquire;
+             return as_dict(i.relaxation.report);
+           })
+      .def("relax",
+           [](I& i, double tolerance, int most)
+           {
+             py::gil_scoped_release release;
+             const int done = relax(i.model, i.step, i.relaxation, tolerance, most);
+             py::gil_scoped_acquire acquire;
+             return py::make_tuple(done, as_dict(i.relaxation.report));
+           })
       .def(
           "finish",
           [](I& i)
@@ -93,6 +111,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           {
             check_array<double>("velocity", array, {static_cast<py::ssize_t>(i.system.owned.size() * D)});
             set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.work.velocity);
+            impose_supports(i.model, i.step);
           })
       .def("stiffness_places", [](const I& i) { return places(i.stiffness); })
       .def("stiffness_values", [](const I& i) { return copied(i.stiffness.values); })
@@ -105,6 +124,11 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
 
 void bind_implicit(py::module_& m)
 {
+  py::enum_<RelaxationKind>(m, "RelaxationKind")
+      .value("RICHARDSON", RelaxationKind::richardson)
+      .value("LOCAL", RelaxationKind::local)
+      .value("KINETIC", RelaxationKind::kinetic)
+      .value("VISCOUS", RelaxationKind::viscous);
   py::class_<GhostOptions>(m, "GhostOptions")
       .def(py::init<>())
       .def_readwrite("stiffness", &GhostOptions::stiffness)

@@ -108,6 +108,14 @@ Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index 
 }
 
 template <int D>
+void impose_supports(Model<D>& model, const ImplicitStep<D>& step)
+{
+  for (const Support<D>& support : model.supports)
+    if (step.active[support.node])
+      impose<D>(support, model.work.velocity[support.node]);
+}
+
+template <int D>
 void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt)
 {
   prepare(model);
@@ -125,9 +133,7 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   update(step.halos.nodes, work.start_velocity.data()->data(), D);
   step.ghosts = find_ghost_facets(model, step.halos, options.ghost);
   work.velocity = work.start_velocity;
-  for (const Support<D>& support : model.supports)
-    if (step.active[support.node])
-      impose<D>(support, work.velocity[support.node]);
+  impose_supports(model, step);
 
   const Vector<D> gravity = gravity_at(model, model.time + dt);
   step.external.resize(work.nodes.size());
@@ -210,6 +216,7 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
 
 #define INSTANTIATE(D)                                                                                                 \
   template Inertia inertia_force(const Model<D>&, const ImplicitStep<D>&, Index, int);                                 \
+  template void impose_supports(Model<D>&, const ImplicitStep<D>&);                                                    \
   template void start_step(Model<D>&, ImplicitStep<D>&, const ImplicitOptions&, double);                               \
   template TrialReport find_residual(Model<D>&, ImplicitStep<D>&, bool);                                               \
   template bool finish_step(Model<D>&, const ImplicitStep<D>&);

@@ -38,7 +38,7 @@ struct TrialReport
   double residual = 0;
   double scale = 0;              ///< largest of |f_ext|, |f_int|, |M (v1 - v0) / dt|, reactions included
   std::int64_t plastic = 0;      ///< particles that yield
-  std::int64_t failed = 0;       ///< particles whose law failed, and those of cells that would lose their volume
+  std::int64_t failed = 0;       ///< particles whose law failed, and cells that would lose their volume
 };
 
 /// What the cells of a trial give a node [N], summed over ranks.
@@ -75,6 +75,10 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
 /// Inertia force of one component of a node, damping in it, for the iterate; none in a quasi-static step.
 template <int D>
 Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component);
+
+/// Makes the iterate satisfy the supports.
+template <int D>
+void impose_supports(Model<D>& model, const ImplicitStep<D>& step);
 
 /// Residual of the iterate `work.velocity`, and the tangents of the cells when wanted.
 /// @note Collective

@@ -128,15 +128,39 @@ void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& s
     }
 }
 
-/// Copies one run's stresses and states to the scratch and prepares its strains. @returns strain and rotation of the cell
+/// Volume of a cell after a displacement, relative to that before: det(1 + grad u).
 template <int D>
-CellStrain<D> load_run(const Model<D>& model, const ImplicitStep<D>& step, const Run& run, Index at,
-                       TrialScratch<D>& scratch)
+double growth(const Matrix<D>& velocity_gradient, double dt)
+{
+  Matrix<D> f;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      f[i][j] = dt * velocity_gradient[i][j] + (i == j ? 1.0 : 0.0);
+  if constexpr (D == 2)
+    return f[0][0] * f[1][1] - f[0][1] * f[1][0];
+  else
+    return f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) - f[0][1] * (f[1][0] * f[2][2] - f[1][2] * f[2][0]) +
+           f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
+}
+
+/// Strain and rotation of a cell.
+template <int D>
+CellStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell, TrialCount& count)
 {
   const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
-  CellStrain<D> strain = strain_increment<D>(affine_field<D>(model.mesh, run.cell, velocity).gradient, step.dt);
+  const Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
+  CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   if (step.options.mixed_discretisation)
-    set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+    set_volumetric(strain, model.work.volumetric_strain[cell]);
+  if (!(growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth))
+    ++count.failed;
+  return strain;
+}
+
+/// Copies one run's stresses, turned, and its states to the scratch and prepares its strains.
+template <int D>
+void load_run(const Model<D>& model, const Run& run, const CellStrain<D>& strain, Index at, TrialScratch<D>& scratch)
+{
   const Index size = run.last - run.first;
   for (int k = 0; k < n_stress<D>; ++k)
   {
@@ -149,7 +173,6 @@ CellStrain<D> load_run(const Model<D>& model, const ImplicitStep<D>& step, const
   rotate<D>(columns, at, at + size, strain.rotation);
   for (std::size_t k = 0; k < model.particles.state.size(); ++k)
     std::copy_n(model.particles.state[k].data() + run.first, size, scratch.state[k] + at);
-  return strain;
 }
 
 template <int D>
@@ -215,9 +238,8 @@ TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tange
     strains.clear();
     for (r = batch.first_run; r < batch.last_run; ++r)
     {
-      strains.push_back(load_run(model, step, runs[r], runs[r].first - batch.first, scratch));
-      if (!(1 + strains.back().volumetric > least_growth))
-        count.failed += runs[r].last - runs[r].first;
+      strains.push_back(cell_strain(model, step, runs[r].cell, count));
+      load_run(model, runs[r], strains.back(), runs[r].first - batch.first, scratch);
     }
     const BatchReport report = update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
     count.plastic += report.plastic;

@@ -10,7 +10,7 @@ namespace mpm
 struct TrialCount
 {
   std::int64_t plastic = 0;
-  std::int64_t failed = 0;
+  std::int64_t failed = 0; ///< particles whose law failed, and runs in cells that would lose their volume
 };
 
 /// Updates the stresses of all particles over dt with the iterate `work.velocity`, batch by batch on copies, and sums

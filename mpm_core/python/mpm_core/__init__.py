@@ -10,6 +10,7 @@ from ._core import (
     InputError,
     LinearElastic,
     MohrCoulomb,
+    RelaxationKind,
     RunError,
     StressUpdate,
 )
@@ -22,6 +23,7 @@ from .mesh import Mesh
 from .model import Model
 from .newton import Newton
 from .particles import Particles
+from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 
 __all__ = [
@@ -37,6 +39,8 @@ __all__ = [
     "MohrCoulomb",
     "Newton",
     "Particles",
+    "Relaxation",
+    "RelaxationKind",
     "Report",
     "RunError",
     "StressUpdate",

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 MAX_CUTS = 10
 """A step is not made shorter than dt / 2^MAX_CUTS."""
 
-EASY_ITERATIONS = 8
-"""A step that took no more is followed by one twice as long, up to dt."""
-
 
 class Stepper:
     """Implicit steps of a model, with what they took since the last report.
@@ -61,7 +58,7 @@ class Stepper:
                     f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from {self._longest:.3g} s "
                     f"down to {dt:.3g} s: {reason}"
                 )
-        if self._last.iterations <= EASY_ITERATIONS:
+        if self._last.easy:
             self._dt = min(self._longest, 2 * self._dt)
 
     def attempt(self, dt: float) -> str:

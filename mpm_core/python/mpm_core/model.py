@@ -15,6 +15,7 @@ from .implicit import run_implicit, settle
 from .mesh import Mesh, floats
 from .newton import Newton
 from .particles import Particles
+from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 
 
@@ -287,7 +288,7 @@ class Model:
         until: float,
         *,
         dt: float,
-        solver: Newton | None = None,
+        solver: Newton | Relaxation | None = None,
         every: float | None = None,
         quasi_static: bool = False,
         damping: float = 0.0,
@@ -326,7 +327,7 @@ class Model:
     def equilibrate(
         self,
         *,
-        solver: Newton | None = None,
+        solver: Newton | Relaxation | None = None,
         nmd: bool = False,
         ghost: GhostPenalty | None = None,
         tolerance: float = 1e-6,

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from .linear import Tangent
 from .solution import Solution, relative
 
+EASY_ITERATIONS = 8
+"""of a step after which one twice as long is tried, up to dt"""
+
 MOST_GROWTH = 5.0
 """of |r| in an iteration whose correction does not lower it"""
 
@@ -55,10 +58,13 @@ class NewtonSolver:
         if changed:
             self._tangent = None
         report = step.trial(tangents=True)
+        if report["failed"]:  # v0 carried on over the whole step is too much; begin at rest
+            step.velocity = np.zeros_like(step.velocity)
+            report = step.trial(tangents=True)
         solution = Solution([relative(report)])
         while solution.residuals[-1] > self._options.tolerance:
             if report["failed"]:
-                solution.reason = f"the law failed or cells lost their volume at {report['failed']} particles"
+                solution.reason = f"the law failed or cells lost their volume, {report['failed']} in number"
                 return solution
             if solution.iterations >= self._options.max_iterations:
                 solution.reason = f"|r| is {solution.residuals[-1]:.2e} after {solution.iterations} iterations"
@@ -67,6 +73,7 @@ class NewtonSolver:
             if correction is None:
                 solution.reason = "the linear solver failed"
                 return solution
+            solution.iterations += 1
             solution.linear_iterations.append(self._tangent.iterations)
             report = self._search(step, correction, report)
             if report is None:
@@ -74,6 +81,7 @@ class NewtonSolver:
                 return solution
             solution.residuals.append(relative(report))
         solution.converged = not report["failed"]
+        solution.easy = solution.iterations <= EASY_ITERATIONS
         return solution
 
     def _correction(self, step: Any, dt: float) -> NDArray[np.float64] | None:

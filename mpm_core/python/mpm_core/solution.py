@@ -10,17 +10,15 @@ class Solution:
     """The course of the iteration over one step; the same on all ranks."""
 
     residuals: list[float] = field(default_factory=list)
-    """|r| relative to the largest of |f_ext|, |f_int| and inertia: at the start and after each iteration"""
+    """|r| relative to the largest of |f_ext|, |f_int| and inertia: at the start and as the iteration goes on"""
+    iterations: int = 0
     converged: bool = False
+    easy: bool = False
+    """Whether a step twice as long may be tried"""
     reason: str = ""
     """Why it did not converge"""
     linear_iterations: list[int] = field(default_factory=list)
     """Krylov iterations of each Newton iteration"""
-
-    @property
-    def iterations(self) -> int:
-        """Iterations done."""
-        return max(0, len(self.residuals) - 1)
 
 
 def relative(report: dict) -> float:
