@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import NamedTuple
 
+from mpi4py import MPI
+
 
 _MOST_STEPS = 1000
 _EASY = 8
@@ -53,7 +55,9 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
 
 
 def print_step(step):
-    """Progress line: number of the step, value, size, iterations of Newton, last residual."""
+    """Progress line, from rank 0: number of the step, value, size, iterations of Newton, last residual."""
+    if MPI.COMM_WORLD.rank != 0:
+        return
     report = step.report
     state = "ok" if step.converged else "failed, halved"
     print(f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, excess_of_strength,
                           interior_points, slope_model)
+from dolfinx import mesh
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -76,6 +77,26 @@ def test_compression_between_plates_ends_at_the_strength(friction_angle):
     assert np.allclose(model.points.stress[:, 1], -strength, rtol=1e-6)
     assert model.reaction(bridge.CREST)[1] == pytest.approx(0.5 * strength, rel=1e-6)
     assert model.reaction(bridge.BASE)[1] == pytest.approx(-0.5 * strength, rel=1e-6)
+
+
+@pytest.mark.parametrize(("degree", "nmd"), [(2, False), (1, True)])
+def test_compression_of_a_cube_ends_at_the_strength(degree, nmd):
+    domain = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2)
+    places = [lambda x: np.isclose(x[0], 0), lambda x: np.isclose(x[1], 0), lambda x: np.isclose(x[2], 0),
+              lambda x: np.isclose(x[2], 1)]
+    facets = [mesh.locate_entities_boundary(domain, 2, place) for place in places]
+    values = np.repeat(np.arange(1, 5, dtype=np.int32), [len(f) for f in facets])
+    order = np.argsort(np.concatenate(facets))
+    facet_tags = mesh.meshtags(domain, 2, np.concatenate(facets)[order], values[order])
+    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0, dilation_angle=10.0)
+    supports = [bridge.roller(1, (1, 0, 0)), bridge.roller(2, (0, 1, 0)), bridge.roller(3, (0, 0, 1)),
+                bridge.prescribed(4, (None, None, -0.05))]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports, degree=degree, nmd=nmd)
+    model.solve(bridge.Load(displacement=1.0))
+    strength = 2e3 * np.tan(np.radians(60))
+    assert model.converged and np.allclose(model.points.stress[:, 2], -strength, rtol=1e-6)
+    assert np.allclose(model.points.stress[:, [0, 1, 3, 4, 5]], 0, atol=1e-5 * strength)
+    assert model.reaction(4)[2] == pytest.approx(strength, rel=1e-6)
 
 
 @pytest.mark.parametrize("dilation_angle", [25.0, 0.0])
