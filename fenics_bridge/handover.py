@@ -83,11 +83,14 @@ def _first_mistake(model, fem):
         law = model.laws[number]
         if type(law) is not type(fem.law):
             return f"fem: its law is {type(fem.law).__name__}, that of material {number} is {type(law).__name__}"
-        for name in _PARAMETERS:
-            here, there = getattr(law, name, None), getattr(fem.law, name, None)
+        for name in _parameters(law):
+            here, there = getattr(law, name), getattr(fem.law, name)
             if here != there:
                 return f"fem: its law has {name}={there!r}, that of material {number} has {name}={here!r}"
     return None
 
 
-_PARAMETERS = ("young", "poisson", "cohesion", "friction_angle", "dilation_angle", "tension_cutoff")
+
+def _parameters(law):
+    """Names of a law's parameters: its numbers, and whatever else is no method."""
+    return [name for name in dir(law) if not name.startswith("_") and not callable(getattr(law, name))]
