@@ -1,63 +1,17 @@
 #include "io/hdf5_file.h"
 
-#include <hdf5.h>
+#include "io/hdf5_calls.h"
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
-#include <type_traits>
 
 namespace mpm
 {
 namespace
 {
-static_assert(std::is_same_v<hid_t, std::int64_t>);
-
-/// Keeps HDF5 from printing its error stack while it lives; the reason goes into the exception instead.
-class Quiet
-{
-public:
-  Quiet()
-  {
-    H5Eget_auto2(H5E_DEFAULT, &_function, &_data);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, _function, _data); }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-
-private:
-  H5E_auto2_t _function = nullptr;
-  void* _data = nullptr;
-};
-
-template <class T>
-hid_t native_type()
-{
-  if constexpr (std::is_same_v<T, float>)
-    return H5T_NATIVE_FLOAT;
-  else if constexpr (std::is_same_v<T, double>)
-    return H5T_NATIVE_DOUBLE;
-  else
-    return H5T_NATIVE_INT64;
-}
-
-/// The innermost message of HDF5's error stack, which is the nearest to the cause.
-std::string hdf5_reason()
-{
-  std::string reason;
-  const auto keep_last = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t
-  {
-    if (error->desc)
-      *static_cast<std::string*>(text) = error->desc;
-    return 0;
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, keep_last, &reason);
-  return reason;
-}
-
 /// What HDF5's own tables take at most for one dataset and its group, in bytes (measured: some 2000).
 constexpr std::int64_t table_size = 4096;
 /// Room that is always kept for tables that HDF5 has not written yet, in bytes.
@@ -93,15 +47,18 @@ RowSlice row_slice(MPI_Comm comm, std::size_t local)
   return rows;
 }
 
-Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path) : _comm(comm), _path(std::move(path))
+Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block) : _comm(comm), _path(std::move(path))
 {
   if (!has_room(0))
     check();
   const Quiet quiet;
   const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fapl_mpio(access, _comm, MPI_INFO_NULL);
-  _file = H5Fcreate(_path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
+  H5Pset_userblock(creation, static_cast<hsize_t>(user_block));
+  _file = H5Fcreate(_path.c_str(), H5F_ACC_TRUNC, creation, access);
   note(_file >= 0, "create");
+  H5Pclose(creation);
   H5Pclose(access);
   check();
 }
@@ -174,6 +131,23 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
   H5Pclose(transfer);
   H5Sclose(in_memory);
   H5Sclose(in_file);
+}
+
+void Hdf5File::write_text(const std::string& name, const std::string& text)
+{
+  const Quiet quiet;
+  if (!has_room(static_cast<std::int64_t>(text.size())))
+    return;
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, text.size() + 1);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const hid_t space = H5Screate(H5S_SCALAR);
+  const hid_t attribute = H5Acreate2(_file, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+  note(attribute >= 0 && H5Awrite(attribute, type, text.c_str()) >= 0, "write");
+  if (attribute >= 0)
+    H5Aclose(attribute);
+  H5Sclose(space);
+  H5Tclose(type);
 }
 
 void Hdf5File::flush()

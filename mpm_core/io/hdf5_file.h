@@ -29,9 +29,10 @@ class Hdf5File
 {
 public:
   /// Creates the file; an older one under that name is replaced.
-  /// @param comm  must outlive the file
+  /// @param comm        must outlive the file
+  /// @param user_block  bytes at the file's start that HDF5 leaves free: 0, or a power of two from 512 on
   /// @throws RunError on all ranks, with path and reason
-  Hdf5File(MPI_Comm comm, std::filesystem::path path);
+  Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block = 0);
   ~Hdf5File();
   Hdf5File(const Hdf5File&) = delete;
   Hdf5File& operator=(const Hdf5File&) = delete;
@@ -45,6 +46,9 @@ public:
   /// @param values  (rows.local, width) row-major; T is float, double or std::int64_t
   template <class T>
   void write(const std::string& name, const RowSlice& rows, int width, std::span<const T> values);
+
+  /// Writes a text as an attribute of the root.
+  void write_text(const std::string& name, const std::string& text);
 
   /// Makes all that was written so far readable by others, now and if the run is killed.
   void flush();

@@ -23,6 +23,21 @@ void require_traction(Particles<D>& particles)
 }
 
 template <int D>
+void reorder(Particles<D>& particles, std::span<const Index> order)
+{
+  for_each_column(particles,
+                  [order](const char*, int, auto& column)
+                  {
+                    if (column.empty())
+                      return;
+                    std::remove_reference_t<decltype(column)> sorted(column.size());
+                    for (std::size_t p = 0; p < sorted.size(); ++p)
+                      sorted[p] = column[static_cast<std::size_t>(order[p])];
+                    column.swap(sorted);
+                  });
+}
+
+template <int D>
 void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials)
 {
   const std::size_t n = particles.id.size();
@@ -38,16 +53,7 @@ void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials)
   for (std::size_t p = 0; p < n; ++p)
     order[static_cast<std::size_t>(start[key(p)]++)] = static_cast<Index>(p);
 
-  for_each_column(particles,
-                  [&order](const char*, int, auto& column)
-                  {
-                    if (column.empty())
-                      return;
-                    std::remove_reference_t<decltype(column)> sorted(column.size());
-                    for (std::size_t p = 0; p < sorted.size(); ++p)
-                      sorted[p] = column[static_cast<std::size_t>(order[p])];
-                    column.swap(sorted);
-                  });
+  reorder<D>(particles, order);
 }
 
 template <int D>
@@ -97,6 +103,7 @@ double bytes_per_particle(const Particles<D>& particles)
 #define INSTANTIATE(D)                                                                                                 \
   template void resize(Particles<D>&, Index);                                                                          \
   template void require_traction(Particles<D>&);                                                                       \
+  template void reorder(Particles<D>&, std::span<const Index>);                                                         \
   template void sort_by_cell(Particles<D>&, Index, Index);                                                             \
   template void remove(Particles<D>&, std::span<const Index>);                                                         \
   template void find_runs(const Particles<D>&, Index, std::vector<Run>&);                                              \

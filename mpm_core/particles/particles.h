@@ -79,6 +79,10 @@ inline Vector<D> at(const std::array<Column, D>& columns, Index p)
   return v;
 }
 
+/// Puts particle `order[p]` in place p.
+template <int D>
+void reorder(Particles<D>& particles, std::span<const Index> order);
+
 /// Puts the particles in the order of their cells (then of their material), by a stable counting sort.
 template <int D>
 void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials);

@@ -13,6 +13,7 @@ void bind_laws(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
 void bind_io(pybind11::module_& m);
+void bind_checkpoints(pybind11::module_& m);
 
 /// The communicator at an address that mpi4py gives (`MPI._addressof(comm)`).
 inline MPI_Comm communicator(std::uintptr_t address) { return *reinterpret_cast<MPI_Comm*>(address); }

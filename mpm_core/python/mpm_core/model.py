@@ -1,13 +1,14 @@
 """A model: background mesh, particles, laws, loads and supports; and the explicit scheme over it."""
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-from . import _core
+from . import _core, checkpoint
 from ._core import InputError, StressUpdate
 from .collective import collectively
 from .ghost import GhostPenalty
@@ -192,6 +193,38 @@ class Model:
         self._core.gravity_ramp = _positive("ramp", ramp, "s", zero=True)
         self._core.gravity = components
 
+    # --- checkpoints ---------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Save the complete state: particles, loads, supports, time and totals.
+
+        The file is written aside as ``path.part``, flushed to the disk and renamed, so that a file of that name is whole at
+        all times, also when the run is killed.
+
+        Args:
+            path: of the file, commonly ``NAME.h5``; the folder must exist.
+
+        Raises:
+            RunError: on all ranks, with path and reason, when it cannot be written; an older file stays as it is.
+        """
+        checkpoint.save(self, path)
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Take the state that ``save`` wrote; particles, loads and supports that the model has are replaced.
+
+        On the same number of ranks (and partition) the run goes on as if it had never stopped, to the last bit; on another
+        one up to the order of sums.
+
+        Args:
+            path: of the file. It must have been saved by a model with the same mesh and laws.
+
+        Raises:
+            InputError: a file of another mesh, of other laws or of another dimension.
+            RunError: on all ranks, with path and reason: the file is not there, not a checkpoint, truncated, damaged or of an
+                unknown format. The model is as it was.
+        """
+        checkpoint.restore(self, path)
+
     # --- runs ----------------------------------------------------------------------------------------------------
 
     @property
@@ -228,6 +261,8 @@ class Model:
         until: float,
         *,
         every: float | None = None,
+        since: float | None = None,
+        watch: Callable[[], bool] | None = None,
         dt: float | None = None,
         courant: float = 0.5,
         damping: float = 0.0,
@@ -241,6 +276,10 @@ class Model:
         Args:
             until: time to reach [s].
             every: time between reports [s]; by default only at the end.
+            since: time from which ``every`` counts [s]; by default the present. A run that goes on from a checkpoint gives
+                the start of the first run, so that it meets the same times to the last bit.
+            watch: called between steps, after every 32nd and before each report, on all ranks alike; the model may be
+                saved then. When it returns true (on all ranks), the run ends with a report.
             dt: time step [s]; by default ``courant`` times the critical one, which is found anew as the soil changes.
             courant: alpha_c of (17), in (0, 1].
             damping: local damping alpha, in [0, 1).
@@ -266,21 +305,32 @@ class Model:
         run.allow_unstable = bool(allow_unstable)
         if not (np.isfinite(until) and until >= self.time):
             raise InputError(f"until is {until} s, expected a time not before the present, {self.time} s")
-        interval = until - self.time if every is None else _positive("every", every, "s")
+        start = self.time if since is None else float(since)
+        if not start <= self.time:
+            raise InputError(f"since is {since} s, expected a time not after the present, {self.time} s")
+        interval = until - start if every is None else _positive("every", every, "s")
         if self.comm.allreduce(len(self.particles)) == 0:
             raise InputError("the model has no particles, seed some first")
-        return self._run_explicit(options, run, until, interval)
-
-    def _run_explicit(self, options: Any, run: Any, until: float, interval: float) -> Iterator[Report]:
-        start = self.time
         count = max(1, int(np.ceil((until - start) / interval - 1e-9))) if until > start else 0
-        # Python must get its turn now and then, for Ctrl-C.
+        done = int(np.floor((self.time - start) / interval + 1e-9)) if until > start else 0
+        times = [until if k == count else start + k * interval for k in range(done + 1, count + 1)]
+        return self._run_explicit(options, run, times, watch)
+
+    def _run_explicit(
+        self, options: Any, run: Any, times: Sequence[float], watch: Callable[[], bool] | None
+    ) -> Iterator[Report]:
+        # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
+        # after each control interval anyway.
         most = max(1, self.comm.allreduce(len(self.particles), MPI.MAX))
-        run.max_steps = max(1, 2_000_000 // most // _core.control_interval) * _core.control_interval
-        for k in range(1, count + 1):
-            run.until = until if k == count else start + k * interval
-            while self.time < run.until:
+        pauses = 1 if watch is not None else max(1, 2_000_000 // most // _core.control_interval)
+        run.max_steps = pauses * _core.control_interval
+        for until in times:
+            run.until = until
+            while self.time < until:
                 self._core.run_explicit(options, run)
+                if watch is not None and watch():
+                    yield self.report()
+                    return
             yield self.report()
 
     def implicit(

@@ -1,0 +1,16 @@
+#pragma once
+/// @file
+/// Tables of numbers by name, in which run state goes to files and back.
+
+#include "base/types.h"
+
+namespace mpm
+{
+/// Rows of `width` numbers; row-major.
+struct Table
+{
+  std::string name;
+  int width = 1;
+  std::vector<double> values;
+};
+} // namespace mpm

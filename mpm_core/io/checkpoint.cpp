@@ -1,0 +1,295 @@
+#include "io/checkpoint.h"
+
+#include "io/hdf5_input.h"
+#include "io/stamp.h"
+#include "parallel/redistribution.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+
+namespace mpm
+{
+namespace
+{
+/// The columns of one real field.
+template <class C>
+struct Field
+{
+  std::string name;
+  std::vector<C*> columns;
+};
+
+/// The fields of real numbers, from the one list of columns.
+template <class P>
+auto real_fields(P& particles)
+{
+  using C = std::remove_reference_t<decltype((particles.mass))>;
+  std::vector<Field<C>> fields;
+  for_each_column(particles,
+                  [&](const char* name, int component, auto& column)
+                  {
+                    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
+                    {
+                      if (component == 0)
+                        fields.push_back({name, {}});
+                      fields.back().columns.push_back(&column);
+                    }
+                  });
+  return fields;
+}
+
+/// Calls f(name, column) for the fields of whole numbers.
+template <class P, class F>
+void for_each_integer_field(P& particles, F&& f)
+{
+  for_each_column(particles,
+                  [&](const char* name, int, auto& column)
+                  {
+                    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
+                      f(std::string(name), column);
+                  });
+}
+
+template <int D>
+void write_particles(Hdf5File& file, const Mesh<D>& mesh, const Particles<D>& particles)
+{
+  const RowSlice rows = row_slice(file.comm(), particles.id.size());
+  int loaded = !particles.traction[0].empty();
+  MPI_Allreduce(MPI_IN_PLACE, &loaded, 1, MPI_INT, MPI_MAX, file.comm());
+  const auto n = particles.id.size();
+  for (const auto& field : real_fields(particles))
+  {
+    if (field.name == "traction" && !loaded)
+      continue;
+    const std::size_t width = field.columns.size();
+    std::vector<double> values(n * width, 0.0);
+    for (std::size_t k = 0; k < width; ++k)
+      for (std::size_t p = 0; p < field.columns[k]->size(); ++p)
+        values[p * width + k] = (*field.columns[k])[p];
+    file.write<double>("/particles/" + field.name, rows, static_cast<int>(width), values);
+  }
+  for_each_integer_field(particles,
+                         [&](const std::string& name, const auto& column)
+                         {
+                           std::vector<std::int64_t> values(column.begin(), column.end());
+                           if (name == "cell")
+                             for (auto& value : values)
+                               value = mesh.global_cells[static_cast<std::size_t>(value)];
+                           file.write<std::int64_t>("/particles/" + name, rows, 1, values);
+                         });
+}
+
+void write_tables(Hdf5File& file, std::size_t particles, const StateTables& state)
+{
+  const RowSlice one = row_slice(file.comm(), 1);
+  auto write_count = [&](const std::string& name, std::size_t count)
+  {
+    const auto value = static_cast<std::int64_t>(count);
+    file.write<std::int64_t>("/ranks/rows_of_" + name, one, 1, {&value, 1});
+  };
+  write_count("particles", particles);
+  for (const Table& table : state.cells)
+  {
+    const std::size_t count = table.values.size() / static_cast<std::size_t>(table.width);
+    write_count(table.name, count);
+    file.write<double>("/cells/" + table.name, row_slice(file.comm(), count), table.width, table.values);
+  }
+  for (const Table& table : state.ranks)
+    file.write<double>("/ranks/" + table.name, one, table.width, table.values);
+}
+
+/// Moves the finished file to its name, and sees to it that the name is on the disk too.
+std::string put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path)
+{
+  std::error_code error;
+  std::filesystem::rename(aside, path, error);
+  if (error)
+    return error.message();
+  const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool flushed = directory >= 0 && (::fsync(directory) == 0 || errno == EINVAL); // some file systems cannot
+  const std::string failure = flushed ? "" : std::strerror(errno);
+  if (directory >= 0)
+    ::close(directory);
+  return failure;
+}
+
+/// This rank's rows of an array of which each rank of the file wrote some, on as many ranks as now.
+RowSlice own_rows(Hdf5Input& file, const NodeExchange& exchange, const std::string& name)
+{
+  const auto counts = file.read<std::int64_t>("/ranks/rows_of_" + name, {0, exchange.size, 0}, 1);
+  RowSlice rows;
+  for (int r = 0; r < exchange.rank; ++r)
+    rows.before += counts[static_cast<std::size_t>(r)];
+  rows.local = counts[static_cast<std::size_t>(exchange.rank)];
+  return rows;
+}
+
+/// The rows of particles, and the numbers of their cells over all ranks.
+template <int D>
+std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, Particles<D>& particles)
+{
+  resize(particles, static_cast<Index>(rows.local));
+  if (file.has("/particles/traction"))
+    require_traction(particles);
+  for (auto& field : real_fields(particles))
+  {
+    if (!file.has("/particles/" + field.name) && (field.name == "traction" || field.name == "state"))
+      continue;
+    const std::size_t width = field.columns.size();
+    const auto values = file.read<double>("/particles/" + field.name, rows, static_cast<int>(width));
+    for (std::size_t k = 0; k < width; ++k)
+      for (std::size_t p = 0; p < field.columns[k]->size(); ++p)
+        (*field.columns[k])[p] = values[p * width + k];
+  }
+  std::vector<GlobalIndex> cells;
+  for_each_integer_field(particles,
+                         [&](const std::string& name, auto& column)
+                         {
+                           const auto values = file.read<std::int64_t>("/particles/" + name, rows, 1);
+                           if (name == "cell")
+                             cells = values;
+                           else
+                             std::transform(values.begin(), values.end(), column.begin(), [](std::int64_t value)
+                                            { return static_cast<std::remove_cvref_t<decltype(column[0])>>(value); });
+                         });
+  return cells;
+}
+
+/// Whether each rank of now has the cells that the same rank of the file had particles in.
+template <int D>
+bool are_same_parts(const NodeExchange& exchange, const Mesh<D>& mesh, const std::vector<GlobalIndex>& cells,
+                    Particles<D>& particles)
+{
+  const auto numbers = owned_cell_numbers(mesh);
+  int same = 1;
+  for (std::size_t p = 0; p < cells.size(); ++p)
+    if (const auto found = numbers.find(cells[p]); found != numbers.end())
+      particles.cell[p] = found->second;
+    else
+      same = 0;
+  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, exchange.comm);
+  return same == 1;
+}
+} // namespace
+
+template <int D>
+void write_checkpoint(MPI_Comm comm, const std::filesystem::path& path, const Mesh<D>& mesh,
+                      const Particles<D>& particles, const StateTables& state, const std::string& description)
+{
+  const std::filesystem::path aside = path.string() + ".part";
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  try
+  {
+    Hdf5File file(comm, aside, stamp_size);
+    for (const char* group : {"/particles", "/cells", "/ranks"})
+      file.create_group(group);
+    file.write_text("description", description);
+    write_particles(file, mesh, particles);
+    write_tables(file, particles.id.size(), state);
+    file.check();
+    file.close();
+    stamp_file(comm, aside);
+    const std::string failure = rank == 0 ? put_in_place(aside, path) : "";
+    if (const std::string text = shared_failure(comm, failure); !text.empty())
+      throw RunError("cannot write " + path.string() + ": " + text);
+  }
+  catch (const RunError&)
+  {
+    std::error_code ignored;
+    if (rank == 0)
+      std::filesystem::remove(aside, ignored);
+    throw;
+  }
+}
+
+std::string checkpoint_description(MPI_Comm comm, const std::filesystem::path& path)
+{
+  check_stamp(comm, path);
+  Hdf5Input file(comm, path);
+  const std::string text = file.read_text("description");
+  file.check();
+  return text;
+}
+
+template <int D>
+Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
+                              std::size_t state_columns, const StateTables& expected)
+{
+  Hdf5Input file(exchange.comm, path);
+  const GlobalIndex ranks = file.shape("/ranks/rows_of_particles").first;
+  Checkpoint<D> checkpoint;
+  Particles<D>& particles = checkpoint.particles;
+  particles.state.resize(state_columns);
+  checkpoint.same_parts = false;
+  if (ranks == exchange.size)
+  {
+    const auto cells = read_particles(file, own_rows(file, exchange, "particles"), particles);
+    file.check();
+    checkpoint.same_parts = are_same_parts(exchange, mesh, cells, particles);
+  }
+  if (!checkpoint.same_parts)
+  {
+    particles = {};
+    particles.state.resize(state_columns);
+    const GlobalIndex total = file.shape("/particles/id").first;
+    const GlobalIndex first = total * exchange.rank / exchange.size, last = total * (exchange.rank + 1) / exchange.size;
+    const auto cells = read_particles(file, {first, last - first, total}, particles);
+    file.check();
+    redistribute<D>(mesh, exchange, cells, particles);
+  }
+  checkpoint.state = expected;
+  const RowSlice rows = checkpoint.same_parts ? RowSlice{exchange.rank, 1, ranks} : RowSlice{0, ranks, ranks};
+  for (Table& table : checkpoint.state.ranks)
+    table.values = file.read<double>("/ranks/" + table.name, rows, table.width);
+  if (!checkpoint.same_parts)
+    checkpoint.state.cells.clear();
+  std::erase_if(checkpoint.state.cells, [&](const Table& table) { return !file.has("/cells/" + table.name); });
+  for (Table& table : checkpoint.state.cells)
+    table.values = file.read<double>("/cells/" + table.name, own_rows(file, exchange, table.name), table.width);
+  file.check();
+  return checkpoint;
+}
+
+template <int D>
+std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh)
+{
+  auto point_hash = [&](Index node)
+  {
+    std::uint64_t hash = 0;
+    for (double x : mesh.points[node])
+      hash = mixed(hash ^ std::bit_cast<std::uint64_t>(x + 0.0)); // + 0.0 makes one zero of the two
+    return hash;
+  };
+  // Sums, because neither the order of cells nor that of a cell's vertices is the same on all partitions.
+  std::uint64_t sum = 0;
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+  {
+    std::uint64_t cell = 0;
+    for (int k = 0; k <= D; ++k)
+    {
+      const std::uint64_t point = point_hash(mesh.cells[c][k]);
+      cell += mixed(point) + mixed(point ^ mixed(static_cast<std::uint64_t>(mesh.facet_tags[c][k])));
+    }
+    cell = mixed(cell ^ static_cast<std::uint64_t>(mesh.cell_tags[c]));
+    sum += mixed(cell ^ mixed(static_cast<std::uint64_t>(mesh.global_cells[c])));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, comm);
+  return sum;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template void write_checkpoint(MPI_Comm, const std::filesystem::path&, const Mesh<D>&, const Particles<D>&,          \
+                                 const StateTables&, const std::string&);                                              \
+  template Checkpoint<D> read_checkpoint(const NodeExchange&, const std::filesystem::path&, const Mesh<D>&,            \
+                                         std::size_t, const StateTables&);                                             \
+  template std::uint64_t mesh_fingerprint(MPI_Comm, const Mesh<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

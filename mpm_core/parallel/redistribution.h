@@ -1,0 +1,17 @@
+#pragma once
+/// @file
+/// Particles that lie on any rank, brought to the ranks that own their cells.
+
+#include "parallel/migration.h"
+
+namespace mpm
+{
+/// Sends each particle to the rank that owns its cell, wherever that is; afterwards the particles are in the order of their
+/// numbers, so that it does not matter where they came from.
+/// @param cells  number of each particle's cell over all ranks; the column `cell` is set from it
+/// @throws RunError on all ranks: a cell that no rank owns
+/// @note Collective
+template <int D>
+void redistribute(const Mesh<D>& mesh, const NodeExchange& exchange, std::span<const GlobalIndex> cells,
+                  Particles<D>& particles);
+} // namespace mpm

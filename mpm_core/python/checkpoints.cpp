@@ -1,0 +1,49 @@
+#include "python/bindings.h"
+
+#include "io/checkpoint.h"
+#include "steps/state.h"
+
+namespace mpm::python
+{
+namespace
+{
+namespace py = pybind11;
+
+template <int D>
+void save(Model<D>& model, const std::string& path, const std::string& description)
+{
+  prepare(model);
+  write_checkpoint<D>(model.exchange.comm, path, model.mesh, model.particles, {rank_state(model), cell_state(model)},
+                      description);
+}
+
+template <int D>
+void restore(Model<D>& model, const std::string& path)
+{
+  const StateTables expected{rank_state(model), empty_cell_state<D>()};
+  Checkpoint<D> checkpoint =
+      read_checkpoint<D>(model.exchange, path, model.mesh, model.particles.state.size(), expected);
+  if (checkpoint.same_parts)
+    restore_same(model, std::move(checkpoint.particles), checkpoint.state.ranks, checkpoint.state.cells);
+  else
+    restore_other(model, std::move(checkpoint.particles), checkpoint.state.ranks);
+}
+
+template <int D>
+void bind(py::module_& m)
+{
+  m.def("save", &save<D>);
+  m.def("restore", &restore<D>);
+  m.def("mesh_fingerprint", [](const Model<D>& model)
+        { return mesh_fingerprint<D>(model.exchange.comm, model.mesh); });
+}
+} // namespace
+
+void bind_checkpoints(py::module_& m)
+{
+  m.def("checkpoint_description", [](std::uintptr_t comm, const std::string& path)
+        { return checkpoint_description(communicator(comm), path); });
+  bind<2>(m);
+  bind<3>(m);
+}
+} // namespace mpm::python

@@ -1,0 +1,89 @@
+"""Saving a model to a file, and going on from there. The layout of the file is described in docs/checkpoints.md."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
+
+from . import _core
+from ._core import InputError, RunError
+from .collective import collectively
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def save(model: Model, path: str | os.PathLike[str]) -> None:
+    """See `Model.save`."""
+    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1))
+
+
+def restore(model: Model, path: str | os.PathLike[str]) -> None:
+    """See `Model.restore`."""
+    name = os.fspath(path)
+    text = _core.checkpoint_description(MPI._addressof(model.comm), name)
+    here = _description(model)
+    there = collectively(model.comm, lambda: _matching(name, text, here))
+    _core.restore(model._core, name)
+    _take(model, there)
+
+
+def _matching(path: str, text: str, here: dict[str, Any]) -> dict[str, Any]:
+    """The description in a checkpoint, where it is of the same dimension, mesh and materials."""
+    try:
+        there = json.loads(text)
+    except ValueError as error:
+        raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
+    for key, what in (("dimension", "dimension"), ("materials", "materials"), ("mesh", "background mesh")):
+        if there.get(key) != here[key]:
+            raise InputError(
+                f"checkpoint {path} is of another {what}: it has {_shown(there.get(key))}, the model has {_shown(here[key])}"
+            )
+    return there
+
+
+def _shown(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _description(model: Model) -> dict[str, Any]:
+    """All that a model is beside particles, totals and time."""
+    core = model._core
+    return {
+        "program": f"talus {_core.version}",
+        "units": "SI: m, kg, s, N, Pa; per metre of thickness in two dimensions; tension positive",
+        "components": "xx yy zz xy" if model.mesh.dim == 2 else "xx yy zz xy yz xz",
+        "ranks": model.comm.size,
+        "time": model.time,
+        "steps": core.steps,
+        "dimension": model.mesh.dim,
+        "mesh": f"fingerprint {_core.mesh_fingerprint(core):016x}",
+        "materials": [_material(law) for law in model.laws],
+        "gravity": list(core.gravity),
+        "gravity_ramp": core.gravity_ramp,
+        "outflow_tags": list(core.outflow_tags),
+        "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
+        "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
+        "next_id": model._next_id,
+    }
+
+
+def _material(law: Any) -> str:
+    """A law with all its parameters as text that tells any two apart."""
+    names = [name for name, value in vars(type(law)).items() if isinstance(value, property)]
+    parameters = ", ".join(f"{name}={getattr(law, name)!r}" for name in sorted(names))
+    return f"{type(law).__name__}({parameters})"
+
+
+def _take(model: Model, there: dict[str, Any]) -> None:
+    """Give the model what a description says."""
+    core = model._core
+    core.gravity, core.gravity_ramp = there["gravity"], there["gravity_ramp"]
+    core.outflow_tags = there["outflow_tags"]
+    model._wishes = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
+    model._prescribed = {int(tag): model._wishes[k] for tag, k in there["prescribed"].items()}
+    model._next_id = there["next_id"]
+    collectively(model.comm, lambda: core.set_supports(model._wishes))

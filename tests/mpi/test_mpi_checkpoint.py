@@ -1,0 +1,185 @@
+"""Checkpoints on several ranks: what goes on from one is the run that never stopped."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
+
+import mpm_core as mpm
+
+RUN = dict(until=0.4, every=0.1, since=0.0, pic=0.01)
+
+
+def slide(model, watch=None, **options):
+    """All reports up to the end, and the particles then."""
+    return list(model.explicit(**RUN, watch=watch, **options)), all_by_id(model, (*FIELDS, "mass", "cell"))
+
+
+def saved_midway(model, path, steps=160, **options):
+    """Run until a checkpoint is written between two reports."""
+
+    def watch():
+        if model._core.steps < steps:
+            return False
+        model.save(path)
+        return True
+
+    *_, report = model.explicit(**RUN, watch=watch, **options)
+    assert 0.1 < report.time < 0.3
+    return report
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_the_same_ranks_go_on_to_the_last_bit(comm, shared_path, owners_of):
+    # Local damping makes a difference in the last bit grow, so that none can hide.
+    reports, never_stopped = slide(sliding_slope(comm, owners_of), damping=0.5)
+    saved_midway(sliding_slope(comm, owners_of), shared_path / "state.h5", damping=0.5)
+
+    model = sliding_slope(comm, owners_of)
+    model.restore(shared_path / "state.h5")
+    assert 0.1 < model.time < 0.3
+    later, restarted = slide(model, damping=0.5)
+    for name, values in never_stopped.items():
+        np.testing.assert_array_equal(restarted[name], values, err_msg=name)
+    assert later == reports[-len(later) :]
+
+
+def test_saving_does_not_change_a_run(comm, shared_path):
+    def watch():
+        model.save(shared_path / "state.h5")
+        return False
+
+    model = sliding_slope(comm)
+    never_saved = slide(sliding_slope(comm), damping=0.5)
+    assert slide(model, watch, damping=0.5)[0] == never_saved[0]
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_another_number_of_ranks_goes_on_up_to_round_off(comm, shared_path, owners_of):
+    _, never_stopped = slide(sliding_slope(comm, owners_of))
+    saved_midway(sliding_slope(comm, owners_of), shared_path / "state.h5")
+    alone = sliding_slope(MPI.COMM_SELF)
+    alone.restore(shared_path / "state.h5")
+    reports, restarted = slide(alone)
+    del never_stopped["cell"]
+    assert_same(restarted, never_stopped)
+
+    # And the other way round: a checkpoint of one rank on all.
+    if comm.rank == 0:
+        saved_midway(sliding_slope(MPI.COMM_SELF), shared_path / "alone.h5")
+    comm.barrier()
+    model = sliding_slope(comm, owners_of)
+    model.restore(shared_path / "alone.h5")
+    later, restarted = slide(model)
+    assert_same(restarted, never_stopped)
+    for name in ("particles", "mass", "external_work", "internal_work", "steps", "particle_steps"):
+        assert getattr(later[-1], name) == pytest.approx(getattr(reports[-1], name), rel=1e-9)
+
+
+def test_loads_and_supports_come_back(comm, shared_path):
+    model = sliding_slope(comm)
+    model.prescribe(2, (0.5, 0.0))
+    model.outflow(4)
+    model.traction(3, (0.0, 10.0))
+    model.set_gravity((0.0, -5.0), ramp=0.5)
+    *_, report = model.explicit(0.05)
+    model.save(shared_path / "state.h5")
+
+    bare = mpm.Model(model.mesh, model.laws)
+    bare.restore(shared_path / "state.h5")
+    for each in (model, bare):
+        each.prescribe(2, (0.6, 0.0))  # replaces the one before
+        *_, report = each.explicit(0.2)
+    one, other = all_by_id(model, (*FIELDS, "traction")), all_by_id(bare, (*FIELDS, "traction"))
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name])
+    assert bare._next_id == model._next_id
+
+
+@pytest.fixture
+def checkpoint(comm, shared_path):
+    model = sliding_slope(comm)
+    model.save(shared_path / "state.h5")
+    return shared_path / "state.h5"
+
+
+def raised_everywhere(comm, kind, match, work):
+    with pytest.raises(kind, match=match) as raised:
+        work()
+    assert len(set(comm.allgather(str(raised.value)))) == 1
+
+
+def test_a_checkpoint_of_something_else_is_refused(comm, checkpoint):
+    soil = mpm.MohrCoulomb(young=4e6, poisson=0.3, cohesion=1e3, friction_angle=26.0)
+    model = mpm.Model(sliding_slope(comm).mesh, soil)
+    raised_everywhere(comm, mpm.InputError, "state.h5 is of another materials.*angle=25.0.*angle=26.0",
+                      lambda: model.restore(checkpoint))  # fmt: skip
+    for mesh in (spread_box((24, 6), (2.4, 0.6), comm, body=((0.1, 0), (0.6, 0.4))),
+                 spread_box((24, 6), (2.4, 0.6), comm, diagonals="alternating", body=((0.1, 0), (0.6, 0.3)))):  # fmt: skip
+        other = mpm.Model(mesh, sliding_slope(comm).laws)
+        raised_everywhere(comm, mpm.InputError, "is of another background mesh", lambda: other.restore(checkpoint))
+    deep = mpm.Model(spread_box((4, 1, 1), (4, 1, 1), comm), sliding_slope(comm).laws)
+    raised_everywhere(comm, mpm.InputError, "is of another dimension: it has 2, the model has 3",
+                      lambda: deep.restore(checkpoint))  # fmt: skip
+
+
+def damaged(comm, path, change):
+    """A copy of a file with its bytes changed, on one rank."""
+    copy = path.with_name("damaged.h5")
+    if comm.rank == 0:
+        copy.write_bytes(change(bytearray(path.read_bytes())))
+    comm.barrier()
+    return copy
+
+
+def flipped(place):
+    def change(data):
+        data[place] ^= 1
+        return data
+
+    return change
+
+
+DAMAGES = [
+    (flipped(600), "its checksum is not that of its content"),
+    (flipped(-9), "its checksum is not that of its content"),
+    (flipped(3), "not a checkpoint, or its first bytes are damaged"),
+    (lambda data: data[:-100], "bytes, expected .* truncated"),
+    (lambda data: data[:700], "bytes, expected .* truncated"),
+    (lambda data: data[:40], "damaged|truncated"),
+    (lambda data: b"", "not a checkpoint"),
+    (lambda data: bytes(data).replace(b"format 1", b"format 0", 1), "it has format 0, this program reads format 1"),
+    (lambda data: bytes(data).replace(b"format 1", b"format 2", 1), "it has format 2, this program reads format 1"),
+]
+
+
+@pytest.mark.parametrize("change, message", DAMAGES)
+def test_a_damaged_checkpoint_is_refused_and_the_model_stays(comm, checkpoint, change, message):
+    copy = damaged(comm, checkpoint, change)
+    model = sliding_slope(comm)
+    before = all_by_id(model)
+    raised_everywhere(comm, mpm.RunError, f"damaged.h5: .*({message})", lambda: model.restore(copy))
+    np.testing.assert_array_equal(all_by_id(model)["position"], before["position"])
+
+
+def test_every_flipped_bit_is_found(comm, checkpoint):
+    data = checkpoint.read_bytes()
+    model = sliding_slope(comm)
+    for place in np.random.default_rng(3).integers(512, len(data), 30):
+        copy = damaged(comm, checkpoint, flipped(int(place)))
+        raised_everywhere(comm, mpm.RunError, "checksum", lambda path=copy: model.restore(path))
+        comm.barrier()
+
+
+def test_a_checkpoint_that_cannot_be_written_or_read(comm, shared_path, checkpoint):
+    model = sliding_slope(comm)
+    raised_everywhere(comm, mpm.RunError, "No such file or directory", lambda: model.restore(shared_path / "none.h5"))
+    raised_everywhere(comm, mpm.RunError, "No such file or directory", lambda: model.save(shared_path / "none" / "a.h5"))
+    folder = shared_path / "folder.h5"
+    if comm.rank == 0:
+        folder.mkdir()
+    comm.barrier()
+    raised_everywhere(comm, mpm.RunError, "Is a directory", lambda: model.save(folder))
+    comm.barrier()
+    assert sorted(path.name for path in shared_path.iterdir()) == ["folder.h5", "state.h5"]
+    model.restore(checkpoint)
