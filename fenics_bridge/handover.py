@@ -48,7 +48,9 @@ def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
     stress = search.values(fem.stress_function(smooth))
-    state = search.values(fem.state_function()) if plastic else np.zeros_like(particles.state)
+    state = np.zeros_like(particles.state)
+    if plastic:
+        state[:, : fem.law.n_state] = search.values(fem.state_function())
     returned = _returned(model.laws, particles.material, stress, state)
     particles.set("stress", stress)
     particles.set("state", state)
@@ -68,8 +70,8 @@ def _returned(laws, material, stress, state):
     outside = 0
     for number, law in enumerate(laws):
         rows = np.flatnonzero(material == number)
-        inside, unchanged = np.ascontiguousarray(stress[rows]), np.ascontiguousarray(state[rows])
-        law.update(np.zeros_like(inside), inside, unchanged, None)
+        inside, unused = stress[rows], np.ascontiguousarray(state[rows, : law.n_state])
+        law.update(np.zeros_like(inside), inside, unused, None)
         moved = np.abs(inside - stress[rows]).max(axis=1, initial=0.0)
         outside += int(np.sum(moved > 1e-9 * np.abs(stress).max(initial=0.0)))
         stress[rows] = inside  # the state stays that of the finite elements
@@ -88,7 +90,6 @@ def _first_mistake(model, fem):
             if here != there:
                 return f"fem: its law has {name}={there!r}, that of material {number} has {name}={here!r}"
     return None
-
 
 
 def _parameters(law):
