@@ -2,10 +2,10 @@
 /// @file
 /// Any constitutive law.
 
-#include "materials/law_list.h"
+#include "materials/undrained.h"
 
 namespace mpm
 {
 /// Any constitutive law, as a plain value
-using Law = LawList<>;
+using Law = LawList<Hencky, Undrained>;
 } // namespace mpm

@@ -3,9 +3,13 @@
 /// The list of laws that stand for themselves, and what can be asked of any law. A new law is one file beside the others
 /// and one entry here.
 
+#include "materials/cam_clay.h"
 #include "materials/drucker_prager.h"
+#include "materials/external_law.h"
 #include "materials/linear_elastic.h"
 #include "materials/mohr_coulomb.h"
+#include "materials/softening_mohr_coulomb.h"
+#include "materials/umat.h"
 
 #include <string>
 #include <variant>
@@ -14,7 +18,8 @@ namespace mpm
 {
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
-using LawList = std::variant<LinearElastic, MohrCoulomb, DruckerPrager, Wrapper...>;
+using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw, Umat,
+                             Wrapper...>;
 
 /// Number of state variables of a law
 template <class L>
@@ -30,6 +35,14 @@ template <class L>
 std::vector<std::string> state_names(const L&)
 {
   return {L::state_names.begin(), L::state_names.end()};
+}
+
+/// Shear modulus [Pa] of a law with Young's modulus and Poisson's ratio
+template <class L>
+  requires requires(L law) { law.young + law.poisson; }
+double shear_modulus(const L& law)
+{
+  return law.young / (2 * (1 + law.poisson));
 }
 
 template <class... L>
@@ -54,6 +67,13 @@ template <class... L>
 double p_wave_modulus(const std::variant<L...>& law)
 {
   return std::visit([](const auto& l) { return p_wave_modulus(l); }, law);
+}
+
+/// Shear modulus [Pa], or an estimate of its size where it changes or is not known
+template <class... L>
+double shear_modulus(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return shear_modulus(l); }, law);
 }
 
 template <int D, class... L>

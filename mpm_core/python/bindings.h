@@ -10,6 +10,8 @@
 namespace mpm::python
 {
 void bind_laws(pybind11::module_& m);
+/// Laws written in Python
+void bind_python_law(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
 void bind_io(pybind11::module_& m);

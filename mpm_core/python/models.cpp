@@ -285,6 +285,14 @@ void bind_model(py::module_& m, const std::string& suffix)
            })
       .def("column", &column<D>)
       .def("set_column", &set_column<D>)
+      .def("set_materials",
+           [](M& model, const py::array& numbers)
+           {
+             check_array<Index>("material", numbers, {static_cast<py::ssize_t>(model.particles.material.size())});
+             const auto in = values<Index>(numbers);
+             model.particles.material.assign(in.begin(), in.end());
+             model.work.ready = false;
+           })
       .def("nodal", &nodal<D>)
       .def("bytes_per_particle", [](const M& model) { return bytes_per_particle(model.particles); });
 }

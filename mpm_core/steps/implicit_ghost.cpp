@@ -1,6 +1,5 @@
 #include "steps/implicit_ghost.h"
 
-#include "materials/elasticity.h"
 
 #include <algorithm>
 
@@ -22,8 +21,7 @@ std::vector<CellContents> cell_contents(const Model<D>& model, const Halo& cells
   std::vector<CellContents> contents(model.mesh.cells.size(), CellContents{});
   for (const Run& run : model.work.runs)
   {
-    const double shear = std::visit([](const auto& law) { return elastic_moduli(law.young, law.poisson).shear; },
-                                    model.laws[run.material]);
+    const double shear = shear_modulus(model.laws[run.material]);
     for (Index p = run.first; p < run.last; ++p)
     {
       contents[run.cell].volume += model.particles.volume[p];

@@ -5,14 +5,21 @@ dimensions; shear strain is engineering shear. Angles are in degrees where the n
 """
 
 from ._core import (
+    CamClay,
     ConeMatch,
     DruckerPrager,
+    Hencky,
     InputError,
     LinearElastic,
     MohrCoulomb,
+    PythonLaw,
     RelaxationKind,
     RunError,
+    Softening,
+    SofteningMohrCoulomb,
     StressUpdate,
+    Umat,
+    Undrained,
 )
 from ._core import compiler as compiler
 from ._core import version as __version__
@@ -27,10 +34,12 @@ from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 
 __all__ = [
+    "CamClay",
     "ConeMatch",
     "DruckerPrager",
     "ElementTest",
     "GhostPenalty",
+    "Hencky",
     "ImplicitReport",
     "InputError",
     "LinearElastic",
@@ -39,11 +48,16 @@ __all__ = [
     "MohrCoulomb",
     "Newton",
     "Particles",
+    "PythonLaw",
     "Relaxation",
     "RelaxationKind",
     "Report",
     "RunError",
+    "Softening",
+    "SofteningMohrCoulomb",
     "StressUpdate",
+    "Umat",
+    "Undrained",
     "__version__",
     "matched_drucker_prager",
     "tresca",

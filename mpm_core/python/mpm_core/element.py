@@ -58,7 +58,9 @@ class ElementTest:
             if np.abs(new - target)[free].max(initial=0.0) <= self._tolerance(new):
                 self.stress, self.state, self.strain = new, state, self.strain + increment
                 return
-            increment[free] -= np.linalg.solve(tangent[np.ix_(free, free)], (new - target)[free])
+            # On an edge of Mohr-Coulomb two stresses are equal whatever the strains: of all of these the smallest step
+            step, *_ = np.linalg.lstsq(tangent[np.ix_(free, free)], (new - target)[free], rcond=1e-12)
+            increment[free] -= step
             new, state, tangent = self._updated(increment)
         raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
 

@@ -147,3 +147,8 @@ class Mesh:
         if tag not in self._tags[kind]:
             raise InputError(f"{kind}_tag is {tag}, which the mesh does not have; it has {sorted(self._tags[kind])}")
         return int(tag)
+
+
+def cell_sizes(mesh: Mesh) -> NDArray[np.float64]:
+    """Size h of each cell [m], shape (cells,): side of the square or cube that D! cells of its volume fill, (D! V)^(1/D)."""
+    return (2.0 * mesh.cell_volumes) ** 0.5 if mesh.dim == 2 else np.cbrt(6.0 * mesh.cell_volumes)

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core, checkpoint
 from ._core import InputError, StressUpdate
 from .collective import collectively
 from .ghost import GhostPenalty
 from .implicit import run_implicit, settle
-from .mesh import Mesh, floats
+from .mesh import Mesh, cell_sizes, floats
 from .newton import Newton
 from .particles import Particles
 from .relaxation import Relaxation
@@ -67,6 +67,9 @@ class Model:
 
     def _seeded(self, added: int, ids: int) -> int:
         self._next_id += ids
+        if any("cell_size" in law.state_names for law in self.laws):
+            sizes, seen = cell_sizes(self.mesh)[self.particles.cell], self.state("cell_size")
+            self.set_state("cell_size", np.where(seen == 0, sizes, seen))
         return self.comm.allreduce(added)
 
     def _material(self, material: int) -> int:
@@ -154,6 +157,49 @@ class Model:
         if area == 0:
             raise InputError(f"facet_tag {facet_tag} has no filled cell behind it to carry the traction")
         return area
+
+    def state(self, name: str) -> NDArray[np.float64]:
+        """A state variable by its name in ``state_names`` of the laws, such as "excess_pore_pressure".
+
+        Returns:
+            Shape (n,), in the order of ``particles``; NaN where a particle's law has no such variable. Not collective.
+        """
+        state, material = self.particles.state, self.particles.material
+        values = np.full(len(material), np.nan)
+        for number, column in self._state_columns(name):
+            values[material == number] = state[material == number, column]
+        return values
+
+    def set_state(self, name: str, values: ArrayLike) -> None:
+        """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
+        state, material = self.particles.state, self.particles.material
+        new = np.asarray(values, dtype=np.float64)
+        if new.shape != material.shape:
+            raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")
+        for number, column in self._state_columns(name):
+            state[material == number, column] = new[material == number]
+        self.particles.set("state", state)
+
+    def _state_columns(self, name: str) -> list[tuple[int, int]]:
+        """(number of a law, column of the state variable) for each law that has it."""
+        columns = [(k, law.state_names.index(name)) for k, law in enumerate(self.laws) if name in law.state_names]
+        if not columns:
+            known = sorted({known for law in self.laws for known in law.state_names})
+            raise InputError(f"name is '{name}', expected a state variable of the laws: {', '.join(known)}")
+        return columns
+
+    def assign(self, material: ArrayLike) -> None:
+        """Give each particle its law: numbers of laws, shape (n,), in the order of ``particles``. Not collective.
+
+        Example:
+            >>> model.assign(np.where(model.particles.position[:, 1] < 2.0, 1, 0))  # layers
+        """
+        numbers = np.asarray(material)
+        if numbers.shape != (len(self.particles),) or not np.issubdtype(numbers.dtype, np.integer):
+            raise InputError(f"material has shape {numbers.shape} and dtype {numbers.dtype}, expected one whole number each")
+        for number in np.unique(numbers):
+            self._material(int(number))
+        self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
 
     # --- supports and loads --------------------------------------------------------------------------------------
 

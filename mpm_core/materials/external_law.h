@@ -1,0 +1,37 @@
+#pragma once
+
+#include "materials/batch.h"
+
+#include <functional>
+
+namespace mpm
+{
+/// A law that is not of this library: functions that update a batch, such as ones that call Python.
+struct ExternalLaw
+{
+  /// Names of the state variables; the first is `plastic_strain`
+  std::vector<std::string> names;
+  /// Modulus of the compression wave [Pa], for the critical time step
+  double wave_modulus;
+  std::function<BatchReport(const PointBatch<2>&)> plane_strain;
+  std::function<BatchReport(const PointBatch<3>&)> solid;
+};
+
+inline int n_state(const ExternalLaw& law) { return static_cast<int>(law.names.size()); }
+inline std::vector<std::string> state_names(const ExternalLaw& law) { return law.names; }
+inline double p_wave_modulus(const ExternalLaw& law) { return law.wave_modulus; }
+/// That of a Poisson's ratio of 1/4
+inline double shear_modulus(const ExternalLaw& law) { return law.wave_modulus / 3; }
+
+/// Throws InputError when there are too many or no state variables, or no positive modulus.
+void check(const ExternalLaw& law);
+
+template <int D>
+BatchReport update(const ExternalLaw& law, const PointBatch<D>& points)
+{
+  if constexpr (D == 2)
+    return law.plane_strain(points);
+  else
+    return law.solid(points);
+}
+} // namespace mpm
