@@ -5,6 +5,7 @@
 #include "materials/law.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
+#include "transfer/kinematics.h"
 #include "transfer/mixed_discretisation.h"
 #include "transfer/nodes.h"
 #include "transfer/supports.h"
@@ -73,6 +74,7 @@ struct Workspace
   std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
+  std::vector<NodalMotion<D>> motion;        ///< of the nodes, as the particles take it
   std::vector<double> cell_volume;           ///< filled volume, at the step's start
   std::vector<double> volumetric_strain;     ///< theta_c, averaged; used with nodal mixed discretisation
   VolumetricSums volumetric_sums;

@@ -1,5 +1,6 @@
 #include "steps/particle_pass.h"
 
+#include "materials/work_columns.h"
 #include "mesh/search.h"
 #include "steps/batches.h"
 #include "transfer/kinematics.h"
@@ -10,27 +11,67 @@ namespace mpm
 {
 namespace
 {
-/// Strain increments of a batch, one column per component.
+/// What the nodes do to the particles. A PIC share of v_p is replaced by the grid's sum N_i (v_i + dt a_i).
 template <int D>
-struct StrainScratch
+void find_motion(Model<D>& model, const PassOptions& options)
 {
-  alignas(64) double column[n_stress<D>][batch_size];
+  Workspace<D>& work = model.work;
+  work.motion.resize(model.mesh.points.size());
+  for (std::size_t i = 0; i < work.motion.size(); ++i)
+    for (int a = 0; a < D; ++a)
+    {
+      work.motion[i][a] = options.dt * work.acceleration[i][a] + options.pic_share * work.start_velocity[i][a];
+      work.motion[i][D + a] = options.dt * work.velocity[i][a];
+    }
+}
+
+/// Room for a batch, in the first-level cache.
+template <int D>
+struct BatchScratch
+{
+  WorkColumns<Matrix<D>> gradient;  ///< of the velocity, per run
+  WorkColumn<double> theta;         ///< averaged volumetric strain, per run
+  WorkColumns<CellStrain<D>> cells; ///< per run
+  alignas(64) double strain[n_stress<D>][batch_size]; ///< per particle, one column per component
 };
 
+/// Strains of the cells of a batch, from the nodes' velocities.
 template <int D>
-void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, StrainScratch<D>& scratch)
+void find_cell_strains(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+{
+  const std::size_t n = batch.last_run - batch.first_run;
+  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
+  for (std::size_t r = 0; r < n; ++r)
+  {
+    const Index cell = model.work.runs[batch.first_run + r].cell;
+    scratch.gradient.set(r, affine_field<D>(model.mesh, cell, velocity).gradient);
+    scratch.theta[r] = options.averaged ? model.work.volumetric_strain[cell] : 0;
+  }
+  const double dt = options.dt;
+#pragma GCC ivdep
+  for (std::size_t r = 0; r < n; ++r)
+    scratch.cells.set(r, strain_increment<D>(scratch.gradient.at(r), dt));
+  if (options.averaged)
+#pragma GCC ivdep
+    for (std::size_t r = 0; r < n; ++r)
+    {
+      CellStrain<D> strain = scratch.cells.at(r);
+      set_volumetric(strain, scratch.theta[r]);
+      scratch.cells.set(r, strain);
+    }
+}
+
+template <int D>
+void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
   Particles<D>& particles = model.particles;
-  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
+  find_cell_strains(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const Run& run = model.work.runs[r];
-    const auto gradient = affine_field<D>(model.mesh, run.cell, velocity).gradient;
-    CellStrain<D> strain = strain_increment<D>(gradient, options.dt);
-    if (options.averaged)
-      set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+    const CellStrain<D> strain = scratch.cells.at(r - batch.first_run);
     for (int k = 0; k < n_stress<D>; ++k)
-      std::fill(scratch.column[k] + (run.first - batch.first), scratch.column[k] + (run.last - batch.first),
+      std::fill(scratch.strain[k] + (run.first - batch.first), scratch.strain[k] + (run.last - batch.first),
                 strain.increment[k]);
     strain_particles<D>(particles, run.first, run.last, strain);
   }
@@ -39,7 +80,7 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
   points.size = batch.last - batch.first;
   for (int k = 0; k < n_stress<D>; ++k)
   {
-    points.strain_increment[k] = scratch.column[k];
+    points.strain_increment[k] = scratch.strain[k];
     points.stress[k] = particles.stress[k].data() + batch.first;
   }
   std::array<double*, max_states> state;
@@ -52,7 +93,7 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
   {
     SymTensor<D> increment;
     for (int k = 0; k < n_stress<D>; ++k)
-      increment[k] = scratch.column[k][report.first_failed];
+      increment[k] = scratch.strain[k][report.first_failed];
     note_trouble<D>(model, Trouble<D>::Kind::law_failed, batch.first + report.first_failed, increment);
   }
 }
@@ -120,9 +161,10 @@ void particle_pass(Model<D>& model, const PassOptions& options)
   if (options.stress)
     model.last.plastic = 0;
   const Index strays_before = work.strays;
-  const NodalMotion<D> motion{model.mesh, work.start_velocity, work.acceleration, work.velocity};
+  if (options.move)
+    find_motion(model, options);
   std::array<bool, batch_size> scattered;
-  StrainScratch<D> scratch;
+  BatchScratch<D> scratch;
 
   for (std::size_t r = 0; r < work.runs.size();)
   {
@@ -132,7 +174,7 @@ void particle_pass(Model<D>& model, const PassOptions& options)
       {
         const Run& run = work.runs[r];
         scattered[r - batch.first_run] =
-            move_particles<D>(model.particles, run, motion, options.dt, options.pic_share) > 0;
+            move_particles<D>(model.particles, run, model.mesh, work.motion, 1 - options.pic_share) > 0;
       }
     if (options.stress)
       update_stress<D>(model, options, batch, scratch);

@@ -2,47 +2,25 @@
 /// @file
 /// From nodes to particles: motion and strain. Consistent: a nodal field that is affine arrives exactly.
 
+#include "transfer/cell_strain.h"
 #include "transfer/moments.h"
 
 #include <span>
 
 namespace mpm
 {
-/// The nodal fields that move the particles.
+/// What a node does to the particles over a step: change of velocity [m/s], then displacement [m]. Together, since both are
+/// wanted at once at the nodes of a cell.
 template <int D>
-struct NodalMotion
-{
-  const Mesh<D>& mesh;
-  std::span<const Vector<D>> start_velocity; ///< v_i at the step's start, used only by a PIC share
-  std::span<const Vector<D>> acceleration;   ///< a_i
-  std::span<const Vector<D>> velocity;       ///< v_i that carries the particles over the step
-};
+using NodalMotion = std::array<double, 2 * D>;
 
-/// Moves the particles of a run: v_p += dt sum N_i a_i (18), x_p += dt sum N_i v_i (20). With a PIC share, that share of v_p is
-/// replaced by the grid's velocity sum N_i (v_i + dt a_i).
+/// Moves the particles of a run: v_p = keep v_p + sum N_i change_i (18), x_p += sum N_i displacement_i (20).
+/// @param motion  per node
+/// @param keep    share of its velocity that a particle keeps, 1 in FLIP
 /// @returns number of particles that are no longer inside of the run's cell (or not finite)
 template <int D>
-int move_particles(Particles<D>& particles, const Run& run, const NodalMotion<D>& motion, double dt, double pic_share);
-
-/// Strain increment of one cell and the rotation that goes with it.
-template <int D>
-struct CellStrain
-{
-  SymTensor<D> increment; ///< engineering shear
-  double volumetric;      ///< trace of the increment
-  double deviatoric;      ///< sqrt(2/3 de : de)
-  Matrix<D> rotation;     ///< of the material over the step, orthogonal
-};
-
-/// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980), so
-/// that stresses turn without a change of size however large the step.
-template <int D>
-CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double dt);
-
-/// Replaces the volumetric part: d is 2 in plane strain, where it is spread over the in-plane components, so that
-/// the strain out of plane stays zero; 3 in three dimensions.
-template <int D>
-void set_volumetric(CellStrain<D>& strain, double volumetric);
+int move_particles(Particles<D>& particles, const Run& run, const Mesh<D>& mesh, std::span<const NodalMotion<D>> motion,
+                   double keep);
 
 /// Columns of a symmetric tensor in the order of `symmetric_pairs`: the stress without zz in plane strain.
 template <int D>

@@ -201,10 +201,17 @@ TYPED_TEST(NodesTest, AffineNodalFieldsArriveExactly)
     velocity.push_back(affine(x, 3));
   }
   const double dt = 1e-3, pic = 0.25;
+  std::vector<NodalMotion<D>> motion(mesh.points.size());
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    for (int a = 0; a < D; ++a)
+    {
+      motion[i][a] = dt * acceleration[i][a] + pic * start[i][a];
+      motion[i][D + a] = dt * velocity[i][a];
+    }
   std::vector<Run> runs;
   find_runs(particles, 1000, runs);
   for (const Run& run : runs)
-    move_particles<D>(particles, run, NodalMotion<D>{mesh, start, acceleration, velocity}, dt, pic);
+    move_particles<D>(particles, run, mesh, motion, 1 - pic);
   for (Index p = 0; p < particles.size(); ++p)
   {
     const Vector<D> x = at<D>(before.position, p), v = at<D>(before.velocity, p);

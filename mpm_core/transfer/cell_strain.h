@@ -1,0 +1,79 @@
+#pragma once
+/// @file
+/// The strain increment that a cell's particles share. Inline, so that a loop over cells vectorises.
+
+#include "base/tensor.h"
+
+namespace mpm
+{
+/// Strain increment of one cell and the rotation that goes with it.
+template <int D>
+struct CellStrain
+{
+  SymTensor<D> increment; ///< engineering shear
+  double volumetric;      ///< trace of the increment
+  double deviatoric;      ///< sqrt(2/3 de : de)
+  Matrix<D> rotation;     ///< of the material over the step, orthogonal
+};
+
+/// sqrt(2/3 e : e) of the deviatoric part of a strain
+template <int D>
+inline double deviatoric_size(const SymTensor<D>& e, double volumetric)
+{
+  double normal = 0, shear = 0;
+  for (int k = 0; k < 3; ++k)
+    normal += (e[k] - volumetric / 3) * (e[k] - volumetric / 3);
+  for (int k = 3; k < n_stress<D>; ++k)
+    shear += e[k] * e[k];
+  return std::sqrt(2.0 / 3.0 * (normal + 0.5 * shear));
+}
+
+/// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980), so
+/// that stresses turn without a change of size however large the step.
+template <int D>
+inline CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double dt)
+{
+  CellStrain<D> strain{};
+  Matrix<D> spin;
+  double half_angle_squared = 0;
+  for (int i = 0; i < D; ++i)
+  {
+    strain.increment[i] = dt * velocity_gradient[i][i];
+    strain.volumetric += strain.increment[i];
+    for (int j = 0; j < D; ++j)
+      spin[i][j] = 0.25 * dt * (velocity_gradient[i][j] - velocity_gradient[j][i]); // half of the step's rotation
+    for (int j = 0; j < i; ++j)
+      half_angle_squared += spin[i][j] * spin[i][j];
+  }
+  for (int k = D; k < n_symmetric<D>; ++k)
+  {
+    const auto [i, j] = symmetric_pairs<D>[k];
+    strain.increment[stress_component<D>[k]] = dt * (velocity_gradient[i][j] + velocity_gradient[j][i]);
+  }
+  strain.deviatoric = deviatoric_size<D>(strain.increment, strain.volumetric);
+
+  // (1 - W)^-1 (1 + W) = 1 + 2 (W + W W) / (1 + |w|^2) for the antisymmetric W of axial vector w
+  const double scale = 2 / (1 + half_angle_squared);
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+    {
+      double square = 0;
+      for (int k = 0; k < D; ++k)
+        square += spin[i][k] * spin[k][j];
+      strain.rotation[i][j] = (i == j ? 1.0 : 0.0) + scale * (spin[i][j] + square);
+    }
+  return strain;
+}
+
+/// Replaces the volumetric part: d is 2 in plane strain, where it is spread over the in-plane components, so that
+/// the strain out of plane stays zero; 3 in three dimensions.
+template <int D>
+inline void set_volumetric(CellStrain<D>& strain, double volumetric)
+{
+  const double change = (volumetric - strain.volumetric) / D;
+  for (int i = 0; i < D; ++i)
+    strain.increment[i] += change;
+  strain.volumetric = volumetric;
+  strain.deviatoric = deviatoric_size<D>(strain.increment, volumetric);
+}
+} // namespace mpm
