@@ -47,8 +47,8 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
       for (const Column& column : model.particles.stress)
         stress = std::max(stress, std::abs(column[p]));
     }
-    const ElasticModuli moduli =
-        std::visit([](const auto& law) { return elastic_moduli(law.young, law.poisson); }, model.laws[run.material]);
+    const double shear = shear_modulus(model.laws[run.material]);
+    const ElasticModuli moduli{p_wave_modulus(model.laws[run.material]) - 2 * shear, shear};
     const CellShape<D>& shape = model.mesh.shapes[run.cell];
     const double overfull = std::max(1.0, model.work.moments[run.cell].volume / shape.volume);
     for (int k = 0; k <= D; ++k)
