@@ -1,0 +1,122 @@
+/// The kernels of a step one by one, and the memory bandwidth that bounds them.
+
+#include "../cpp/boxes.h"
+
+#include "materials/law.h"
+#include "particles/seed.h"
+#include "transfer/kinematics.h"
+#include "transfer/nodes.h"
+
+#include <benchmark/benchmark.h>
+
+using namespace mpm;
+
+namespace
+{
+/// STREAM triad a = b + s c on columns far larger than the caches; 24 bytes per entry, as STREAM counts.
+void stream_triad(benchmark::State& state)
+{
+  const std::size_t n = std::size_t(1) << 24;
+  std::vector<double> a(n, 0.0), b(n, 1.0), c(n, 2.0);
+  for (auto _ : state)
+  {
+    double *const x = a.data(), *const y = b.data(), *const z = c.data();
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < n; ++i)
+      x[i] = y[i] + 3.0 * z[i];
+    benchmark::ClobberMemory();
+  }
+  state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations() * 24 * n));
+}
+BENCHMARK(stream_triad)->Unit(benchmark::kMillisecond);
+
+/// A filled box with 10 particles per cell (8 in three dimensions) and its runs.
+template <int D>
+struct Filled
+{
+  Mesh<D> mesh;
+  Particles<D> particles;
+  std::vector<Run> runs;
+
+  explicit Filled(int n) : mesh(test::box<D>(n).mesh())
+  {
+    particles.state.resize(1);
+    seed_cells<D>(mesh, {}, D == 2 ? 10 : 8, {0, 2000.0}, 0, particles);
+    find_runs<D>(particles, 256, runs);
+  }
+};
+
+void count_particles(benchmark::State& state, Index particles)
+{
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()) * particles);
+}
+
+template <int D>
+void gather_moments(benchmark::State& state)
+{
+  Filled<D> box(static_cast<int>(state.range(0)));
+  std::vector<CellMoments<D>> moments(box.mesh.cells.size());
+  for (auto _ : state)
+    for (const Run& run : box.runs)
+      gather<D>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], moments[run.cell]);
+  count_particles(state, box.particles.size());
+}
+BENCHMARK(gather_moments<2>)->Arg(18)->Arg(112);
+BENCHMARK(gather_moments<3>)->Arg(5)->Arg(24);
+
+template <int D>
+void move(benchmark::State& state)
+{
+  Filled<D> box(static_cast<int>(state.range(0)));
+  const std::vector<NodalMotion<D>> motion(box.mesh.points.size()); // at rest: the particles stay where they are
+  for (auto _ : state)
+    for (const Run& run : box.runs)
+      benchmark::DoNotOptimize(move_particles<D>(box.particles, run, box.mesh, motion, 1.0));
+  count_particles(state, box.particles.size());
+}
+BENCHMARK(move<2>)->Arg(18)->Arg(112);
+BENCHMARK(move<3>)->Arg(5)->Arg(24);
+
+template <int D>
+void strain(benchmark::State& state)
+{
+  Filled<D> box(static_cast<int>(state.range(0)));
+  const CellStrain<D> none = strain_increment<D>({}, 1.0);
+  for (auto _ : state)
+    for (const Run& run : box.runs)
+      strain_particles<D>(box.particles, run.first, run.last, none);
+  count_particles(state, box.particles.size());
+}
+BENCHMARK(strain<2>)->Arg(18)->Arg(112);
+BENCHMARK(strain<3>)->Arg(5)->Arg(24);
+
+/// A law on one batch in the first-level cache. `shear` strains: 0 stays elastic, 1 yields everywhere.
+template <int D>
+void mohr_coulomb(benchmark::State& state)
+{
+  constexpr Index n = 256;
+  const Law law = MohrCoulomb{200e3, 0.33, 1e3, 25.0};
+  const bool yields = state.range(0) != 0, with_tangent = state.range(1) != 0;
+  std::vector<Column> strain(n_stress<D>, Column(n, 0.0)), stress(n_stress<D>, Column(n, 0.0)), variables(1, Column(n));
+  std::vector<double> tangent(static_cast<std::size_t>(n * n_stress<D> * n_stress<D>));
+  double* columns[] = {variables[0].data()};
+  PointBatch<D> points;
+  points.size = n;
+  for (int k = 0; k < n_stress<D>; ++k)
+  {
+    strain[k].assign(n, k == 3 && yields ? 1e-3 : 0.0);
+    stress[k].assign(n, k < 3 ? -5e3 : 0.0);
+    points.strain_increment[k] = strain[k].data();
+    points.stress[k] = stress[k].data();
+  }
+  points.state = columns;
+  points.tangent = with_tangent ? tangent.data() : nullptr;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(update<D>(law, points));
+  count_particles(state, n);
+}
+BENCHMARK(mohr_coulomb<2>)->ArgNames({"yields", "tangent"})->ArgsProduct({{0, 1}, {0, 1}});
+BENCHMARK(mohr_coulomb<3>)->ArgNames({"yields", "tangent"})->ArgsProduct({{0, 1}, {0, 1}});
+} // namespace
+
+BENCHMARK_MAIN();
