@@ -17,7 +17,7 @@ import numpy as np
 from common.animation import Frame, save_animation
 from common.history import History
 from common.interrupt import Interrupt
-from common.options import add_choice, add_count, add_number, add_switch, check, study_parser
+from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
 from common.slope_case import SlopeCase, add_slope_options, build_slope, initialise
@@ -46,7 +46,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
-    add_switch(p, "--paper", False, "the paper exactly: zero initial stress, time step 1e-4 s")
+    add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p
 
 

@@ -6,6 +6,9 @@ Example:
     >>> add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0.0, below=90.0)
     >>> add_count(parser, "--particles-per-cell", 10, "particles in each cell at the start", choices=(1, 3, 4, 6, 10, 12))
     >>> options = parser.parse_args()
+
+Every option may also stand in a TOML file, ``--parameters FILE``, under its name without the dashes in front; the command
+line wins over the file.
 """
 
 from __future__ import annotations
@@ -18,9 +21,36 @@ from typing import NoReturn
 
 from mpi4py import MPI
 
+from .parameters import Parameter, ParameterError, described, read_parameters
+
+
+class Options(argparse.Namespace):
+    """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings."""
+
+    __slots__ = ("actions", "study")
+    actions: list[argparse.Action]
+    study: str
+
+    def parameters(self) -> list[Parameter]:
+        """All options that say what is computed, with the values that are in force."""
+        return described(self.actions, self)
+
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that, on several ranks, speaks on the first one only."""
+    """A parser that reads a file of parameters too and, on several ranks, speaks on the first one only."""
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: None = None) -> Options:  # type: ignore[override]
+        first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+        first.add_argument("--parameters", nargs="?")
+        path = first.parse_known_args(args)[0].parameters
+        if path is not None:
+            try:
+                self.set_defaults(**read_parameters(Path(path), self._actions))
+            except ParameterError as error:
+                self.error(str(error))
+        options = Options()
+        options.actions, options.study = self._actions, self.prog.split()[-1]
+        return super().parse_args(args, options)
 
     def _print_message(self, message: str, file=None) -> None:
         if MPI.COMM_WORLD.rank == 0:
@@ -41,6 +71,10 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
     parser.add_argument(
         "--output", type=Path, default=None, metavar="DIR", help="folder for the results (default: results/NAME)"
     )
+    parser.add_argument(
+        "--parameters", type=Path, default=None, metavar="FILE",
+        help="TOML file with options, such as parameters.toml of an earlier run; the command line wins over it",
+    )  # fmt: skip
     return parser
 
 
@@ -83,6 +117,7 @@ def add_number(
             raise argparse.ArgumentTypeError(f"is '{value}', expected a number {expected}{label}".replace("  ", " "))
         return result
 
+    number.takes = "a number"  # type: ignore[attr-defined]
     _add(parser, name, default, f"{text} [{unit}]", type=number, metavar="X")
 
 
@@ -98,6 +133,7 @@ def add_count(
             raise argparse.ArgumentTypeError(f"is '{value}', expected {expected}")
         return result
 
+    count.takes = "a number"  # type: ignore[attr-defined]
     _add(parser, name, default, text, type=count, metavar="N")
 
 
@@ -116,6 +152,11 @@ def add_switch(parser: argparse.ArgumentParser, name: str, default: bool, text: 
     """Add a pair of options, ``--name`` and ``--no-name``."""
     shown = name if default else "--no-" + name.removeprefix("--")
     parser.add_argument(name, action=argparse.BooleanOptionalAction, default=default, help=f"{text} (default: {shown})")
+
+
+def add_flag(parser: argparse.ArgumentParser, name: str, text: str) -> None:
+    """Add an option that is off unless it is named."""
+    parser.add_argument(name, action="store_true", help=text)
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

@@ -1,4 +1,4 @@
-"""The results folder and the file ``summary.json`` in it."""
+"""The results folder and the files ``summary.json`` and ``parameters.toml`` in it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+
+from .options import Options
+from .parameters import write_parameters
 
 ROOT = Path(__file__).parents[2]
 
@@ -91,7 +94,8 @@ def write_summary(
 ) -> None:
     """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names.
 
-    The file appears as a whole or not at all. Call it on every rank; the first one writes.
+    The options also go to ``parameters.toml``, by which the run can be repeated. ``summary.json`` appears as a whole or not
+    at all. Call it on every rank; the first one writes.
 
     Args:
         folder: as ``results_folder`` gave it.
@@ -111,6 +115,8 @@ def write_summary(
     aside = folder / "summary.json.part"
     aside.write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
     os.replace(aside, folder / "summary.json")
+    if isinstance(options, Options):
+        write_parameters(folder / "parameters.toml", options.parameters(), options.study)
 
 
 def _plain(value: object) -> object:

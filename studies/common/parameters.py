@@ -1,0 +1,115 @@
+"""Parameters of a study as a TOML file: read in place of command line options, and written so that a run can be repeated."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+NOT_PARAMETERS = ("help", "output", "parameters")
+"""Options that say where things are, not what is computed; they do not belong into a file of parameters."""
+
+
+class ParameterError(ValueError):
+    """A file of parameters cannot be used; the message names the file, the key and what was expected."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An option as a table shows it."""
+
+    name: str
+    value: object
+    unit: str
+    meaning: str
+
+
+def described(actions: Sequence[argparse.Action], values: argparse.Namespace) -> list[Parameter]:
+    """The options that say what is computed, with their values."""
+    return [Parameter(name, getattr(values, action.dest), *_told(action)) for name, action in _named(actions).items()]
+
+
+def read_parameters(path: Path, actions: Sequence[argparse.Action]) -> dict[str, object]:
+    """Values by the options' names in Python (``dest``), checked as the command line checks them.
+
+    Raises:
+        ParameterError: the file cannot be read or is not TOML; an unknown key; a value of another type or out of bounds.
+    """
+    try:
+        with open(path, "rb") as file:
+            table = tomllib.load(file)
+    except OSError as error:
+        raise ParameterError(f"cannot read --parameters {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParameterError(f"--parameters {path} is not TOML: {error}") from None
+    known = _named(actions)
+    values = {}
+    for key, value in table.items():
+        if key not in known:
+            raise ParameterError(f"{path}: unknown key '{key}', expected some of {', '.join(known)}")
+        try:
+            values[known[key].dest] = _from_toml(known[key], value)
+        except (argparse.ArgumentTypeError, ValueError) as error:
+            raise ParameterError(f"{path}: {key} {error}") from None
+    return values
+
+
+def write_parameters(path: Path, parameters: Sequence[Parameter], study: str) -> None:
+    """Write a file that `read_parameters` reads, with units and meanings as comments. Call it on one rank.
+
+    What is None is left out: TOML has no form for it, and it is what an option is when it is not named.
+    """
+    lines = [f"# To repeat this run: studies/run {study} --parameters {path.name}", ""]
+    for parameter in parameters:
+        if parameter.value is not None:
+            unit = "" if parameter.unit == "-" else f" [{parameter.unit}]"
+            lines.append(f"{parameter.name} = {_to_toml(parameter.value)}  # {parameter.meaning}{unit}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:
+    """Options by their names without dashes in front; of a pair --name and --no-name by the first."""
+    shown = [action for action in actions if action.option_strings and action.dest not in NOT_PARAMETERS]
+    return {action.option_strings[0].removeprefix("--"): action for action in shown}
+
+
+def _told(action: argparse.Action) -> tuple[str, str]:
+    """Unit and meaning of an option, from its help: ``meaning [unit] (default: ...)``."""
+    text = (action.help or "").replace("%%", "%").split(" (default:")[0]
+    if text.endswith("]") and " [" in text:
+        meaning, unit = text[:-1].rsplit(" [", 1)
+        return unit, meaning
+    return "-", text
+
+
+def _to_toml(value: object) -> str:
+    # A JSON text is a TOML text, and Python's shortest form of a number is TOML and is read back as the same number.
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_to_toml, value)) + "]"
+    if isinstance(value, Path):
+        value = str(value.resolve())
+    return repr(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else json.dumps(value)
+
+
+def _from_toml(action: argparse.Action, value: object) -> Any:
+    """A value of a file as the command line would give it."""
+    if action.nargs == 0:
+        if not isinstance(value, bool):
+            raise ValueError(f"is {value!r}, expected true or false")
+        return value
+    if isinstance(value, list) and action.nargs is not None:
+        return [_single(action, one) for one in value]
+    return _single(action, value)
+
+
+def _single(action: argparse.Action, value: object) -> Any:
+    takes = getattr(action.type, "takes", "a number or a text in quotes")
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"is {value!r}, expected {takes}")
+    if isinstance(value, str) and takes == "a number":
+        raise ValueError(f"is '{value}', expected a number")
+    return action.type(str(value)) if callable(action.type) else str(value)
