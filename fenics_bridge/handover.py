@@ -48,7 +48,7 @@ def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
     stress = search.values(fem.stress_function(smooth))
-    state = np.zeros_like(particles.state)
+    state = particles.state
     if plastic:
         state[:, : fem.law.n_state] = search.values(fem.state_function())
     returned = _returned(model.laws, particles.material, stress, state)

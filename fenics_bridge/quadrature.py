@@ -31,6 +31,15 @@ class QuadraturePoints:
         self.trial_stress, self.trial_state = self.stress.copy(), self.state.copy()
         self.tangent = np.zeros((self.n, self.size, self.size))
 
+    def reset_state(self, law):
+        """State variables as a law wants them at the start: zero, but for the size of the cells [m] where it asks for it."""
+        self.state[:] = 0.0
+        if "cell_size" in law.state_names:
+            corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
+            filled = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))  # D! times the volume
+            size = filled ** (1 / self._domain.geometry.dim)
+            self.state[:, law.state_names.index("cell_size")] = np.repeat(size, self.per_cell)
+
     def update(self, law, strain_increment):
         """Trial stress, state and tangent by one call of the law; returns its report of this rank."""
         np.copyto(self.trial_stress, self.stress)

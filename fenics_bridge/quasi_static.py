@@ -43,6 +43,7 @@ class QuasiStatic:
         self._constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags)
         self.points = QuadraturePoints(domain, law.n_state, max(1, 2 * (degree - 1)))
+        self.points.reset_state(law)
         self.load, self.converged = Load(), False
         self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, self._constraints)
         self._solver = LinearSolver(space, options_prefix)
@@ -56,7 +57,7 @@ class QuasiStatic:
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
         agree(self.domain.comm, None if good else f"stress: got shape {np.shape(stress)}, expected finite {shape}")
         self.points.stress[:] = stress
-        self.points.state[:] = 0.0
+        self.points.reset_state(self.law)
         self.displacement.x.array[:] = 0.0
         self.load = load
 

@@ -35,6 +35,8 @@ struct CamClay
   /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with another
   /// one; `log_volume` is ln of the specific volume over that of the start.
   static constexpr std::array state_names{"plastic_strain", "log_preconsolidation", "log_volume"};
+
+  bool operator==(const CamClay&) const = default;
 };
 
 /// Throws InputError when a parameter is out of its range.

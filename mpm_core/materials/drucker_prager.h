@@ -30,6 +30,8 @@ struct DruckerPrager
   double tension_cutoff = std::numeric_limits<double>::infinity();
 
   static constexpr std::array state_names{"plastic_strain"};
+
+  bool operator==(const DruckerPrager&) const = default;
 };
 
 /// Where a cone meets the pyramid of Mohr-Coulomb

@@ -16,6 +16,8 @@ namespace mpm
 struct Hencky
 {
   LawList<> law;
+
+  bool operator==(const Hencky&) const = default;
 };
 
 /// One more than those of the law: the last is `log_volume`, ln J

@@ -13,6 +13,8 @@ struct LinearElastic
   double poisson;
 
   static constexpr std::array state_names{"plastic_strain"};
+
+  bool operator==(const LinearElastic&) const = default;
 };
 
 /// Throws InputError when a parameter is out of its range.

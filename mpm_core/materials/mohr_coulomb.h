@@ -30,6 +30,8 @@ struct MohrCoulomb
   double tension_cutoff = std::numeric_limits<double>::infinity();
 
   static constexpr std::array state_names{"plastic_strain"};
+
+  bool operator==(const MohrCoulomb&) const = default;
 };
 
 /// Throws InputError when a parameter is out of its range.

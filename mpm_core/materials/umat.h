@@ -34,6 +34,8 @@ struct Umat
   int plastic_strain_variable;
   /// Modulus of the compression wave [Pa], for the critical time step
   double wave_modulus;
+
+  bool operator==(const Umat&) const = default;
 };
 
 /// The UMAT of a shared library, which stays loaded.

@@ -19,6 +19,8 @@ struct Undrained
   double water_modulus;
   /// Porosity n [-], in (0, 1)
   double porosity;
+
+  bool operator==(const Undrained&) const = default;
 };
 
 /// One more than those of the skeleton: the last is `excess_pore_pressure`, u [Pa]

@@ -118,6 +118,7 @@ py::class_<L> bind_law(py::module_& m, const char* name, const char* text)
                              "Names of the state variables; the first is plastic_strain, accumulated and deviatoric")
       .def_property_readonly("p_wave_modulus", [](const L& law) { return p_wave_modulus(law); },
                              "Modulus of the compression wave, K + 4G/3 [Pa]")
+      .def("__eq__", [](const L& law, const py::object& other) { return py::isinstance<L>(other) && law == other.cast<L>(); })
       .def("update", &update_arrays<L>, py::arg("strain_increment"), py::arg("stress"), py::arg("state"),
            py::arg("tangent") = py::none(), update_text);
 }

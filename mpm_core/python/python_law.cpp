@@ -87,7 +87,8 @@ ExternalLaw python_law(const py::object& law)
     throw InputError("law has state_names of another number than n_state, or not plastic_strain as the first");
   return checked(ExternalLaw{std::move(names), law.attr("p_wave_modulus").cast<double>(),
                              [law, states](const PointBatch<2>& points) { return call<2>(law, states, points); },
-                             [law, states](const PointBatch<3>& points) { return call<3>(law, states, points); }});
+                             [law, states](const PointBatch<3>& points) { return call<3>(law, states, points); },
+                             law.ptr()});
 }
 } // namespace
 

@@ -149,6 +149,19 @@ def test_a_point_may_begin_with_a_preconsolidation_of_its_own():
     assert np.abs(batch.stress + np.array([250e3] * 3 + [0.0] * 3)).max() < 1e-6
 
 
+def test_log_preconsolidation_puts_a_stress_on_or_inside_the_surface():
+    stress, _ = random_points(3, 200, pressure=60e3, deviator=5e3, strain=0.0)
+    for ratio, strain in [(1.0, -1e-6), (1.5, 0.0)]:
+        state = np.zeros((200, 3))
+        state[:, 1] = mpm.log_preconsolidation(CLAY, stress, ratio)
+        batch = Batch(CLAY, stress, strain * np.tile([1.0, 1, 1, 0, 0, 0], (200, 1)), state)
+        p, q = p_and_q(stress)
+        assert p + q**2 / M**2 / p == pytest.approx(100e3 * np.exp(state[:, 1]) / ratio)
+        assert batch.report.plastic == 0 if ratio > 1 else batch.report.plastic > 0
+    with pytest.raises(mpm.InputError, match="expected below the attraction"):
+        mpm.log_preconsolidation(CLAY, np.zeros((1, 4)))
+
+
 def test_bad_parameters_are_named_with_value_and_range():
     good = {**PARAMETERS, "preconsolidation": 100e3}
     for name, value in [("swelling", 0.0), ("compression", 0.03125), ("critical_slope", -1.0), ("poisson", 0.5),

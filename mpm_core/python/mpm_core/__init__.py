@@ -25,7 +25,7 @@ from ._core import compiler as compiler
 from ._core import version as __version__
 from .ghost import GhostPenalty
 from .element import ElementTest
-from .laws import matched_drucker_prager, tresca, von_mises
+from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
 from .newton import Newton
@@ -59,6 +59,7 @@ __all__ = [
     "Umat",
     "Undrained",
     "__version__",
+    "log_preconsolidation",
     "matched_drucker_prager",
     "tresca",
     "von_mises",

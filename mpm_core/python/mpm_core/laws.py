@@ -1,6 +1,10 @@
 """Laws that are special cases of others, under the names that the field knows them by."""
 
-from ._core import ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
+from .mesh import floats
 
 
 def _positive(name: str, value: float) -> float:
@@ -69,3 +73,26 @@ def matched_drucker_prager(
         dilation=cone_slope(soil.dilation_angle, match),
         tension_cutoff=tension_cutoff,
     )
+
+
+def log_preconsolidation(law: CamClay, stress: ArrayLike, overconsolidation: float = 1.0) -> NDArray[np.float64]:
+    """The state `log_preconsolidation` of points that begin with a stress and an overconsolidation ratio.
+
+    Args:
+        law: the clay.
+        stress: effective stress [Pa], tension positive, shape (n, 4) or (n, 6); its mean must be below the attraction.
+        overconsolidation: size of the yield surface over that of the one through the stress [-], at least 1.
+
+    Returns:
+        Shape (n,), for ``Model.set_state("log_preconsolidation", ...)``.
+    """
+    if not overconsolidation >= 1:
+        raise InputError(f"overconsolidation is {overconsolidation}, expected at least 1")
+    s = floats("stress", stress, (None, None))
+    mean = s[:, :3].mean(axis=1)
+    pressure = law.attraction - mean
+    if (pressure <= 0).any():
+        raise InputError(f"stress has the mean {mean.max():g} Pa, expected below the attraction, {law.attraction:g} Pa")
+    squares = ((s[:, :3] - mean[:, None]) ** 2).sum(axis=1) + 2 * (s[:, 3:] ** 2).sum(axis=1)
+    through = pressure + 1.5 * squares / (law.critical_slope**2 * pressure)
+    return np.log(overconsolidation * through / (law.preconsolidation + law.attraction))
