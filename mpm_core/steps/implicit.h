@@ -58,6 +58,8 @@ struct ImplicitStep
   std::vector<Vector<D>> external;                       ///< f_ext at the step's end
   std::vector<Vector<D>> residual;                       ///< zero along supported directions
   std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
+  /// Sum V dsigma/dstrain of each owned cell, without zz in plane strain; engineering shear
+  std::vector<std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>> stiffness;
   std::vector<CellTangent<D>> tangents;                  ///< of each owned cell
   std::vector<TrialForces<D>> forces;
   std::vector<GhostFacet<D>> ghosts;                     ///< stabilised facets

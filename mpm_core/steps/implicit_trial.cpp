@@ -19,16 +19,7 @@ struct TrialScratch
   alignas(64) double strain[n_stress<D>][batch_size];
   alignas(64) double stress[n_stress<D>][batch_size]; ///< at the start, turned with the material; then at the end
   alignas(64) double state[max_states][batch_size];
-  std::vector<double> tangent;
-};
-
-/// What turns with the iterate in one cell: strain and rotation, and the derivatives of the rotation.
-template <int D>
-struct CellTurn
-{
-  CellStrain<D> strain;
-  /// For each pair b < m of axes, d Omega = dR R^T per du_b/dx_m; its negative belongs to du_m/dx_b
-  std::array<Matrix<D>, D*(D - 1) / 2> spin;
+  std::vector<double> tangent; ///< (batch_size, components, components)
 };
 
 template <int D>
@@ -41,91 +32,87 @@ constexpr std::array<std::array<int, 2>, D*(D - 1) / 2> spin_pairs = []
   return pairs;
 }();
 
-/// The Cayley transform R of the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
+/// d Omega = dR R^T for each pair b < m of axes, per du_b/dx_m; its negative belongs to du_m/dx_b. The Cayley transform R of
+/// the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
 template <int D>
-CellTurn<D> cell_turn(const CellStrain<D>& strain)
+std::array<Matrix<D>, D*(D - 1) / 2> spins(const Matrix<D>& rotation)
 {
-  CellTurn<D> turn{strain, {}};
-  Matrix<D> y = strain.rotation;
+  Matrix<D> y = rotation;
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
       y[i][j] = 0.5 * (y[i][j] + (i == j ? 1.0 : 0.0));
-  for (std::size_t k = 0; k < turn.spin.size(); ++k)
+  std::array<Matrix<D>, D*(D - 1) / 2> spin;
+  for (std::size_t k = 0; k < spin.size(); ++k)
   {
     const auto [b, m] = spin_pairs<D>[k];
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
-        turn.spin[k][i][j] = 0.5 * (y[i][b] * y[j][m] - y[i][m] * y[j][b]);
+        spin[k][i][j] = 0.5 * (y[i][b] * y[j][m] - y[i][m] * y[j][b]);
   }
-  return turn;
+  return spin;
 }
 
-/// Omega sigma - sigma Omega of a symmetric tensor; zz of plane strain does not turn.
 template <int D>
-SymTensor<D> turned_by(const Matrix<D>& omega, const SymTensor<D>& stress)
+using Symmetric = std::array<double, n_symmetric<D>>;
+
+/// Omega S - S Omega of a symmetric S.
+template <int D>
+Symmetric<D> turned_by(const Matrix<D>& omega, const Symmetric<D>& s)
 {
   Matrix<D> product{};
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
       for (int k = 0; k < D; ++k)
-        product[i][j] += omega[i][k] * stress[stress_component<D>[symmetric_index<D>(k, j)]];
-  SymTensor<D> turned{};
+        product[i][j] += omega[i][k] * s[symmetric_index<D>(k, j)];
+  Symmetric<D> turned;
   for (int k = 0; k < n_symmetric<D>; ++k)
   {
     const auto [i, j] = symmetric_pairs<D>[k];
-    turned[stress_component<D>[k]] = product[i][j] + product[j][i]; // -sigma Omega is the transpose of Omega sigma
+    turned[k] = product[i][j] + product[j][i]; // -S Omega is the transpose of Omega S
   }
   return turned;
 }
 
-/// The same of a strain with engineering shear.
+/// The tangent of a cell from C = sum V dsigma/dstrain and the sum of V sigma at the increment's end.
+///
+/// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R turns by
+/// Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
 template <int D>
-SymTensor<D> turned_strain(const Matrix<D>& omega, SymTensor<D> strain)
+CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
+                            const CellStrain<D>& strain, bool averaged)
 {
-  for (int k = 3; k < n_stress<D>; ++k)
-    strain[k] /= 2;
-  SymTensor<D> turned = turned_by<D>(omega, strain);
-  for (int k = 3; k < n_stress<D>; ++k)
-    turned[k] *= 2;
-  return turned;
-}
+  CellTangent<D> tangent{};
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    for (int b = 0; b < D; ++b)
+      for (int m = 0; m < D; ++m)
+        tangent.by_gradient[k][b * D + m] = c[k][symmetric_index<D>(b, m)];
 
-/// Adds V d sigma / d grad u of one particle: the law's tangent C acts on the strain. To the rotation goes what follows
-/// from isotropy: had the strain turned along with the start's stress, the result would have, too; so it changes by
-/// (Omega sigma - sigma Omega) - C (Omega de - de Omega).
-template <int D>
-void add_tangent(const double* c, const CellTurn<D>& turn, const SymTensor<D>& stress, double volume, bool averaged,
-                 CellTangent<D>& tangent)
-{
-  constexpr int S = n_stress<D>;
-  for (int b = 0; b < D; ++b)
-    for (int m = 0; m < D; ++m)
-      for (int k = 0; k < n_symmetric<D>; ++k)
-        tangent.by_gradient[k][b * D + m] += volume * c[stress_component<D>[k] * S + stress_component<D>[symmetric_index<D>(b, m)]];
-  for (std::size_t s = 0; s < turn.spin.size(); ++s)
+  Symmetric<D> e; // as a tensor
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    e[k] = strain.increment[stress_component<D>[k]] * (k < D ? 1.0 : 0.5);
+  const auto spin = spins<D>(strain.rotation);
+  for (std::size_t s = 0; s < spin.size(); ++s)
   {
-    const SymTensor<D> with_stress = turned_by<D>(turn.spin[s], stress);
-    const SymTensor<D> with_strain = turned_strain<D>(turn.spin[s], turn.strain.increment);
+    const Symmetric<D> stress_turned = turned_by<D>(spin[s], stress), strain_turned = turned_by<D>(spin[s], e);
     const auto [b, m] = spin_pairs<D>[s];
     for (int k = 0; k < n_symmetric<D>; ++k)
     {
-      double turned = with_stress[stress_component<D>[k]];
-      for (int j = 0; j < S; ++j)
-        turned -= c[stress_component<D>[k] * S + j] * with_strain[j];
-      tangent.by_gradient[k][b * D + m] += volume * turned;
-      tangent.by_gradient[k][m * D + b] -= volume * turned;
+      double change = stress_turned[k];
+      for (int j = 0; j < n_symmetric<D>; ++j)
+        change -= c[k][j] * strain_turned[j] * (j < D ? 1.0 : 2.0);
+      tangent.by_gradient[k][b * D + m] += change;
+      tangent.by_gradient[k][m * D + b] -= change;
     }
   }
   if (averaged)
     for (int k = 0; k < n_symmetric<D>; ++k)
     {
-      double volumetric = 0;
       for (int j = 0; j < D; ++j)
-        volumetric += c[stress_component<D>[k] * S + j] / D;
-      tangent.by_volumetric[k] += volume * volumetric;
+        tangent.by_volumetric[k] += c[k][j] / D;
       for (int j = 0; j < D; ++j)
-        tangent.by_gradient[k][j * D + j] -= volume * volumetric;
+        tangent.by_gradient[k][j * D + j] -= tangent.by_volumetric[k];
     }
+  return tangent;
 }
 
 /// Volume of a cell after a displacement, relative to that before: det(1 + grad u).
@@ -203,18 +190,19 @@ void sum_run(const Model<D>& model, ImplicitStep<D>& step, const Run& run, Index
       step.stress[run.cell][k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
 }
 
+/// Adds V C of one run; rows and columns of zz are not needed in plane strain.
 template <int D>
-void sum_tangents(const Model<D>& model, ImplicitStep<D>& step, const Run& run, const CellStrain<D>& strain, Index at,
-                  const TrialScratch<D>& scratch)
+void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialScratch<D>& scratch,
+                   std::array<Symmetric<D>, n_symmetric<D>>& stiffness)
 {
-  const CellTurn<D> turn = cell_turn<D>(strain);
+  constexpr int S = n_stress<D>;
   for (Index p = 0; p < run.last - run.first; ++p)
   {
-    SymTensor<D> stress;
-    for (int k = 0; k < n_stress<D>; ++k)
-      stress[k] = scratch.stress[k][at + p];
-    add_tangent<D>(&scratch.tangent[static_cast<std::size_t>((at + p) * n_stress<D> * n_stress<D>)], turn, stress,
-                   model.particles.volume[run.first + p], step.options.mixed_discretisation, step.tangents[run.cell]);
+    const double* const c = &scratch.tangent[static_cast<std::size_t>((at + p) * S * S)];
+    const double volume = model.particles.volume[run.first + p];
+    for (int k = 0; k < n_symmetric<D>; ++k)
+      for (int j = 0; j < n_symmetric<D>; ++j)
+        stiffness[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
   }
 }
 } // namespace
@@ -224,34 +212,34 @@ TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tange
 {
   const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
   step.stress.assign(cells, {});
-  if (tangents)
-    step.tangents.assign(cells, {});
+  step.stiffness.assign(tangents ? cells : 0, {});
   TrialScratch<D> scratch;
-  if (tangents)
-    scratch.tangent.resize(static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>));
-  std::vector<CellStrain<D>> strains;
+  scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
   TrialCount count;
   const auto& runs = model.work.runs;
   for (std::size_t r = 0; r < runs.size();)
   {
     const Batch batch = next_batch(runs, r);
-    strains.clear();
     for (r = batch.first_run; r < batch.last_run; ++r)
-    {
-      strains.push_back(cell_strain(model, step, runs[r].cell, count));
-      load_run(model, runs[r], strains.back(), runs[r].first - batch.first, scratch);
-    }
+      load_run(model, runs[r], cell_strain(model, step, runs[r].cell, count), runs[r].first - batch.first, scratch);
     const BatchReport report = update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
     count.plastic += report.plastic;
     count.failed += report.failed;
-    for (std::size_t k = 0; k < strains.size(); ++k)
+    for (r = batch.first_run; r < batch.last_run; ++r)
     {
-      const Run& run = runs[batch.first_run + k];
-      sum_run(model, step, run, run.first - batch.first, scratch);
+      sum_run(model, step, runs[r], runs[r].first - batch.first, scratch);
       if (tangents)
-        sum_tangents(model, step, run, strains[k], run.first - batch.first, scratch);
+        sum_stiffness(model, runs[r], runs[r].first - batch.first, scratch, step.stiffness[runs[r].cell]);
     }
   }
+  if (tangents)
+    step.tangents.resize(cells);
+  TrialCount counted;
+  for (std::size_t c = 0; tangents && c < cells; ++c)
+    if (model.work.moments[c].volume > 0)
+      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c],
+                                         cell_strain(model, step, static_cast<Index>(c), counted),
+                                         step.options.mixed_discretisation);
   return count;
 }
 

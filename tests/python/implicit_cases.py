@@ -4,6 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+import mpm_core as mpm
+
 LEFT = 1
 """Tag of the low side along the first axis, as `core_cases.box` numbers them"""
 
@@ -57,3 +59,39 @@ def tangent(step, dim):
     return j + matrix(step.volumetric_force_places(), force, (dofs, nodes)) @ matrix(
         step.volumetric_strain_places(), strain, (nodes, dofs)
     )
+
+
+SLOPE_SOIL = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
+
+
+def slope(h=0.1, weight=80e3, per_cell=10):
+    """The slope of the paper's section 6: height 1 m, 45 degrees, squares of side h cut in four by their diagonals."""
+    nx, ny = round(4.1 / h), round(1.0 / h)
+    corner = np.stack(np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"), -1).reshape(-1, 2) * h
+    square = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), -1).reshape(-1, 2)
+    points = np.concatenate([corner, (square + 0.5) * h])
+    low = square[:, 0] * (ny + 1) + square[:, 1]
+    round_square = np.stack([low, low + ny + 1, low + ny + 2, low + 1, low], axis=1)
+    middle = len(corner) + np.arange(len(square))
+    cells = np.concatenate([np.c_[round_square[:, k : k + 2], middle] for k in range(4)]).astype(np.int32)
+    sides = [cells[points[cells[:, :2], axis].max(axis=1) < 1e-9][:, :2] for axis in (0, 1)]
+    centres = points[cells].mean(axis=1)
+    mesh = mpm.Mesh(
+        points,
+        cells,
+        cell_tags=np.where(centres.sum(axis=1) < 2.1, 1, 2).astype(np.int32),
+        facets=np.concatenate(sides),
+        facet_tags=np.repeat([1, 2], [len(s) for s in sides]).astype(np.int32),
+    )
+    model = mpm.Model(mesh, SLOPE_SOIL)
+    model.seed(density=weight / 9.81, per_cell=per_cell, cell_tag=1)
+    model.roller(1, (1, 0))
+    model.fix(2)
+    model.set_gravity((0, -9.81))
+    return model
+
+
+def crest_displacement(model):
+    """Length of the displacement of the particle that was nearest to the slope's crest [m]."""
+    start = model.particles.initial_position
+    return np.linalg.norm(model.particles.displacement[np.argmin(np.hypot(start[:, 0] - 1.1, start[:, 1] - 1.0))])

@@ -37,7 +37,8 @@ class Stepper:
         self._longest = self._dt = dt
         self._changed = True
         self._iterations = self._cuts = 0
-        self._last = Solution()
+        self.last = Solution()
+        """How the last step tried was solved"""
 
     def advance(self, until: float) -> None:
         """One step towards a time, cut as often as it must be.
@@ -58,16 +59,16 @@ class Stepper:
                     f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from {self._longest:.3g} s "
                     f"down to {dt:.3g} s: {reason}"
                 )
-        if self._last.easy:
+        if self.last.easy:
             self._dt = min(self._longest, 2 * self._dt)
 
     def attempt(self, dt: float) -> str:
         """Try one step; the particles change only when it succeeds. Returns why it did not, or nothing."""
         self._changed |= self._step.start(self._options, dt)
-        self._last = self._solver.solve(self._step, dt, self._changed)
+        self.last = self._solver.solve(self._step, dt, self._changed)
         self._changed = False
-        self._iterations += self._last.iterations
-        return self._step.finish() if self._last.converged else self._last.reason
+        self._iterations += self.last.iterations
+        return self._step.finish() if self.last.converged else self.last.reason
 
     def report(self) -> ImplicitReport:
         """Where the run stands; counts begin anew."""
@@ -75,7 +76,7 @@ class Stepper:
             **vars(self._model.report()),
             iterations=self._iterations,
             cuts=self._cuts,
-            residual=self._last.residuals[-1],
+            residual=self.last.residuals[-1],
         )
         self._iterations = self._cuts = 0
         return report

@@ -1,0 +1,47 @@
+"""All solvers reach the same root, and Newton's method does so quadratically."""
+
+import numpy as np
+import pytest
+from implicit_cases import slope
+
+import mpm_core as mpm
+from mpm_core import _core
+from mpm_core.implicit import Stepper
+
+KINDS = [mpm.RelaxationKind.RICHARDSON, mpm.RelaxationKind.LOCAL, mpm.RelaxationKind.KINETIC, mpm.RelaxationKind.VISCOUS]
+
+
+DT = 0.1
+"""[s], some 6 critical steps"""
+
+
+def solved_step(solver, *, nmd=False, quasi_static=False):
+    """Nodal velocities of a step in which soil yields, and how it was solved: a sliding slope, or one below collapse that is
+    brought to equilibrium at once."""
+    model = slope(0.2, weight=20e3 if quasi_static else 80e3)
+    if not quasi_static:
+        list(model.implicit(3 * DT, dt=DT, damping=0.75))
+    options = _core.ImplicitOptions()
+    options.damping, options.mixed_discretisation, options.quasi_static = 0.75, nmd, quasi_static
+    stepper = Stepper(model, solver, options, DT)
+    assert stepper.attempt(DT) == ""
+    assert model.report().plastic_share > (0.01 if quasi_static else 0.1)
+    return model.nodal("velocity"), stepper.last
+
+
+@pytest.mark.parametrize("nmd", [False, True])
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_every_relaxation_reaches_the_root_of_newtons_method(kind, nmd):
+    expected, _ = solved_step(mpm.Newton(tolerance=1e-12), nmd=nmd)
+    found, _ = solved_step(mpm.Relaxation(kind, tolerance=1e-11), nmd=nmd)
+    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("quasi_static", [False, True])
+@pytest.mark.parametrize("nmd", [False, True])
+def test_newtons_method_converges_quadratically(nmd, quasi_static):
+    _, solution = solved_step(mpm.Newton(tolerance=1e-13), nmd=nmd, quasi_static=quasi_static)
+    r = np.array([x for x in solution.residuals if x > 1e-12])
+    # In the last iterations above round-off the number of right digits doubles, but for a factor.
+    assert r[-1] < 20 * r[-2] ** 2 or r[-2] < 20 * r[-3] ** 2, solution.residuals
+
