@@ -80,12 +80,12 @@ constexpr double mass_share(RelaxationKind kind)
 {
   switch (kind)
   {
-  case RelaxationKind::viscous:
-    return 0.25;
+  case RelaxationKind::richardson:
+    return 0.5;
   case RelaxationKind::local:
     return 0.25 * (1 + local_damping_share);
-  default: // kinetic: the half step after each peak then takes the stiffest modes away, and does not only turn them round
-    return 0.5;
+  default:
+    return 0.25;
   }
 }
 
@@ -132,8 +132,8 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
     case RelaxationKind::local:
       next[a] = rate[a] + (residual[a] - (rate[a] == 0 ? 0 : std::copysign(damping * std::abs(residual[a]), rate[a]))) / mass;
       break;
-    case RelaxationKind::kinetic:
-      next[a] = rate[a] + residual[a] / mass;
+    case RelaxationKind::kinetic: // where it has passed the peak of its kinetic energy, it begins anew from rest
+      next[a] = rate[a] * residual[a] < 0 ? 0.5 * residual[a] / mass : rate[a] + residual[a] / mass;
       break;
     case RelaxationKind::viscous:
       next[a] = ((2 - damping) * rate[a] + 2 * residual[a] / mass) / (2 + damping);
@@ -142,25 +142,12 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
   return next;
 }
 
-/// After a peak of the kinetic energy: w begins anew from rest.
-template <int D>
-void stop_at_peak(const Model<D>& model, const ImplicitStep<D>& step, Relaxation<D>& relaxation)
-{
-  const double energy = nodal_sum(model, [&](std::size_t i)
-                                  { return relaxation.mass[i] * dot<D>(relaxation.rate[i], relaxation.rate[i]); });
-  const bool passed = energy < relaxation.kinetic_energy;
-  relaxation.kinetic_energy = passed ? 0 : energy;
-  if (passed)
-    for (std::size_t i = 0; i < relaxation.rate.size(); ++i)
-      for (int a = 0; a < D; ++a) // so that the next one is half as long: w belongs to the middle between two iterates
-        relaxation.rate[i][a] = relaxation.mass[i] > 0 ? -0.5 * step.residual[i][a] / relaxation.mass[i] : 0;
-}
 } // namespace
 
 template <int D>
 Relaxation<D> start_relaxation(Model<D>& model, ImplicitStep<D>& step, RelaxationKind kind)
 {
-  Relaxation<D> relaxation{kind, tangent_rows(model, step), {}, {}, 0, {}};
+  Relaxation<D> relaxation{kind, tangent_rows(model, step), {}, {}, {}};
   for (double& mass : relaxation.mass)
     mass *= margin * mass_share(kind);
   relaxation.rate.assign(model.mesh.points.size(), {});
@@ -189,8 +176,6 @@ int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, dou
     impose_supports(model, step);
     relaxation.last = step.residual;
     relaxation.report = find_residual(model, step, false);
-    if (relaxation.kind == RelaxationKind::kinetic)
-      stop_at_peak(model, step, relaxation);
     ++done;
   }
   return done;

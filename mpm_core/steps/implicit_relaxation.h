@@ -24,7 +24,7 @@ enum class RelaxationKind
 {
   richardson, ///< (21) as it is
   local,      ///< second order, local damping beta |r| sign(w); M_DR is larger by 1 + beta
-  kinetic,    ///< second order, w set to zero at each peak of its kinetic energy
+  kinetic,    ///< second order, each component of w set to zero where it has passed a peak of its kinetic energy, w r < 0
   viscous     ///< second order, viscous damping critical for the lowest mode by Rayleigh's quotient (Underwood 1983)
 };
 
@@ -36,7 +36,6 @@ struct Relaxation
   std::vector<double> mass;          ///< M_TR or M_DR of each node
   std::vector<Vector<D>> rate;       ///< w
   std::vector<Vector<D>> last;       ///< residual of the iterate before
-  double kinetic_energy = 0;
   TrialReport report;                ///< of the iterate
 };
 
