@@ -15,11 +15,13 @@ from time import perf_counter
 import mpm_core as mpm
 import numpy as np
 from common.animation import Frame, save_animation
+from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
+from common.ranks import end_all_on_error
 from common.slope_case import SlopeCase, add_slope_options, build_slope, initialise
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
@@ -46,6 +48,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
+    add_checkpoint_options(p)
     add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p
 
@@ -116,8 +119,10 @@ class Files:
 
     def __init__(self, case: SlopeCase, folder: Path) -> None:
         self.model, mesh = case.model, case.model.mesh
-        self.particles = ParticleOutput(folder / "particles", comm)
-        self.mesh = MeshOutput(folder / "mesh", comm, mesh.points, mesh.cells[: mesh.owned_cells])
+        restarted = case.args.restart is not None
+        particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
+        self.particles = ParticleOutput(particles, comm)
+        self.mesh = MeshOutput(background, comm, mesh.points, mesh.cells[: mesh.owned_cells])
         self.tags = mesh.cell_tags[: mesh.owned_cells]
 
     def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
@@ -134,7 +139,9 @@ class Files:
         self.mesh.close()
 
 
-def slide(case: SlopeCase, watch: Watch, history: History, files: Files, interrupt: Interrupt) -> dict:
+def slide(
+    case: SlopeCase, watch: Watch, history: History, files: Files, interrupt: Interrupt, checkpoints: Checkpoints
+) -> dict:
     """Run to the end or to an interruption, and store frames; returns what is to be told about it."""
     a, model = case.args, case.model
     loop = {"seconds": 0.0, "stopped": None}
@@ -151,10 +158,16 @@ def slide(case: SlopeCase, watch: Watch, history: History, files: Files, interru
         watch.keep(report.time, fields)
         progress.show(report.time, report.steps, crest=f"{crest:.4f} m")
 
+    def between_steps() -> bool:
+        checkpoints.save_when_due()
+        return interrupt.requested()
+
     with Progress("slide", a.time, comm) as progress:
         report = model.report()
+        done_before = report.particle_steps
         look(report)
-        run = model.explicit(a.time, every=a.time / a.frames, dt=a.dt, damping=a.damping, pic=a.pic, nmd=a.nmd)
+        run = model.explicit(a.time, every=a.time / a.frames, since=0.0, watch=between_steps,
+                             dt=a.dt, damping=a.damping, pic=a.pic, nmd=a.nmd)  # fmt: skip
         started = perf_counter()
         try:
             for report in run:
@@ -162,7 +175,8 @@ def slide(case: SlopeCase, watch: Watch, history: History, files: Files, interru
                 energy_scale = max(energy_scale, abs(report.external_work), report.kinetic_energy)
                 look(report)
                 if interrupt.requested():
-                    loop["stopped"] = f"interrupted at {report.time:g} s"
+                    checkpoints.save()
+                    loop["stopped"] = f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
                     break
                 started = perf_counter()
         except mpm.RunError as error:
@@ -170,7 +184,7 @@ def slide(case: SlopeCase, watch: Watch, history: History, files: Files, interru
             report = model.report()
     work = report.external_work + report.support_work - report.internal_work - report.damping_work
     loop["energy_balance_error"] = abs(work - report.kinetic_energy) / energy_scale if energy_scale else 0.0
-    return {**loop, "report": report}
+    return {**loop, "report": report, "particle_steps": report.particle_steps - done_before}
 
 
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
@@ -209,18 +223,25 @@ def main(arguments: list[str] | None = None) -> int:
     folder = results_folder("slope", a.output, comm)
     case = build_slope(a, comm)
     clock["mesh_and_particles"] = perf_counter()
-    ratio = initialise(case, a.initial, a.initial_unit_weight)
+    ratio = None
+    if a.restart is not None:
+        case.model.restore(a.restart)
+    else:
+        ratio = initialise(case, a.initial, a.initial_unit_weight)
     clock["initial_stress"] = perf_counter()
-    if comm.rank == 0:
+    if comm.rank == 0 and a.restart is not None:
+        print(f"going on from {a.restart} at {case.model.time:g} s")
+    elif comm.rank == 0:
         print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): out-of-balance ratio {ratio:.2e}")
 
     watch = Watch(case)
     with (
         Interrupt(comm) as interrupt,
-        History(folder / "history.csv", COLUMNS, comm) as history,
+        continued_history(folder / "history.csv", COLUMNS, case.model.time, comm) as history,
         Files(case, folder) as files,
     ):
-        loop = slide(case, watch, history, files, interrupt)
+        checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every)
+        loop = slide(case, watch, history, files, interrupt, checkpoints)
         clock["slide"] = perf_counter()
         draw(case, watch, history, folder)
         clock["pictures"] = perf_counter()
@@ -239,7 +260,7 @@ def main(arguments: list[str] | None = None) -> int:
         "crest_displacement_m": history["crest_displacement_m"][-1],
         "runout_m": history["runout_m"][-1],
         "energy_balance_error": loop["energy_balance_error"],
-        "particle_steps_per_second": report.particle_steps / loop["seconds"] if loop["seconds"] else 0.0,
+        "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }
     write_summary(folder, a, summary, comm)
@@ -259,9 +280,10 @@ def tell(summary: dict, folder: Path) -> None:
 
 
 if __name__ == "__main__":
+    end_all_on_error(comm)
     try:
         sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
+    except (mpm.InputError, mpm.RunError, OutputError) as error:
         if comm.rank == 0:
             print(f"studies/run slope: {error}", file=sys.stderr)
         sys.exit(2)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-NOT_PARAMETERS = ("help", "output", "parameters")
+NOT_PARAMETERS = ("help", "output", "parameters", "restart")
 """Options that say where things are, not what is computed; they do not belong into a file of parameters."""
 
 

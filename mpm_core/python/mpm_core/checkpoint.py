@@ -72,10 +72,11 @@ def _description(model: Model) -> dict[str, Any]:
 
 
 def _material(law: Any) -> str:
-    """A law with all its parameters as text that tells any two apart."""
-    names = [name for name, value in vars(type(law)).items() if isinstance(value, property)]
-    parameters = ", ".join(f"{name}={getattr(law, name)!r}" for name in sorted(names))
-    return f"{type(law).__name__}({parameters})"
+    """A law with all its parameters as text that tells any two apart; laws within laws too."""
+    names = sorted(name for name, value in vars(type(law)).items() if isinstance(value, property))
+    values = [getattr(law, name) for name in names]
+    texts = [_material(value) if isinstance(value, tuple(_core.law_types)) else repr(value) for value in values]
+    return f"{type(law).__name__}({', '.join(f'{name}={text}' for name, text in zip(names, texts, strict=True))})"
 
 
 def _take(model: Model, there: dict[str, Any]) -> None:

@@ -278,6 +278,11 @@ class Model:
         """Time [s]."""
         return self._core.time
 
+    @property
+    def steps(self) -> int:
+        """Steps since the model was made."""
+        return self._core.steps
+
     def critical_time_step(self) -> float:
         """Critical time step (16): smallest h_min / c_d over the particles [s]."""
         return self._core.critical_time_step()

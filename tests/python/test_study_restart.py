@@ -1,0 +1,112 @@
+"""The slope stopped and started again: what was written stays, and the end is the same."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[2] / "studies"
+SMALL = ["--initial", "zero", "--cell-size", "0.2", "--crest", "1.2", "--particles-per-cell", "3", "--frames", "6", "--time", "0.6"]
+
+
+def slope(folder, *options, ranks=1):
+    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(folder), *SMALL, *options]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", *command]
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env={**os.environ, **root})
+
+
+def history(folder):
+    with open(folder / "history.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def final_particles(path):
+    with h5py.File(path) as file:
+        last = file["frames"][str(max(map(int, file["frames"])))]
+        order = np.argsort(last["id"][()])
+        return {name: last[name][()][order] for name in ("id", "position", "velocity", "plastic_strain")}
+
+
+def test_a_restarted_slope_ends_as_the_one_that_never_stopped(tmp_path):
+    whole, halves = tmp_path / "whole", tmp_path / "halves"
+    assert slope(whole).returncode == 0
+    first = slope(halves, "--checkpoint-every", "40")
+    assert first.returncode == 0, first.stderr
+    second = slope(halves, "--restart", str(halves / "checkpoint.h5"))
+    assert second.returncode == 0, second.stderr
+    assert "going on from" in second.stdout
+    one, other = final_particles(whole / "particles.h5"), final_particles(halves / "particles-2.h5")
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name])
+    assert (halves / "particles.h5").exists()
+    assert history(whole)[-1] == history(halves)[-1]
+    assert history(whole)[0] == history(halves)[0]
+    times = [float(row["time_s"]) for row in history(halves)]
+    assert times == sorted(times) and len(times) >= len(history(whole))
+
+
+def test_a_restart_on_two_ranks(tmp_path):
+    # Without damping, which makes round-off grow.
+    assert slope(tmp_path / "a", "--damping", "0", "--checkpoint-every", "40").returncode == 0
+    result = slope(tmp_path / "b", "--damping", "0", "--restart", str(tmp_path / "a" / "checkpoint.h5"), ranks=2)
+    assert result.returncode == 0, result.stderr
+    one, other = final_particles(tmp_path / "a" / "particles.h5"), final_particles(tmp_path / "b" / "particles.h5")
+    np.testing.assert_array_equal(one["id"], other["id"])
+    for name in ("position", "velocity", "plastic_strain"):  # stored in single precision
+        np.testing.assert_allclose(one[name], other[name], rtol=0, atol=2e-7 * np.abs(one[name]).max())
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_an_interrupted_slope_leaves_a_checkpoint(tmp_path, number):
+    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "history.csv").exists() and child.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.3)
+    child.send_signal(number)
+    out, err = child.communicate(timeout=60)
+    assert child.returncode == 128 + number, err
+    assert "--restart" in err and (tmp_path / "checkpoint.h5").exists() and (tmp_path / "summary.json").exists()
+    result = slope(tmp_path, "--restart", str(tmp_path / "checkpoint.h5"), "--time", "1e-3")
+    assert result.returncode == 2 and "a time not before the present" in result.stderr
+
+
+def test_a_restart_from_something_else_is_refused_on_all_ranks(tmp_path):
+    assert slope(tmp_path / "a", "--checkpoint-every", "40").returncode == 0
+    checkpoint = str(tmp_path / "a" / "checkpoint.h5")
+    for options, message in [
+        (["--restart", checkpoint, "--cohesion", "2e3"], "is of another materials"),
+        (["--restart", checkpoint, "--crest", "1.4"], "is of another background mesh"),
+        (["--restart", str(tmp_path / "none.h5")], "No such file or directory"),
+    ]:
+        result = slope(tmp_path / "b", *options, ranks=2)
+        assert result.returncode == 2, result.stderr
+        assert message in result.stderr
+
+
+@pytest.mark.parametrize("value", ["0", "-5", "5 hours", "min", "0.5"])
+def test_bad_intervals_are_named(tmp_path, value):
+    result = slope(tmp_path, f"--checkpoint-every={value}")
+    assert result.returncode == 2
+    assert "expected a number of steps such as 500, or of minutes such as 5min" in result.stderr
+
+
+def test_an_error_that_nothing_catches_ends_all_ranks(tmp_path):
+    script = (
+        "import sys, time; from mpi4py import MPI; from studies.common.ranks import end_all_on_error\n"
+        "end_all_on_error()\nassert MPI.COMM_WORLD.rank == 0, 'this rank fails'\nMPI.COMM_WORLD.barrier()"
+    )
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    result = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", sys.executable, "-c", script],
+                            capture_output=True, text=True, timeout=60, env={**os.environ, **root})  # fmt: skip
+    assert result.returncode != 0
+    assert "error on rank 1" in result.stderr and "this rank fails" in result.stderr
