@@ -21,6 +21,7 @@ from common.interrupt import Interrupt
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
+from common.report import Movie, Report, save_report
 from common.ranks import end_all_on_error
 from common.slope_case import SlopeCase, add_slope_options, build_slope, initialise
 from common.summary import OutputError, results_folder, write_summary
@@ -100,12 +101,12 @@ class Watch:
     def keep(self, time: float, fields: dict[str, np.ndarray]) -> None:
         """Store a frame for the pictures, on the first rank. Collective."""
         shown = {
-            "position": fields["position"], "volume": fields["volume"],
+            "position": fields["position"], "volume": fields["volume"], "id": fields["id"],
             "displacement": np.linalg.norm(fields["displacement"], axis=1),
             # Plastic, because elastic oscillations during the long creep add up in the total.
             "shear_strain": fields["plastic_strain"], "vertical_stress": fields["stress"][:, 1],
         }  # fmt: skip
-        parts = comm.gather({name: values.astype(np.float32) for name, values in shown.items()})
+        parts = comm.gather({name: values if name == "id" else values.astype(np.float32) for name, values in shown.items()})
         if parts is not None:
             frame = {name: np.concatenate([part[name] for part in parts]) for name in shown}
             self.frames.append({"time": np.float64(time), **frame})
@@ -214,6 +215,36 @@ def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
     save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
 
 
+def write_page(case: SlopeCase, watch: Watch, history: History, folder: Path, summary: dict) -> None:
+    """The page ``report.html``, on the first rank."""
+    scene = case.scene()
+    if scene is None:
+        return
+    quantities = {"shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS}
+    captions = {
+        "figure_2_mesh": "Background mesh and particles at the start", "figure_3_displacement": "Total displacement at the end",
+        "figure_4_shear_strain": "Accumulated plastic shear strain at the end",
+        "figure_5_vertical_stress": "Vertical stress at the end", "figure_6_crest": "Displacement of the crest over time",
+    }  # fmt: skip
+    facts = {
+        "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",
+        "simulated": f"{summary['time_s']:.4g} s", "particles": f"{summary['particles']:,}",
+        "computing time": f"{summary['wall_seconds']['slide']:.3g} s",
+    }  # fmt: skip
+    save_report(folder / "report.html", Report(
+        title="A slope slides",
+        subtitle=f"{case.args.height:g} m high, inclined by {case.args.angle:g} degrees, unit weight "
+                 f"{case.args.unit_weight / 1e3:g} kN/m\u00b3. Initial stresses: {case.args.initial}; slide by the explicit "
+                 "material point method.",
+        facts=facts,
+        movies=[Movie("", scene, watch.frames, quantities)],
+        history=history,
+        figures={folder / f"{name}.png": caption for name, caption in captions.items()},
+        parameters=case.args.parameters(),
+        results={name: value for name, value in summary.items() if isinstance(value, (int, float))},
+    ))  # fmt: skip
+
+
 # --- 5. All together -------------------------------------------------------------------------------------------------
 
 
@@ -264,6 +295,7 @@ def main(arguments: list[str] | None = None) -> int:
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }
     write_summary(folder, a, summary, comm)
+    write_page(case, watch, history, folder, summary)
     if comm.rank == 0:
         tell(summary, folder)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)

@@ -1,0 +1,68 @@
+// Curves over time as small charts. A line in each shows the player's time; a click or a drag sets it.
+"use strict";
+
+const CHART = { width: 380, height: 190, left: 52, right: 10, top: 10, bottom: 36 };
+
+function svgElement(name, attributes, text) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text !== undefined) element.textContent = text;
+  return element;
+}
+
+class Curve {
+  constructor(curve, times, host, chooseTime) {
+    Object.assign(this, { curve, times });
+    const element = document.createElement("div");
+    element.className = "curve";
+    element.innerHTML = "<h3><span></span><output></output></h3>";
+    element.querySelector("span").textContent = withUnit(curve.name, curve.unit === "-" ? "" : `[${curve.unit}]`);
+    this.output = element.querySelector("output");
+    host.append(element);
+    const finite = curve.values.filter(Number.isFinite);
+    let low = Math.min(0, ...finite), high = Math.max(...finite, low);
+    if (!(high > low)) high = low + 1;
+    const end = times.at(-1) > times[0] ? times.at(-1) : times[0] + 1;
+    const { width, height, left, right, top, bottom } = CHART;
+    this.x = (t) => left + ((t - times[0]) / (end - times[0])) * (width - left - right);
+    this.y = (v) => height - bottom - ((v - low) / (1.05 * (high - low))) * (height - top - bottom);
+    this.svg = svgElement("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": curve.name });
+    this.grid(niceTicks(times[0], end, 6), niceTicks(low, high, 4));
+    const points = curve.values.map((v, k) => (Number.isFinite(v) ? `${this.x(times[k]).toFixed(1)},${this.y(v).toFixed(1)}` : "")).filter(Boolean);
+    this.svg.append(svgElement("polyline", { points: points.join(" "), fill: "none", stroke: "#0b559f", "stroke-width": 1.6, "stroke-linejoin": "round" }));
+    this.line = svgElement("line", { y1: top, y2: height - bottom, stroke: "#d8321e", "stroke-width": 1 });
+    this.dot = svgElement("circle", { r: 3.2, fill: "#d8321e", stroke: "#fff" });
+    this.svg.append(this.line, this.dot);
+    element.append(this.svg);
+    const choose = (event) => {
+      const box = this.svg.getBoundingClientRect(), px = ((event.clientX - box.left) * width) / box.width;
+      chooseTime(times[0] + ((px - left) / (width - left - right)) * (end - times[0]));
+    };
+    this.svg.onpointerdown = (event) => { this.svg.setPointerCapture(event.pointerId); choose(event); };
+    this.svg.onpointermove = (event) => { if (event.buttons) choose(event); };
+    this.show(times[0]);
+  }
+
+  grid(ticksX, ticksY) {
+    const { width, height, left, right, bottom } = CHART;
+    for (const t of ticksX) {
+      this.svg.append(svgElement("text", { x: this.x(t), y: height - bottom + 15, "text-anchor": "middle" }, shown(t)));
+    }
+    this.svg.append(svgElement("text", { x: (left + width - right) / 2, y: height - 4, "text-anchor": "middle" }, "Time [s]"));
+    for (const v of ticksY) {
+      this.svg.append(svgElement("line", { x1: left, x2: width - right, y1: this.y(v), y2: this.y(v), stroke: "#e3e7eb" }));
+      this.svg.append(svgElement("text", { x: left - 6, y: this.y(v) + 4, "text-anchor": "end" }, shown(v)));
+    }
+  }
+
+  show(time) {
+    let k = 0;
+    while (k < this.times.length - 1 && this.times[k + 1] <= time * (1 + 1e-9)) k++;
+    const value = this.curve.values[k];
+    this.line.setAttribute("x1", this.x(this.times[k]));
+    this.line.setAttribute("x2", this.x(this.times[k]));
+    this.dot.setAttribute("cx", this.x(this.times[k]));
+    this.dot.setAttribute("cy", Number.isFinite(value) ? this.y(value) : -10);
+    this.output.textContent = withUnit(shown(value), this.curve.unit);
+  }
+}
