@@ -1,0 +1,127 @@
+"""The implicit scheme against the explicit one: order in time, the slope with and without damping, and steps that fail."""
+
+import numpy as np
+import pytest
+from core_cases import box
+from implicit_cases import crest_displacement, slope
+
+import mpm_core as mpm
+from mpm_core import RunError
+
+
+H, WAVE_SPEED = 1.0, np.sqrt(1e6 / 1000.0)
+
+
+def vibrating_column():
+    """An elastic column in its lowest mode, with the period 4 H / c; particles do not leave their cells."""
+    model = mpm.Model(box([1, 10], [0.1, H]), mpm.LinearElastic(young=1e6, poisson=0.0))
+    model.seed(density=1000.0, per_cell=6)
+    for tag in (1, 2):
+        model.roller(tag, (1, 0))
+    model.fix(3)
+    x = model.particles.position
+    model.particles.set("velocity", np.c_[np.zeros(len(x)), 1e-3 * np.sin(0.5 * np.pi * x[:, 1] / H)])
+    return model
+
+
+def test_converges_to_the_explicit_result_at_first_order():
+    until = 0.7 * H / WAVE_SPEED
+    reference = vibrating_column()
+    list(reference.explicit(until, courant=0.01))
+    expected = reference.particles.displacement
+    errors = []
+    for steps in (40, 80, 160):
+        model = vibrating_column()
+        list(model.implicit(until, dt=until / steps))
+        errors.append(np.abs(model.particles.displacement - expected).max())
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (order > 0.85).all() and (order < 1.15).all(), errors
+
+
+def test_damping_is_that_of_the_explicit_scheme_where_steps_are_small():
+    until = 3.0 * H / WAVE_SPEED
+    reference, model = vibrating_column(), vibrating_column()
+    dt = 0.05 * reference.critical_time_step()
+    list(reference.explicit(until, dt=dt, damping=0.5))
+    list(model.implicit(until, dt=dt, damping=0.5))
+    amplitude = 1e-3 * 2 * H / (np.pi * WAVE_SPEED)  # without damping
+    difference = np.abs(model.particles.displacement - reference.particles.displacement).max()
+    assert np.abs(reference.particles.displacement).max() < 0.6 * amplitude
+    assert difference < 0.03 * amplitude
+
+
+def test_undamped_slope_comes_to_the_explicit_place():
+    """An independent explicit code gives 0.68 to 0.69 m at the crest after 2 s and 0.65 m implicitly with steps of 0.1 s."""
+    model = slope()
+    *_, report = model.implicit(2.0, dt=0.1)
+    assert crest_displacement(model) == pytest.approx(0.65, abs=0.02)
+    assert report.kinetic_energy < 0.01 * report.external_work
+
+
+@pytest.mark.parametrize("solver", [mpm.Newton(), mpm.Relaxation(tolerance=1e-6)], ids=["newton", "relaxation"])
+def test_damped_slope_comes_to_rest_where_the_explicit_one_does(solver):
+    """At steps of 24 critical ones. On the way the curves part: in the explicit run, damping acts on elastic oscillations,
+    too, which hold the slide back for 60 s; large steps have none."""
+    explicit, model = slope(), slope()
+    *_, at_rest = explicit.explicit(75.0, damping=0.75, pic=0.1)
+    assert at_rest.kinetic_energy < 1e-2
+    dt = 0.2
+    assert dt > 20 * model.critical_time_step()
+    *_, report = model.implicit(20.0, dt=dt, damping=0.75, pic=0.1, solver=solver)
+    assert report.kinetic_energy < 1e-3
+    assert crest_displacement(model) == pytest.approx(crest_displacement(explicit), rel=0.1)
+
+
+def test_a_step_that_fails_is_cut_and_leaves_the_particles_as_they_were():
+    """No quasi-static slope carries 3.5 times its collapse load."""
+    model = slope(0.2)
+    before = {name: getattr(model.particles, name) for name in ("id", "position", "velocity", "stress", "volume", "state")}
+    with pytest.raises(RunError, match="failed with all lengths from 1 s down to 0.000977 s"):
+        list(model.implicit(1.0, dt=1.0, quasi_static=True, solver=mpm.Newton(max_iterations=8)))
+    assert model.time == 0
+    order = np.argsort(model.particles.id)
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(model.particles, name)[order], values[np.argsort(before["id"])])
+
+
+def test_a_particle_that_would_leave_is_put_back():
+    model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e4, poisson=0.2))
+    model.seed_points([[0.5, 0.4]], [1e-3], density=1000.0)
+    model.particles.set("velocity", [[1.0, 0.0]])
+    with pytest.raises(RunError, match="left the background mesh"):
+        list(model.implicit(10.0, dt=1.0))
+    assert model.particles.position[0, 0] > 0.99
+    assert len(model.particles) == 1
+
+
+def test_equilibrate_balances_loads_without_spending_time():
+    model = mpm.Model(box([4, 4]), mpm.LinearElastic(young=1e7, poisson=0.3))
+    model.seed(density=1000.0, per_cell=10)
+    for tag in (1, 2):
+        model.roller(tag, (1, 0))
+    model.fix(3)
+    model.set_gravity((0, -10.0))
+    model.particles.set("velocity", np.full((len(model.particles), 2), 1e-3))
+    assert model.out_of_balance() > 0.5
+    report = model.equilibrate(tolerance=1e-8)
+    assert report.unbalanced_ratio < 1e-8
+    assert report.time == 0 and report.kinetic_energy == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"dt": 0.0}, "dt is 0.0 s"),
+        ({"dt": 0.1, "damping": 1.0}, "damping is 1.0"),
+        ({"dt": 0.1, "every": -1.0}, "every is -1.0"),
+        ({"dt": 0.1, "pic": 2.0}, "pic is 2.0"),
+    ],
+)
+def test_bad_input_is_named(options, message):
+    with pytest.raises(mpm.InputError, match=message):
+        vibrating_column().implicit(1.0, **options)
+
+
+def test_bad_ghost_penalty_is_named():
+    with pytest.raises(mpm.InputError, match="filled is 2.0"):
+        mpm.GhostPenalty(filled=2.0)
