@@ -97,12 +97,13 @@ void bind_python_law(py::module_& m)
   bind_law<ExternalLaw>(m, "PythonLaw", R"(A law written in Python on NumPy arrays, for trying ideas.
 
 Args:
-    law: an object with
-        n_state: number of state variables, at least 1; the first is the accumulated plastic deviatoric strain.
-        p_wave_modulus: modulus of the compression wave [Pa], for the critical time step.
-        update(strain_increment, stress, state, tangent): updates in place, as the method `update` of any law;
-            tangent is None in the explicit scheme.
-        state_names: names of the state variables, optional.
+    law: an object with these members.
+
+        - n_state: number of state variables, at least 1; the first is the accumulated plastic deviatoric strain.
+        - p_wave_modulus: modulus of the compression wave [Pa], for the critical time step.
+        - update(strain_increment, stress, state, tangent): updates in place, as the method `update` of any law;
+          tangent is None in the explicit scheme.
+        - state_names: names of the state variables, optional.
 
 An exception in update is printed, and counts as a failure of its points; so does a value that is not finite.)")
       .def(py::init(&python_law), py::arg("law"));
