@@ -64,7 +64,7 @@ def tangent(step, dim):
 SLOPE_SOIL = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
 
 
-def slope(h=0.1, weight=80e3, per_cell=10):
+def slope(h=0.1, weight=80e3, per_cell=10, law=SLOPE_SOIL):
     """The slope of the paper's section 6: height 1 m, 45 degrees, squares of side h cut in four by their diagonals."""
     nx, ny = round(4.1 / h), round(1.0 / h)
     corner = np.stack(np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"), -1).reshape(-1, 2) * h
@@ -83,7 +83,7 @@ def slope(h=0.1, weight=80e3, per_cell=10):
         facets=np.concatenate(sides),
         facet_tags=np.repeat([1, 2], [len(s) for s in sides]).astype(np.int32),
     )
-    model = mpm.Model(mesh, SLOPE_SOIL)
+    model = mpm.Model(mesh, law)
     model.seed(density=weight / 9.81, per_cell=per_cell, cell_tag=1)
     model.roller(1, (1, 0))
     model.fix(2)
