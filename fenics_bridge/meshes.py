@@ -12,6 +12,7 @@ import gmsh
 import numpy as np
 
 from fenics_bridge.errors import InputError, agree, on_root
+from fenics_bridge.mesh_checks import check_cells_fit
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 _SIMPLEX = {2: "triangles", 3: "tetrahedra"}
@@ -51,6 +52,7 @@ def gmsh_session():
 def arrays_from_model(dim, name):
     """MeshArrays of gmsh's current model; `name` stands for the model in error messages."""
     cells, cell_values = _entities(dim, name)
+    check_cells_fit(cells, name)
     facets, facet_values = _entities(dim - 1, name, only_groups=True)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     points = coordinates.reshape(-1, 3)
