@@ -19,6 +19,7 @@ from common.checkpoint import Checkpoints, add_checkpoint_options, continued_his
 from common.history import History
 from common.interrupt import Interrupt
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
+from common.output_options import add_output_options
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
 from common.report import Movie, Report, save_report
@@ -32,6 +33,9 @@ comm = MPI.COMM_WORLD
 COLUMNS = [
     "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unbalanced_ratio", "plastic_share", "dt_s"
 ]  # fmt: skip
+FIELDS = (
+    "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
+)  # fmt: skip
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -49,6 +53,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
+    add_output_options(p, FIELDS)
     add_checkpoint_options(p)
     add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p
@@ -122,13 +127,17 @@ class Files:
         self.model, mesh = case.model, case.model.mesh
         restarted = case.args.restart is not None
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
-        self.particles = ParticleOutput(particles, comm)
-        self.mesh = MeshOutput(background, comm, mesh.points, mesh.cells[: mesh.owned_cells])
+        a = case.args
+        self.names = ["position", *a.fields.split(",")]
+        self.particles = ParticleOutput(particles, comm, not a.float64, a.compression)
+        self.mesh = MeshOutput(
+            background, comm, mesh.points, mesh.cells[: mesh.owned_cells], not a.float64, a.compression
+        )
         self.tags = mesh.cell_tags[: mesh.owned_cells]
 
     def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
         """Add a frame. Collective."""
-        self.particles.write(time, fields)
+        self.particles.write(time, {name: fields[name] for name in self.names})
         nodes = {name: self.model.nodal(name) for name in ("mass", "velocity", "internal_force")}
         self.mesh.write(time, nodes, {"tag": self.tags})
 

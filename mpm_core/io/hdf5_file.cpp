@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -119,8 +120,17 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
     H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, count, nullptr);
   else
     H5Sselect_none(in_file);
-  const hid_t dataset =
-      H5Dcreate2(_file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+  if (_compression > 0 && rows.total > 0)
+  {
+    // Deflate works on chunks; of this size HDF5's own tables stay small.
+    const hsize_t chunk[2] = {std::min<hsize_t>(shape[0], 1 << 16), columns};
+    H5Pset_chunk(creation, rank, chunk);
+    H5Pset_shuffle(creation);
+    H5Pset_deflate(creation, static_cast<unsigned>(_compression));
+  }
+  const hid_t dataset = H5Dcreate2(_file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT, creation, H5P_DEFAULT);
+  H5Pclose(creation);
   note(dataset >= 0, "write");
   const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
   H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);

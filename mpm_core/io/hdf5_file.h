@@ -37,6 +37,9 @@ public:
   Hdf5File(const Hdf5File&) = delete;
   Hdf5File& operator=(const Hdf5File&) = delete;
 
+  /// Arrays that are written from now on are compressed by deflate, level 1 to 9; 0 stores them as they are.
+  void set_compression(int level) { _compression = level; }
+
   void create_group(const std::string& name);
 
   /// Writes a whole array, each rank its rows.
@@ -71,6 +74,7 @@ private:
   std::filesystem::path _path;
   std::int64_t _file = -1;    ///< hid_t, which is not named here so that only sources of this folder see HDF5
   std::string _failure;       ///< what failed first on this rank; empty if nothing did
+  int _compression = 0;
   std::int64_t _reserved = 0; ///< bytes that the file may have come to need
 };
 } // namespace mpm

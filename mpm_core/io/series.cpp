@@ -89,10 +89,11 @@ void require_frame(MPI_Comm comm, double time, std::string error, const std::vec
 }
 } // namespace
 
-SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Precision precision)
+SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage)
     : _file(comm, with_suffix(path, ".h5")), _xdmf_path(with_suffix(path, ".xdmf")), _grid(std::move(grid)),
-      _precision(precision)
+      _storage(storage)
 {
+  _file.set_compression(storage.compression);
   replace_xdmf(xdmf_series(_grid, ""));
   _file.create_group("/frames");
 }
@@ -107,7 +108,7 @@ XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, 
                                  std::span<const double> values)
 {
   const std::string dataset = _group + "/" + name;
-  const bool single = _precision == Precision::float32;
+  const bool single = _storage.precision == Precision::float32;
   if (single)
   {
     // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
@@ -189,8 +190,8 @@ void SeriesFile::replace_xdmf(const std::string& text)
     throw RunError(failure);
 }
 
-ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision)
-    : _series(comm, path, "particles", precision)
+ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage)
+    : _series(comm, path, "particles", storage)
 {
 }
 
@@ -219,9 +220,9 @@ XdmfData ParticleSeries::write_vertices(const RowSlice& rows)
   return _series.write_integers("vertices", rows, 1, numbers);
 }
 
-MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision, int dimension,
+MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
                        std::span<const double> points, std::span<const std::int64_t> cells)
-    : _series(comm, path, "mesh", precision),
+    : _series(comm, path, "mesh", storage),
       _nodes(row_slice(comm, points.size() / static_cast<std::size_t>(dimension))),
       _cells(row_slice(comm, cells.size() / static_cast<std::size_t>(dimension + 1)))
 {

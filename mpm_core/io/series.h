@@ -30,6 +30,13 @@ enum class Precision
   float64
 };
 
+/// How values are stored.
+struct Storage
+{
+  Precision precision = Precision::float32;
+  int compression = 0; ///< level of deflate, 0 (none) to 9
+};
+
 /// The files PATH.h5 and PATH.xdmf of one series. ParaView, VTK and meshio open the XDMF file, also while the run goes
 /// on and after it was killed: each frame is in the HDF5 file before the XDMF file names it.
 ///
@@ -43,7 +50,7 @@ public:
   /// @param path  without suffix, or with .h5 or .xdmf; the folder must exist
   /// @param grid  name of the grid in the XDMF file
   /// @throws RunError if the files cannot be written, with path and reason
-  SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Precision precision);
+  SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage);
 
   /// Starts the group of a frame.
   void begin_frame();
@@ -76,7 +83,7 @@ private:
   Hdf5File _file;
   std::filesystem::path _xdmf_path;
   std::string _grid;
-  Precision _precision;
+  Storage _storage;
   std::string _group; ///< group that datasets go into, without trailing slash
   int _n_frames = 0;
   std::string _frames;          ///< XDMF of the frames so far
@@ -88,7 +95,7 @@ private:
 class ParticleSeries
 {
 public:
-  ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision);
+  ParticleSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage);
 
   /// Writes a frame.
   /// @param time        s, finite
@@ -117,7 +124,7 @@ public:
   /// @param points     (n, dimension) nodes of this rank's cells; m. A node that several ranks give appears once for
   /// each.
   /// @param cells      (m, dimension + 1) rows of `points`, this rank's own cells only
-  MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Precision precision, int dimension,
+  MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
              std::span<const double> points, std::span<const std::int64_t> cells);
 
   /// Writes a frame of fields on the nodes and cells given at the start.

@@ -14,7 +14,10 @@ using IntegerArray = py::array_t<std::int64_t, py::array::c_style>;
 using RealFields = std::vector<std::pair<std::string, RealArray>>;
 using IntegerFields = std::vector<std::pair<std::string, IntegerArray>>;
 
-Precision precision(bool float32) { return float32 ? Precision::float32 : Precision::float64; }
+Storage storage(bool float32, int compression)
+{
+  return {float32 ? Precision::float32 : Precision::float64, compression};
+}
 
 /// Components per row: 1 for shape (n,), k for (n, k).
 int width(const py::array& array) { return array.ndim() < 2 ? 1 : static_cast<int>(array.shape(1)); }
@@ -39,9 +42,9 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 void bind_io(py::module_& m)
 {
   py::class_<ParticleSeries>(m, "ParticleSeries")
-      .def(py::init([](std::uintptr_t comm, const std::string& path, bool float32)
-                    { return std::make_unique<ParticleSeries>(communicator(comm), path, precision(float32)); }),
-           py::arg("comm"), py::arg("path"), py::arg("float32"))
+      .def(py::init([](std::uintptr_t comm, const std::string& path, bool float32, int compression)
+                    { return std::make_unique<ParticleSeries>(communicator(comm), path, storage(float32, compression)); }),
+           py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"))
       .def(
           "write",
           [](ParticleSeries& series, double time, const RealArray& position, const RealFields& fields,
@@ -54,13 +57,13 @@ void bind_io(py::module_& m)
 
   py::class_<MeshSeries>(m, "MeshSeries")
       .def(py::init(
-               [](std::uintptr_t comm, const std::string& path, bool float32, const RealArray& points,
+               [](std::uintptr_t comm, const std::string& path, bool float32, int compression, const RealArray& points,
                   const IntegerArray& cells)
                {
-                 return std::make_unique<MeshSeries>(communicator(comm), path, precision(float32), width(points),
+                 return std::make_unique<MeshSeries>(communicator(comm), path, storage(float32, compression), width(points),
                                                      values<double>(points), values<std::int64_t>(cells));
                }),
-           py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("points"), py::arg("cells"))
+           py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"), py::arg("points"), py::arg("cells"))
       .def(
           "write",
           [](MeshSeries& series, double time, const RealFields& node_fields, const RealFields& cell_fields)

@@ -24,6 +24,28 @@ def test_shares_are_stored_by_rising_rank(comm, shared_path):
             np.testing.assert_array_equal(file[f"frames/{step}/id"][()], numbers)
 
 
+@pytest.mark.parametrize("compression", [1, 9])
+def test_compressed_values_come_back(comm, shared_path, compression):
+    # Rank r has 100 r particles, so the first has none.
+    n = 100 * comm.rank
+    position = np.random.default_rng(comm.rank).random((n, 3))
+    whole = np.concatenate(comm.allgather(position))
+    for name, level in (("plain", 0), ("small", compression)):
+        with ParticleOutput(shared_path / name, comm, float32=False, compression=level) as output:
+            output.write(0.0, {"position": position, "mass": np.ones(n)})
+            output.write(1.0, {"position": position[:0], "mass": np.ones(0)})
+    with h5py.File(shared_path / "small.h5") as file:
+        np.testing.assert_array_equal(file["frames/0/position"][()], whole)
+        if len(whole):
+            assert file["frames/0/mass"].compression == "gzip" and file["frames/0/mass"].id.get_storage_size() < 4 * len(whole)
+    assert (shared_path / "plain.xdmf").read_text().replace("plain", "small") == (shared_path / "small.xdmf").read_text()
+
+
+def test_a_wrong_level_of_compression_is_named(comm, shared_path):
+    with pytest.raises(InputError, match="compression is 10, expected a whole number from 0 to 9"):
+        ParticleOutput(shared_path / "particles", comm, compression=10)
+
+
 def test_mesh_cells_keep_their_nodes(comm, shared_path):
     # Each rank gives one triangle, moved by its rank along x.
     points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) + [comm.rank, 0.0]

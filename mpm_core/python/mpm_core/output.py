@@ -34,6 +34,7 @@ class ParticleOutput:
         path: of the files, without suffix; the folder must exist. Files of that name are replaced.
         comm: communicator whose ranks write together; must not be freed before the output is closed.
         float32: store real numbers in single precision; in double precision if false.
+        compression: level of deflate, 1 to 9; 0 stores values as they are.
 
     Raises:
         RunError: on all ranks, with path and reason, when the files cannot be written (missing folder, no permission,
@@ -43,9 +44,11 @@ class ParticleOutput:
         Collective: construction, ``write`` and ``close`` are called by all ranks.
     """
 
-    def __init__(self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True) -> None:
+    def __init__(
+        self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
+    ) -> None:
         self._comm = comm
-        self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32)
+        self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression))
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
         """Write one frame, which is on disk when this returns.
@@ -86,6 +89,7 @@ class MeshOutput:
         points: (n, 2) or (n, 3), nodes of this rank's cells, m. A node that several ranks give is stored once for each.
         cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
         float32: store real numbers in single precision; in double precision if false.
+        compression: level of deflate, 1 to 9; 0 stores values as they are.
 
     Raises:
         InputError: ``points`` or ``cells`` have a wrong shape, or a cell names a point that is not there.
@@ -102,10 +106,11 @@ class MeshOutput:
         points: np.ndarray,
         cells: np.ndarray,
         float32: bool = True,
+        compression: int = 0,
     ) -> None:
         self._comm = comm
         points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
-        self._series = _core.MeshSeries(MPI._addressof(comm), os.fspath(path), float32, points, cells)
+        self._series = _core.MeshSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells)
 
     def write(
         self,
@@ -138,6 +143,12 @@ class MeshOutput:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _level(compression: int) -> int:
+    if compression not in range(10):
+        raise InputError(f"compression is {compression}, expected a whole number from 0 to 9")
+    return int(compression)
 
 
 def _numeric(name: str, values: np.ndarray) -> np.ndarray:
