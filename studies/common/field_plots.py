@@ -1,0 +1,277 @@
+"""Pictures of finite elements: curves over load, convergence over mesh size, mechanisms, fields side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import fenics_bridge as bridge
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, boundary_edges, colour_limits, discs, paper_style
+
+INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
+INCREMENT_SHEAR = Quantity("Shear strain increment at collapse, relative", "-", colours="inferno")
+LINE = "#00a8e8"
+
+
+@dataclass
+class Field:
+    """A nodal quantity on triangles, on the first rank.
+
+    points: (n, 2) [m]; cells: (m, 3) rows of points; values: (n, k)
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    values: np.ndarray
+
+    @property
+    def outline(self) -> np.ndarray:
+        """Segments (k, 2, 2) of the body's boundary."""
+        return self.points[boundary_edges(self.cells)]
+
+    def shear(self) -> np.ndarray:
+        """Shear strain of a displacement in each triangle, sqrt((exx - eyy)^2 + gxy^2): (m,)."""
+        corners, moved = self.points[self.cells], self.values[self.cells]
+        edges = corners[:, 1:] - corners[:, :1]
+        gradient = np.linalg.solve(edges, moved[:, 1:] - moved[:, :1])  # [cell, along, component]
+        shear = gradient[:, 0, 1] + gradient[:, 1, 0]
+        return np.hypot(gradient[:, 0, 0] - gradient[:, 1, 1], shear)
+
+    def exceeded_in(self, share: float, values: np.ndarray) -> float:
+        """Value in triangles that is exceeded in a share of the area; above it are single cells at singular corners."""
+        corners = self.points[self.cells]
+        area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+        order = np.argsort(values)
+        return values[order][np.searchsorted(np.cumsum(area[order]), (1 - share) * area.sum())]
+
+
+def gathered(function: object) -> Field | None:
+    """A continuous function of DOLFINx at the corners of all cells; None but on the first rank. Collective."""
+    comm = function.function_space.mesh.comm
+    mesh = bridge.background_arrays(function.function_space.mesh)
+    values = bridge.evaluate_at(mesh["points"], value=function)["value"]
+    own = mesh["cells"][mesh["cell_owners"] == comm.rank]
+    parts = comm.gather((mesh["points"][own].reshape(-1, 2), values[own].reshape(3 * len(own), -1)))
+    if parts is None:
+        return None
+    corners, at_corners = (np.concatenate(arrays) for arrays in zip(*parts))
+    points, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    return Field(points, number.reshape(-1, 3), at_corners[first])
+
+
+# --- curves ----------------------------------------------------------------------------------------------------------
+
+
+def save_curves(
+    path: Path,
+    curves: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    labels: tuple[str, str],
+    *,
+    reference: tuple[float, str] | None = None,
+    limits: tuple[tuple[float, float | None], tuple[float, float | None]] = ((0, None), (0, None)),
+    per_colour: int = 1,
+) -> None:
+    """Draw curves, such as a load over displacement, with each computed point.
+
+    Args:
+        curves: (horizontal, vertical) values by name, as shown.
+        labels: of the axes, with units.
+        reference: a level and its name, drawn dashed.
+        limits: of the axes; None to fit.
+        per_colour: curves that follow one another in one colour, each with a line of its own.
+    """
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
+        for k, (name, (x, y)) in enumerate(curves.items()):
+            axes.plot(x, y, ("o-", "s:")[k % per_colour], color=CURVES[k // per_colour % len(CURVES)], markersize=2.5,
+                      linewidth=1.1, label=name)  # fmt: skip
+        if reference:
+            axes.axhline(reference[0], color="black", linestyle="--", linewidth=0.9, label=reference[1])
+        _finish(axes, labels, limits)
+        _save(figure, path)
+
+
+def save_convergence(
+    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, reference: tuple[float, str] | None
+) -> None:
+    """Draw results over the mesh size.
+
+    Args:
+        sizes: of the cells [m].
+        curves: one value for each size, by name, as shown; NaN where there is none.
+        label: of the vertical axis, with unit.
+        reference: a level and its name, drawn dashed.
+    """
+    every = [value for curve in curves.values() for value in curve] + ([reference[0]] if reference else [])
+    low, high = np.nanmin(every), np.nanmax(every)
+    margin = 0.12 * (high - low) or 0.05 * abs(high)
+    curves = {name: (np.asarray(sizes), np.asarray(values)) for name, values in curves.items()}
+    save_curves(path, curves, ("Cell size [m]", label), reference=reference,
+                limits=((0, 1.08 * max(sizes)), (low - margin, high + margin)))  # fmt: skip
+
+
+def save_log_log(
+    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, slope: float = 1.0
+) -> None:
+    """Draw differences over the mesh size in logarithmic axes, with a line of the given slope to compare with."""
+    sizes = np.asarray(sizes)
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
+        for k, (name, values) in enumerate(curves.items()):
+            axes.loglog(sizes, values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
+        lowest = np.nanmin([value for values in curves.values() for value in values])
+        axes.loglog(sizes, 0.8 * lowest * (sizes / sizes.min()) ** slope, "--", color="black", linewidth=0.9,
+                    label=f"slope {slope:g}")  # fmt: skip
+        axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+        axes.minorticks_off()
+        axes.set_xlabel("Cell size [m]")
+        axes.set_ylabel(label)
+        axes.tick_params(top=True, right=True, which="both")
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(fontsize=8)
+        _save(figure, path)
+
+
+def bend(curves: Sequence[np.ndarray], share: float = 0.8) -> float:
+    """End of the axis that shows how load-displacement curves bend; what follows at hardly any more load is cut off.
+
+    curves: (k, 2) load and displacement, each with the load rising; share: of a curve's last load, where it still is steep
+    """
+    return 3.0 * max(np.interp(share * curve[-1, 0], *curve.T) for curve in curves)
+
+
+def _finish(axes: Axes, labels: tuple[str, str], limits: tuple) -> None:
+    axes.set_xlabel(labels[0])
+    axes.set_ylabel(labels[1])
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])
+    axes.tick_params(top=True, right=True)
+    axes.grid(linewidth=0.3, color="#d0d0d0")
+    axes.legend(fontsize=8, loc="best")
+
+
+# --- fields ----------------------------------------------------------------------------------------------------------
+
+
+def save_mechanism(
+    path: Path, field: Field, title: str, *, line: np.ndarray | None = None, line_name: str = "",
+    box: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> None:
+    """Draw a displacement increment: its length with arrows, and below it its shear strain.
+
+    Args:
+        field: the increment, in any unit.
+        line: (k, 2) [m] drawn over both, such as the slip line of limit analysis.
+        line_name: for the legend.
+        box: (lower, upper) corner of what is shown; all by default.
+    """
+    lengths, shear = np.linalg.norm(field.values, axis=1), field.shear()
+    lower, upper = (np.array(corner) for corner in box or (field.points.min(axis=0), field.points.max(axis=0)))
+    with paper_style():
+        figure, panels = _panels(lower, upper, 2)
+        for (axes, bar), quantity in zip(panels, (INCREMENT, INCREMENT_SHEAR)):
+            axes.add_collection(LineCollection(field.outline, colors="black", linewidths=0.8, zorder=3))
+            is_shear = quantity is INCREMENT_SHEAR
+            top = field.exceeded_in(0.02, shear) if is_shear else lengths.max()
+            shown = {"facecolors": shear / top} if is_shear else {"shading": "gouraud"}
+            values = () if is_shear else (lengths / top,)
+            axes.tripcolor(*field.points.T, field.cells, *values, cmap=quantity.colours, vmin=0, vmax=1, rasterized=True,
+                           **shown)  # fmt: skip
+            if line is not None:
+                axes.plot(*line.T, "--", color=LINE, linewidth=1.4, label=line_name)
+            _bar(figure, bar, quantity, (0.0, 1.0), "max" if is_shear else "neither")
+        _arrows(panels[0][0], field, lower, upper)
+        panels[0][0].set_title(title, loc="left", pad=4)
+        if line is not None:
+            panels[1][0].legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), fontsize=9)
+        _save(figure, path)
+
+
+def _arrows(axes: Axes, field: Field, lower: np.ndarray, upper: np.ndarray) -> None:
+    """Arrows at about 20 x 20 places, at nodes that are nearest to them."""
+    spacing = (upper - lower).max() / 22
+    inside = np.flatnonzero(np.all((field.points >= lower) & (field.points <= upper), axis=1))
+    raster = np.rint(field.points[inside] / spacing)
+    distance = np.linalg.norm(field.points[inside] - spacing * raster, axis=1)
+    order = np.argsort(distance)
+    _, first = np.unique(raster[order], axis=0, return_index=True)
+    nodes = inside[order[first]]
+    lengths = np.linalg.norm(field.values, axis=1)
+    nodes = nodes[lengths[nodes] > 0.06 * lengths.max()]
+    scale = lengths.max() / (1.3 * spacing)
+    axes.quiver(*field.points[nodes].T, *field.values[nodes].T, color="white", angles="xy", scale_units="xy", scale=scale,
+                width=0.0022, zorder=4)  # fmt: skip
+
+
+def save_side_by_side(
+    path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray, panels: Mapping[str, np.ndarray], quantity: Quantity,
+    title: str,
+) -> None:
+    """Draw several quantities of the same material points one below the other, in one colour scale from zero.
+
+    Args:
+        position: (n, 2) [m], where the points are drawn; volume: (n,) [m^3 per metre].
+        panels: values (n,) in SI units by the name of the panel.
+    """
+    limits = colour_limits(quantity, panels.values())
+    lower, upper = scene.limits([])
+    each = 0.46 * WIDTH
+    height = each * (upper[1] - lower[1]) / (upper[0] - lower[0])
+    with paper_style():
+        figure = plt.figure(figsize=(WIDTH, 2 * height + 1.0), layout="constrained")
+        grid = figure.subplots(2, 2).ravel()
+        for axes in grid[len(panels):]:
+            axes.set_axis_off()
+        for axes, (name, values) in zip(grid, panels.items()):
+            axes.set_aspect("equal")
+            axes.set_xlim(lower[0], upper[0])
+            axes.set_ylim(lower[1], upper[1])
+            axes.add_collection(LineCollection(scene.initial_outline, colors="black", linewidths=0.6, zorder=3))
+            collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0,
+                               rasterized=True)  # fmt: skip
+            collection.set_array(quantity.scale * values)
+            axes.set_title(name, loc="left", pad=4)
+            axes.set_xlabel("$x$ [m]", labelpad=1)
+            axes.set_ylabel("$y$ [m]", labelpad=1)
+        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=grid[-1], location="top",
+                              ticks=ROUND_TICKS, shrink=0.9, aspect=24, extend="max")  # fmt: skip
+        bar.set_label(quantity.label)
+        figure.suptitle(title, fontsize=10)
+        _save(figure, path)
+
+
+def _panels(lower: np.ndarray, upper: np.ndarray, count: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
+    """Equal axes side by side, each with room for a horizontal colour bar below: (axes, bar axes) of each."""
+    margin = 0.03 * (upper - lower).max()
+    each = (WIDTH - 0.25) / count - 0.35
+    height = float(np.clip(each * (upper[1] - lower[1] + 2 * margin) / (upper[0] - lower[0] + 2 * margin), 0.8, 6.0))
+    figure = plt.figure(figsize=(WIDTH, height + 1.3), layout="constrained")
+    grid = figure.subplots(2, count, height_ratios=[1, 0.04], squeeze=False)
+    for axes in grid[0]:
+        axes.set_aspect("equal")
+        axes.set_xlim(lower[0] - margin, upper[0] + margin)
+        axes.set_ylim(lower[1] - margin, upper[1] + margin)
+        axes.set_xlabel("$x$ [m]", labelpad=1)
+    grid[0][0].set_ylabel("$y$ [m]")
+    return figure, list(zip(grid[0], grid[1]))
+
+
+def _bar(figure: Figure, axes: Axes, quantity: Quantity, limits: tuple[float, float], extend: str) -> None:
+    bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), cax=axes, orientation="horizontal",
+                          extend=extend)  # fmt: skip
+    bar.set_label(quantity.label, labelpad=2, fontsize=8)
+    bar.outline.set_linewidth(0.5)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
+    plt.close(figure)

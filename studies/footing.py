@@ -1,0 +1,186 @@
+"""Bearing capacity of a strip footing on weightless ground, by elasto-plastic FEM against Prandtl's solution.
+
+Half of a smooth, flexible strip: a uniform pressure is raised until no equilibrium is found any more, on several meshes.
+Pressure at collapse = cohesion x Nc; with associated flow (the default) Nc converges from above to that of Prandtl.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+import numpy as np
+from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from common.options import add_choice, add_count, add_number, check, study_parser
+from common.ranks import end_all_on_error
+from common.slope_case import soil_of
+from common.slope_fem import step_line
+from common.summary import ROOT, OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+AXIS, BASE, FAR, FOOTING = 1, 2, 3, 5
+"""Facet tags of meshes/footing.geo."""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_number(p, "--friction-angle", 0.0, "degrees", "friction angle", at_least=0, below=45)
+    add_number(p, "--dilation-angle", None, "degrees",
+               "dilation angle, at most the friction angle (default: that one, associated flow)", at_least=0)  # fmt: skip
+    add_number(p, "--cohesion", 1e3, "Pa", "cohesion", above=0)
+    add_number(p, "--young", 100e3, "Pa", "Young's modulus", above=0)
+    add_number(p, "--poisson", 0.3, "-", "Poisson's ratio", above=-1, below=0.5)
+    add_number(p, "--half-width", 0.5, "m", "half of the footing's width", above=0)
+    add_number(p, "--cell-size", 0.05, "m", "triangles below the footing; a fifth of it at its edge, more far away", above=0)
+    add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
+    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    if options.dilation_angle is None:
+        options.dilation_angle = options.friction_angle
+    check(p, options.dilation_angle <= options.friction_angle,
+          lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, "
+                  f"{options.friction_angle:g} degrees")  # fmt: skip
+    check(p, options.cell_size <= options.half_width,
+          lambda: f"--cell-size is {options.cell_size:g}, expected at most --half-width")  # fmt: skip
+    return options
+
+
+# --- 2. Prandtl ------------------------------------------------------------------------------------------------------
+
+
+def prandtl_factor(friction_angle: float) -> float:
+    """Nc of weightless ground (Prandtl 1921): (Nq - 1) cot(phi), Nq = exp(pi tan(phi)) tan^2(45 + phi/2); 2 + pi for 0."""
+    if friction_angle == 0:
+        return 2 + np.pi
+    phi = np.radians(friction_angle)
+    return float((np.exp(np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2) ** 2 - 1) / np.tan(phi))
+
+
+def prandtl_line(half_width: float, friction_angle: float) -> np.ndarray:
+    """Slip line below the right half: wedge, logarithmic spiral about the footing's edge, wedge; (k, 2) [m]."""
+    phi = np.radians(friction_angle)
+    steep = np.pi / 4 + phi / 2
+    turned = np.linspace(0, np.pi / 2, 61)
+    radius = half_width / np.cos(steep) * np.exp(turned * np.tan(phi))
+    direction = np.pi + steep + turned
+    spiral = np.column_stack([half_width + radius * np.cos(direction), radius * np.sin(direction)])
+    end = half_width + 2 * radius[-1] * np.cos(np.pi / 4 - phi / 2)
+    return np.vstack([spiral, [end, 0.0]])
+
+
+# --- 3. Collapse on each mesh ----------------------------------------------------------------------------------------
+
+
+@dataclass
+class Run:
+    """Collapse on one mesh; settlement: (k, 2) pressure [Pa] and settlement of the footing's centre [m]."""
+
+    cell_size: float
+    collapse: bridge.Collapse
+    settlement: np.ndarray
+
+
+def footing(a: Namespace, cell_size: float, first_step: float) -> Run:
+    """Raise the pressure to the last equilibrium on one mesh that reaches well beyond Prandtl's slip line."""
+    line = prandtl_line(a.half_width, a.friction_angle)
+    parameters = {"half_width": a.half_width, "width": 1.6 * line[-1, 0], "depth": -2.0 * line[:, 1].min(),
+                  "edge_size": 0.2 * cell_size, "near_size": cell_size, "far_size": 6 * cell_size}  # fmt: skip
+    domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
+    supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
+    model = bridge.QuasiStatic(domain, soil_of(a), facet_tags, supports, degree=int(a.elements[1]))
+    show, curve = step_line(f"cells of {cell_size:g} m"), [(0.0, 0.0)]
+    centre = np.zeros((1 if comm.rank == 0 else 0, 2))
+
+    def look(step: bridge.LoadStep) -> None:
+        show(step)
+        moved = bridge.evaluate_at(centre, displacement=model.displacement)["displacement"]
+        if step.converged and comm.rank == 0:
+            curve.append((step.value, -moved[0, 1]))
+
+    load = lambda pressure: bridge.Load(pressure={FOOTING: pressure})  # noqa: E731
+    return Run(cell_size, bridge.collapse_load(model, load, first_step=first_step, progress=look), np.array(curve))
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(a: Namespace, runs: list[Run], folder: Path) -> None:
+    """Load-settlement curves, convergence and mechanism. Collective."""
+    field = gathered(runs[-1].collapse.mechanism)
+    if field is None:
+        return
+    factor = prandtl_factor(a.friction_angle)
+    reference = (factor, f"Prandtl, {factor:.2f}")
+    curves = {f"{run.cell_size:g} m": (1e3 * run.settlement[:, 1], run.settlement[:, 0] / a.cohesion) for run in runs}
+    save_curves(folder / "load_settlement.png", curves, ("Settlement of the centre [mm]", "Pressure over cohesion [-]"),
+                reference=reference, limits=((0, 1e3 * bend([run.settlement for run in runs])), (0, None)))  # fmt: skip
+    save_convergence(folder / "convergence.png", [run.cell_size for run in runs],
+                     {f"$\\phi$ = {a.friction_angle:g}°": [run.collapse.value / a.cohesion for run in runs]},
+                     "Bearing capacity factor $N_c$ [-]", reference)  # fmt: skip
+    line = prandtl_line(a.half_width, a.friction_angle)
+    box = ((0.0, 1.3 * line[:, 1].min()), (1.15 * line[-1, 0], 0.0))
+    title = f"Collapse at $N_c$ = {runs[-1].collapse.value / a.cohesion:.2f}, $\\phi$ = {a.friction_angle:g}°"
+    save_mechanism(folder / "mechanism.png", field, title, line=line, line_name="slip line of Prandtl", box=box)
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    start = perf_counter()
+    folder = results_folder("footing", a.output, comm)
+    expected = prandtl_factor(a.friction_angle)
+    sizes = [a.cell_size * 2**k for k in reversed(range(a.meshes)) if a.cell_size * 2**k <= a.half_width * (1 + 1e-9)]
+    runs = [footing(a, size, 0.03 * expected * a.cohesion) for size in sizes]
+    draw(a, runs, folder)
+
+    factors = [run.collapse.value / a.cohesion for run in runs]
+    summary = {
+        "bearing_capacity_factor_Nc": factors[-1],
+        "prandtl_bearing_capacity_factor_Nc": expected,
+        "relative_difference_to_prandtl": factors[-1] / expected - 1,
+        "collapse_pressure_Pa": runs[-1].collapse.value,
+        "failed_at_pressure_Pa": runs[-1].collapse.failed_at,
+        "meshes": [
+            {"cell_size_m": run.cell_size, "bearing_capacity_factor_Nc": factor,
+             "relative_difference_to_prandtl": factor / expected - 1, "steps": len(run.collapse.steps)}
+            for run, factor in zip(runs, factors)
+        ],
+        "curve_pressure_Pa": runs[-1].settlement[:, 0],
+        "curve_settlement_m": runs[-1].settlement[:, 1],
+        "wall_seconds": perf_counter() - start,
+    }  # fmt: skip
+    write_summary(folder, a, summary, comm)
+    if comm.rank == 0:
+        print(f"Prandtl: Nc = {expected:.3f}")
+        for row in summary["meshes"]:
+            print("cells of {cell_size_m:<6g} m: Nc = {bearing_capacity_factor_Nc:.3f} "
+                  "({relative_difference_to_prandtl:+.1%})".format(**row))  # fmt: skip
+        print(f"results in {folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    end_all_on_error(comm)
+    try:
+        sys.exit(main())
+    except (mpm.InputError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run footing: {error}", file=sys.stderr)
+        sys.exit(2)
