@@ -1,8 +1,8 @@
 """The paper's slope: initial stresses by FEM, then failure and slide by MPM with the explicit scheme.
 
-The soil body is solved in DOLFINx under its initial unit weight; its stresses go to the particles; the unit weight is raised at
-once, and the slope slides until its geometry has changed enough to carry it. The defaults are those of the paper's
-section 6; --paper repeats it exactly, with zero initial stress and a time step of 1e-4 s.
+The elasto-plastic equilibrium of the soil body under its initial unit weight is found in DOLFINx; its stresses go to the
+particles; the unit weight is raised at once, and the slope slides until its geometry has changed enough to carry it. The
+defaults are those of the paper's section 6; --paper repeats it exactly, with zero initial stress and a time step of 1e-4 s.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
-from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
+from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
 from common.report import Movie, Report, save_report
 from common.ranks import end_all_on_error
-from common.slope_case import SlopeCase, add_slope_options, build_slope, initialise
+from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
@@ -45,7 +45,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_slope_options(p)
-    add_choice(p, "--initial", "fem", ("fem", "k0", "zero"), "initial stresses")
+    add_choice(p, "--initial", "fem", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
@@ -62,9 +62,7 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
-    check(p, options.dilation_angle <= options.friction_angle,
-          lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, "
-                  f"{options.friction_angle:g} degrees")  # fmt: skip
+    check_slope_options(p, options)
     if options.paper:
         options.initial, options.dt = "zero", 1e-4
     return options
@@ -79,10 +77,7 @@ class Watch:
     def __init__(self, case: SlopeCase) -> None:
         self.model = case.model
         start = self.model.particles.initial_position
-        distance = np.hypot(start[:, 0] - case.args.crest, start[:, 1] - case.args.height)
-        nearest = np.argmin(distance) if len(distance) else None
-        own = (np.inf, -1) if nearest is None else (distance[nearest], int(self.model.particles.id[nearest]))
-        self.crest_id = min(comm.allgather(own))[1]
+        self.crest_id = case.crest_particle()
         self.first_toe = comm.allreduce(start[:, 0].max(initial=-np.inf), MPI.MAX)
         self.frames: list[dict[str, np.ndarray]] = []
 
@@ -263,16 +258,17 @@ def main(arguments: list[str] | None = None) -> int:
     folder = results_folder("slope", a.output, comm)
     case = build_slope(a, comm)
     clock["mesh_and_particles"] = perf_counter()
-    ratio = None
+    start = {"initial_out_of_balance_ratio": None}
     if a.restart is not None:
         case.model.restore(a.restart)
     else:
-        ratio = initialise(case, a.initial, a.initial_unit_weight)
+        start = initialise(case, a.initial, a.initial_unit_weight)
     clock["initial_stress"] = perf_counter()
     if comm.rank == 0 and a.restart is not None:
         print(f"going on from {a.restart} at {case.model.time:g} s")
     elif comm.rank == 0:
-        print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): out-of-balance ratio {ratio:.2e}")
+        facts = ", ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in start.items())
+        print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): {facts}")
 
     watch = Watch(case)
     with (
@@ -296,7 +292,7 @@ def main(arguments: list[str] | None = None) -> int:
         "cells": comm.allreduce(case.model.mesh.owned_cells),
         "soil_cells": comm.allreduce(int((case.model.mesh.cell_tags[: case.model.mesh.owned_cells] == 1).sum())),
         "particles": report.particles,
-        "initial_out_of_balance_ratio": ratio,
+        **start,
         "crest_displacement_m": history["crest_displacement_m"][-1],
         "runout_m": history["runout_m"][-1],
         "energy_balance_error": loop["energy_balance_error"],

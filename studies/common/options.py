@@ -137,7 +137,7 @@ def add_count(
     _add(parser, name, default, text, type=count, metavar="N")
 
 
-def add_choice(parser: argparse.ArgumentParser, name: str, default: str, choices: Sequence[str], text: str) -> None:
+def add_choice(parser: argparse.ArgumentParser, name: str, default: str | None, choices: Sequence[str], text: str) -> None:
     """Add an option that takes one of some words."""
 
     def choice(value: str) -> str:

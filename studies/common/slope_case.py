@@ -10,28 +10,55 @@ import mpm_core as mpm
 import numpy as np
 from mpi4py import MPI
 
-from .options import add_choice, add_count, add_number
+from .options import add_choice, add_count, add_number, check
 from .plots import Scene
 
 GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
+SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+"""Of the finite elements of the slope; those of the particles are the same."""
 
 
 def add_slope_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the slope's geometry, mesh and soil; the defaults are the paper's, section 6."""
+    """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6."""
+    add_geometry_options(parser, cell_size=0.1)
+    add_number(parser, "--runout-length", 2.0, "m", "background mesh beyond the toe", above=0)
+    add_count(parser, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
+    add_soil_options(parser, dilation_angle=0.0)
+
+
+def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> None:
+    """Options of the slope's shape and of the mesh; `cell_size` [m] is the default."""
     add_number(parser, "--height", 1.0, "m", "height of the slope", above=0)
     add_number(parser, "--angle", 45.0, "degrees", "inclination of the slope", above=0, at_most=90)
     add_number(parser, "--crest", 1.1, "m", "length of the level crest", above=0)
-    add_number(parser, "--runout-length", 2.0, "m", "background mesh beyond the toe", above=0)
-    add_number(parser, "--cell-size", 0.1, "m", "side of the squares or of the triangles", above=0)
-    add_choice(parser, "--mesh", "crossed", ("crossed", "gmsh"), "squares cut by their diagonals, or unstructured")
-    add_count(parser, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
-    add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
+    add_number(parser, "--cell-size", cell_size, "m", "side of the squares or of the triangles", above=0)
+    add_choice(parser, "--mesh", None, ("crossed", "fitted", "gmsh"),
+               "squares cut by their diagonals, the same stretched to fit the slope, or unstructured (default: the first "
+               "of them that suits the angle)")  # fmt: skip
+
+
+def add_soil_options(parser: argparse.ArgumentParser, dilation_angle: float | None) -> None:
+    """Options of the soil; without a default for the dilation angle it is the friction angle: associated flow."""
     add_number(parser, "--young", 200e3, "Pa", "Young's modulus", above=0)
     add_number(parser, "--poisson", 0.33, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(parser, "--cohesion", 1e3, "Pa", "cohesion", at_least=0)
     add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0, below=90)
-    add_number(parser, "--dilation-angle", 0.0, "degrees", "dilation angle, at most the friction angle", at_least=0)
+    associated = "" if dilation_angle is not None else " (default: that one, associated flow)"
+    add_number(parser, "--dilation-angle", dilation_angle, "degrees",
+               "dilation angle, at most the friction angle" + associated, at_least=0)  # fmt: skip
+
+
+def check_slope_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Fill in what follows from other options, and end with an error where they do not fit together."""
+    if options.dilation_angle is None:
+        options.dilation_angle = options.friction_angle
+    check(parser, options.dilation_angle <= options.friction_angle,
+          lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, "
+                  f"{options.friction_angle:g} degrees")  # fmt: skip
+    if options.mesh is None:
+        options.mesh = "crossed" if options.angle in (45, 90) else "fitted" if 11.4 <= options.angle <= 78.6 else "gmsh"
 
 
 @dataclass
@@ -62,6 +89,14 @@ class SlopeCase:
         points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
         return Scene(points, cells.reshape(-1, 3), np.concatenate(tags) == bridge.SOIL)
 
+    def crest_particle(self) -> int:
+        """Number of the particle that started nearest to the crest. Collective."""
+        start = self.model.particles.initial_position
+        distance = np.hypot(start[:, 0] - self.args.crest, start[:, 1] - self.args.height)
+        nearest = np.argmin(distance) if len(distance) else None
+        own = (np.inf, -1) if nearest is None else (distance[nearest], int(self.model.particles.id[nearest]))
+        return min(self.model.comm.allgather(own))[1]
+
     @property
     def surface(self) -> np.ndarray:
         """Ground surface before the slide, polyline of points (x, y) [m]."""
@@ -69,14 +104,14 @@ class SlopeCase:
         return np.array([(0.0, a.height), (a.crest, a.height), (self.toe, 0.0)])
 
 
-def soil_of(args: argparse.Namespace) -> mpm.MohrCoulomb:
-    """The soil that the options describe."""
+def soil_of(args: argparse.Namespace, dilation_angle: float | None = None) -> mpm.MohrCoulomb:
+    """The soil that the options describe; with another dilation angle [degrees] if given."""
     return mpm.MohrCoulomb(
         young=args.young,
         poisson=args.poisson,
         cohesion=args.cohesion,
         friction_angle=args.friction_angle,
-        dilation_angle=args.dilation_angle,
+        dilation_angle=args.dilation_angle if dilation_angle is None else dilation_angle,
     )
 
 
@@ -100,23 +135,66 @@ def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
     return SlopeCase(args, domain, cell_tags, facet_tags, soil, model)
 
 
-def fem_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
-    """Stresses at the particles from elastic equilibrium of the soil body under its weight, by FEM: (n, 4) [Pa]."""
-    body, _, body_facets = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
-    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
-    solution = bridge.solve_elastic(body, body_facets, supports, case.soil.young, case.soil.poisson, unit_weight)
-    return solution.evaluate_at(case.model.particles.position)["stress"]
+def initialise(case: SlopeCase, kind: str, unit_weight: float) -> dict[str, float]:
+    """Give the particles their initial stresses: "fem", "elastic", "k0" or "zero".
 
-
-def initialise(case: SlopeCase, kind: str, unit_weight: float) -> float:
-    """Give the particles their initial stresses: "fem", "k0" or "zero".
-
-    Returns the ratio of out-of-balance to external force under that unit weight [-]; 1 without stresses. Collective.
+    Returns what is to be told about it, by name: the ratio of out-of-balance to external force under that unit weight [-]
+    (1 without stresses) and, after "fem", how the hand-over went. Collective.
     """
-    particles = case.model.particles
+    gravity = (0.0, -GRAVITY * unit_weight / case.args.unit_weight)
     if kind == "fem":
-        particles.set("stress", fem_stress(case, unit_weight))
+        return hand_over(case, unit_weight, gravity)
+    particles = case.model.particles
+    if kind == "elastic":
+        particles.set("stress", elastic_stress(case, unit_weight))
     elif kind == "k0":
         k0 = bridge.k0_elastic(case.soil.poisson)
         particles.set("stress", bridge.k0_stress(particles.position, case.surface, unit_weight, k0))
-    return case.model.out_of_balance((0.0, -GRAVITY * unit_weight / case.args.unit_weight))
+    return {"initial_out_of_balance_ratio": case.model.out_of_balance(gravity)}
+
+
+def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float]) -> dict[str, float]:
+    """Stresses and states of elasto-plastic equilibrium under the initial unit weight, brought to rest in the particles.
+
+    Linear triangles, the particles' own soil cells: so the particles balance their weight as soon as they have the stresses.
+    Displacements count from the state that is handed over. Collective.
+    """
+    model = case.model
+    fem = solved_fem(case, unit_weight)
+    model.set_gravity(gravity)
+    report = bridge.initialise(model, fem, count_displacement=False)
+    model.set_gravity((0.0, -GRAVITY))
+    return {
+        "initial_out_of_balance_ratio": report.unbalanced_ratio,
+        "equilibrated_out_of_balance_ratio": report.settled_ratio,
+        "newly_yielded_share": report.yielded_share,
+        "returned_to_strength_share": report.returned_share,
+    }
+
+
+def solved_fem(case: SlopeCase, unit_weight: float) -> bridge.QuasiStatic:
+    """Elasto-plastic equilibrium of the soil body under a unit weight, on the particles' soil cells.
+
+    Raises InputError, on all ranks, when the slope does not carry the unit weight. Collective.
+    """
+    fem = soil_fem(case)
+    fem.solve(bridge.Load(unit_weight=unit_weight))
+    if not fem.converged:
+        raise mpm.InputError(
+            f"--initial-unit-weight is {unit_weight:g} N/m3, which the slope does not carry: the finite elements found no "
+            f"equilibrium above {fem.load.unit_weight:.5g} N/m3"
+        )
+    return fem
+
+
+def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
+    """Finite elements, linear triangles, on the particles' soil cells, unloaded. Collective."""
+    body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
+    return bridge.QuasiStatic(body, case.soil, facet_tags, SUPPORTS, degree=1)
+
+
+def elastic_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
+    """Stresses at the particles from elastic equilibrium of the soil body under its weight, by FEM: (n, 4) [Pa]."""
+    body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
+    solution = bridge.solve_elastic(body, facet_tags, SUPPORTS, case.soil.young, case.soil.poisson, unit_weight)
+    return solution.evaluate_at(case.model.particles.position)["stress"]
