@@ -145,7 +145,7 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
 template <int D>
 double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
 {
-  std::array<double, 2> squares{}; // of f_ext - f_int over unsupported directions, and of f_ext
+  std::array<double, 3> squares{}; // of f_ext - f_int over unsupported directions, of f_ext, and of reactions
   auto support = model.supports.begin();
   for (Index i = 0; i < model.mesh.n_nodes(); ++i)
   {
@@ -164,13 +164,16 @@ double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
     {
       Support<D> held = *support;
       held.value.fill(0);
+      squares[2] += dot<D>(unbalanced, unbalanced);
       impose<D>(held, unbalanced);
+      squares[2] -= dot<D>(unbalanced, unbalanced);
     }
     squares[0] += dot<D>(unbalanced, unbalanced);
     squares[1] += dot<D>(external, external);
   }
-  MPI_Allreduce(MPI_IN_PLACE, squares.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
-  return squares[1] > 0 ? std::sqrt(squares[0] / squares[1]) : 0;
+  MPI_Allreduce(MPI_IN_PLACE, squares.data(), 3, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  const double acting = squares[1] > 0 ? squares[1] : squares[2];
+  return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
 }
 
 template <int D>

@@ -30,7 +30,7 @@ template <int D>
 void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
 
 /// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported directions do not
-/// count above. 0 without external force.
+/// count above. Without external force, as under prescribed velocities, reactions take its place; 0 without either.
 /// @note Collective
 template <int D>
 double out_of_balance(const Model<D>& model, const Vector<D>& gravity);

@@ -32,12 +32,20 @@ class Report:
     plastic_share: float
     """Share of the particles that yielded in the last step"""
     unbalanced_ratio: float
-    """Out-of-balance over external force in the last step, Euclidean norms over the nodes"""
+    """Out-of-balance over external force, Euclidean norms over the nodes; over reactions where there is no external force"""
     outflow_particles: int
     """Particles that left through outflow facets"""
     outflow_mass: float
     particle_steps: int
     """Sum over steps of the number of particles"""
+
+    def is_quasi_static(self, tolerance: float = 1e-3) -> bool:
+        """Whether the soil is at rest: the out-of-balance ratio and kinetic energy over external work are not above a tolerance.
+
+        Kinetic energy is not looked at where external forces have done no work.
+        """
+        work = abs(self.external_work)
+        return self.unbalanced_ratio <= tolerance and (work == 0 or self.kinetic_energy <= tolerance * work)
 
 
 @dataclass(frozen=True)
