@@ -102,13 +102,18 @@ def run_implicit(
 
 
 def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
-    """Quasi-static steps at the present time until the particles balance their loads."""
+    """Quasi-static steps at the present time until the particles balance their loads.
+
+    Only the first moves the particles. One that moves again may cross into the next cell and back for ever, each time with a
+    jump of the nodal forces that sends it there.
+    """
     stepper = Stepper(model, solver, options, 1.0)
     time = model.time
     for _ in range(max_steps):
         model._core.time = time - 1.0  # loads are those of the step's end
         reason = stepper.attempt(1.0)
         model._core.time = time
+        options.hold_positions = True
         if reason:
             raise RunError(f"no equilibrium at t = {time:.9g} s: {reason}")
         report = stepper.report()

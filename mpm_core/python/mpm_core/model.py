@@ -437,7 +437,7 @@ class Model:
         """Bring the particles to equilibrium under the present loads, by quasi-static steps of no duration.
 
         Needed after an imported initial state, and after convection, where the particles' stresses no longer balance the
-        loads. Velocities become zero.
+        loads. Velocities become zero. The first step moves the particles, the others only change their stresses.
 
         Args:
             solver: what solves each step; Newton's method by default.
