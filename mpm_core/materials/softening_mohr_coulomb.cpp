@@ -30,9 +30,25 @@ struct Softener
     return deviatoric_plastic_strain(m, trial, return_to_surface(m, trial).stress);
   }
 
-  /// The plastic strain that answers itself. The answer stays finite while the strength falls no further than to its
-  /// residual, so there is one.
+  /// The plastic strain that answers itself, by the secant method: in small increments strength falls little, and a few
+  /// evaluations do. Where they do not, by bracketing.
   double increment() const
+  {
+    double x = answer(0), excess = answer(x) - x;
+    double next = x + excess;
+    for (int iteration = 0; iteration < 6 && std::abs(excess) > 1e-12 * x && next > 0; ++iteration)
+    {
+      const double next_excess = answer(next) - next;
+      const double better = next - next_excess * (next - x) / (next_excess - excess);
+      x = next;
+      excess = next_excess;
+      next = better;
+    }
+    return std::abs(excess) <= 1e-12 * x ? x : bracketed_increment();
+  }
+
+  /// The answer stays finite while the strength falls no further than to its residual, so there is a bracket.
+  double bracketed_increment() const
   {
     const double first = answer(0);
     double bound = first;

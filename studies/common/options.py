@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -157,6 +158,15 @@ def add_switch(parser: argparse.ArgumentParser, name: str, default: bool, text: 
 def add_flag(parser: argparse.ArgumentParser, name: str, text: str) -> None:
     """Add an option that is off unless it is named."""
     parser.add_argument(name, action="store_true", help=text)
+
+
+def change_defaults(parser: argparse.ArgumentParser, **defaults: object) -> None:
+    """Other defaults for options that are shared by studies, by their names with underscores; the help shows them."""
+    for name, value in defaults.items():
+        action = next(a for a in parser._actions if a.dest == name)
+        action.default = value
+        shown = f" (default: {value:g})" if isinstance(value, float) else f" (default: {value})"
+        action.help = re.sub(r" \(default: .*\)$", "", action.help or "") + shown
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene
+from .soils import add_law_options, law_of
 
 GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
@@ -26,6 +27,7 @@ def add_slope_options(parser: argparse.ArgumentParser) -> None:
     add_count(parser, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
     add_soil_options(parser, dilation_angle=0.0)
+    add_law_options(parser)
 
 
 def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> None:
@@ -69,7 +71,7 @@ class SlopeCase:
     domain: object
     cell_tags: object
     facet_tags: object
-    soil: mpm.MohrCoulomb
+    soil: object
     model: mpm.Model
 
     @property
@@ -117,7 +119,7 @@ def soil_of(args: argparse.Namespace, dilation_angle: float | None = None) -> mp
 
 def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
     """Mesh, particles, supports and gravity; no stresses yet. Collective."""
-    soil = soil_of(args)
+    soil = law_of(args)
     domain, cell_tags, facet_tags = bridge.slope_mesh(
         comm,
         height=args.height,
@@ -148,7 +150,7 @@ def initialise(case: SlopeCase, kind: str, unit_weight: float) -> dict[str, floa
     if kind == "elastic":
         particles.set("stress", elastic_stress(case, unit_weight))
     elif kind == "k0":
-        k0 = bridge.k0_elastic(case.soil.poisson)
+        k0 = bridge.k0_elastic(case.args.poisson)
         particles.set("stress", bridge.k0_stress(particles.position, case.surface, unit_weight, k0))
     return {"initial_out_of_balance_ratio": case.model.out_of_balance(gravity)}
 
@@ -196,5 +198,5 @@ def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
 def elastic_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
     """Stresses at the particles from elastic equilibrium of the soil body under its weight, by FEM: (n, 4) [Pa]."""
     body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
-    solution = bridge.solve_elastic(body, facet_tags, SUPPORTS, case.soil.young, case.soil.poisson, unit_weight)
+    solution = bridge.solve_elastic(body, facet_tags, SUPPORTS, case.args.young, case.args.poisson, unit_weight)
     return solution.evaluate_at(case.model.particles.position)["stress"]

@@ -38,6 +38,7 @@ class ElementTest:
         """State variables, shape (n_state,)"""
         self.strain = np.zeros_like(self.stress)
         """Strain since the start, engineering shear, shape (S,)"""
+        self._last = np.zeros_like(self.stress)
 
     def step(self, strain_increment: ArrayLike, stress: ArrayLike | None = None) -> None:
         """Drive the point by one increment, by Newton's method with the law's tangent.
@@ -51,18 +52,27 @@ class ElementTest:
         """
         increment = np.array(strain_increment, dtype=float)
         free = np.isnan(increment)
-        increment[free] = 0.0
         target = self.stress if stress is None else floats("stress", stress, self.stress.shape)
+        # A point that softens may be taken for an elastic one from the first guess, but not from its last increment
+        for guess in (np.zeros_like(self.strain), self._last):
+            increment[free] = guess[free]
+            if self._solved(increment, free, target):
+                return
+        raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
+
+    def _solved(self, increment: NDArray[np.float64], free: NDArray[np.bool_], target: NDArray[np.float64]) -> bool:
+        """Find the free components of the increment from those given, in place; take the step if there are any."""
         new, state, tangent = self._updated(increment)
         for _ in range(MAX_ITERATIONS):
             if np.abs(new - target)[free].max(initial=0.0) <= self._tolerance(new):
                 self.stress, self.state, self.strain = new, state, self.strain + increment
-                return
+                self._last = increment
+                return True
             # On an edge of Mohr-Coulomb two stresses are equal whatever the strains: of all of these the smallest step
             step, *_ = np.linalg.lstsq(tangent[np.ix_(free, free)], (new - target)[free], rcond=1e-12)
             increment[free] -= step
             new, state, tangent = self._updated(increment)
-        raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
+        return False
 
     def _tolerance(self, stress: NDArray[np.float64]) -> float:
         return 1e-9 * float(np.abs(stress).max()) + 1e-12 * self.law.p_wave_modulus

@@ -1,0 +1,76 @@
+"""The laws that studies can choose from on the command line, and the options of those beyond Mohr-Coulomb."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import mpm_core as mpm
+from .options import add_choice, add_number, add_switch
+
+MATERIALS = ("mohr-coulomb", "softening", "tresca", "von-mises", "drucker-prager", "cam-clay", "elastic")
+
+
+def add_law_options(parser: argparse.ArgumentParser) -> None:
+    """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation."""
+    p = parser
+    add_choice(p, "--material", MATERIALS[0], MATERIALS, "law of the soil; Tresca and von Mises: the cohesion is the shear strength")
+    add_number(p, "--tension-cutoff", None, "Pa", "largest principal stress (default: that of the strength)", at_least=0)
+    add_number(p, "--residual-cohesion", 200.0, "Pa", "softening: cohesion in the end", at_least=0)
+    add_number(p, "--residual-friction-angle", 15.0, "degrees", "softening: friction angle in the end", at_least=0, below=90)
+    add_number(p, "--softening-strain", 0.3, "-", "softening: plastic strain over which strength falls, in a band of the "
+               "reference length", above=0)  # fmt: skip
+    add_number(p, "--reference-length", 0.1, "m", "softening: cell size for which the softening strain holds", above=0)
+    add_number(p, "--compression-slope", 0.1, "-", "Cam-Clay: slope lambda", above=0)
+    add_number(p, "--swelling-slope", 0.02, "-", "Cam-Clay: slope kappa", above=0)
+    add_number(p, "--critical-slope", 1.0, "-", "Cam-Clay: slope M", above=0)
+    add_number(p, "--void-ratio", 1.0, "-", "Cam-Clay: void ratio at the start", above=0)
+    add_number(p, "--preconsolidation", 20e3, "Pa", "Cam-Clay: preconsolidation pressure at the start", above=0)
+    add_number(p, "--attraction", 1e3, "Pa", "Cam-Clay: isotropic tension that it bears", at_least=0)
+    add_switch(p, "--undrained", False, "effective stresses, with pore water that does not drain")
+    add_number(p, "--water-modulus", 2e7, "Pa", "undrained: bulk modulus of the pore water", above=0)
+    add_number(p, "--porosity", 0.4, "-", "undrained: porosity", above=0, below=1)
+    add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")
+
+
+def law_of(args: argparse.Namespace) -> Any:
+    """The law that the options describe.
+
+    Raises:
+        InputError: options that do not fit together, by the law's own parameter names.
+    """
+    law = _skeleton(args)
+    if args.finite_strain:
+        law = mpm.Hencky(law)
+    if args.undrained:
+        law = mpm.Undrained(law, water_modulus=args.water_modulus, porosity=args.porosity)
+    return law
+
+
+def _skeleton(a: argparse.Namespace) -> Any:
+    elastic = {"young": a.young, "poisson": a.poisson}
+    strength = {"cohesion": a.cohesion, "friction_angle": a.friction_angle, "dilation_angle": a.dilation_angle}
+    strength["tension_cutoff"] = a.tension_cutoff
+    match a.material:
+        case "elastic":
+            return mpm.LinearElastic(**elastic)
+        case "tresca":
+            return mpm.tresca(**elastic, shear_strength=a.cohesion)
+        case "von-mises":
+            return mpm.von_mises(**elastic, yield_stress=a.cohesion * 3**0.5)
+        case "drucker-prager":
+            return mpm.matched_drucker_prager(**elastic, **strength, match=mpm.ConeMatch.PLANE_STRAIN)
+        case "cam-clay":
+            return mpm.CamClay(
+                compression=a.compression_slope, swelling=a.swelling_slope, critical_slope=a.critical_slope, poisson=a.poisson,
+                preconsolidation=a.preconsolidation, void_ratio=a.void_ratio, attraction=a.attraction,
+            )  # fmt: skip
+        case "softening":
+            return mpm.SofteningMohrCoulomb(
+                mpm.MohrCoulomb(**elastic, **strength),
+                residual_cohesion=a.residual_cohesion,
+                residual_friction_angle=min(a.residual_friction_angle, a.friction_angle),
+                softening_strain=a.softening_strain,
+                reference_length=a.reference_length,
+            )
+    return mpm.MohrCoulomb(**elastic, **strength)

@@ -1,0 +1,156 @@
+"""Laboratory tests on one point of any law: oedometer, triaxial drained and undrained, simple shear; stress paths.
+
+The undrained triaxial test keeps the volume; with --undrained the law itself has pore water, and the excess pore pressure is
+drawn. Laws of one's own: --python-law FILE.py:CLASS, or --umat LIBRARY.so with its PROPS.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import mpm_core as mpm
+import numpy as np
+from common.history import History
+from common.options import add_choice, add_count, add_number, check, study_parser
+from common.plots import paper_style
+from common.slope_case import add_soil_options
+from common.soils import add_law_options, law_of
+from common.summary import OutputError, results_folder, write_summary
+
+TESTS = ("oedometer", "drained", "undrained", "shear")
+COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
+           "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_choice(p, "--test", "drained", TESTS, "compression at no side strain; triaxial at constant side stress; at "
+               "constant volume; simple shear at constant volume")  # fmt: skip
+    add_number(p, "--pressure", 20e3, "Pa", "isotropic pressure at the start", at_least=0)
+    add_number(p, "--strain", 0.2, "-", "axial strain to reach (shear strain in simple shear), in compression", above=0)
+    add_count(p, "--steps", 400, "increments")
+    add_soil_options(p, dilation_angle=0.0)
+    add_law_options(p)
+    p.add_argument("--python-law", metavar="FILE:CLASS", help="a law written in Python, made without arguments")
+    p.add_argument("--umat", metavar="LIBRARY", help="shared library with an Abaqus UMAT")
+    p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
+    p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
+    return p
+
+
+def chosen_law(p: ArgumentParser, a: Namespace) -> Any:
+    """The law that the options name."""
+    if a.umat:
+        return mpm.Umat(a.umat, properties=a.properties, n_variables=a.variables, p_wave_modulus=a.young)
+    if a.python_law:
+        file, _, name = a.python_law.rpartition(":")
+        check(p, Path(file).is_file(), f"--python-law is '{a.python_law}', expected a file, a colon and a class in it")
+        sys.path.insert(0, str(Path(file).parent))  # for what it imports beside it
+        spec = importlib.util.spec_from_file_location("law_of_the_user", file)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        check(p, hasattr(module, name), f"--python-law names the class '{name}', which {file} does not have")
+        return mpm.PythonLaw(getattr(module, name)())
+    return law_of(a)
+
+
+# --- 2. The test -----------------------------------------------------------------------------------------------------
+
+
+def increment(kind: str, size: float) -> list[float | None]:
+    """Strain increment of a test, None where the stress is kept; x is the axis."""
+    return {
+        "oedometer": [-size, 0.0, 0.0, 0.0, 0.0, 0.0],
+        "drained": [-size, None, None, 0.0, 0.0, 0.0],
+        "undrained": [-size, size / 2, size / 2, 0.0, 0.0, 0.0],
+        "shear": [0.0, 0.0, 0.0, size, 0.0, 0.0],
+    }[kind]
+
+
+def row(test: mpm.ElementTest) -> dict[str, float]:
+    """What is looked at: invariants of the effective stress where there is pore water, else of the stress."""
+    names = test.law.state_names
+    pore = test.state[names.index("excess_pore_pressure")] if "excess_pore_pressure" in names else 0.0
+    p = -test.stress[:3].mean()
+    s = test.stress + p * np.array([1, 1, 1, 0, 0, 0])
+    q = np.sqrt(1.5 * ((s[:3] ** 2).sum() + 2 * (s[3:] ** 2).sum()))
+    return {
+        "axial_strain": -test.strain[0], "shear_strain": test.strain[3], "volumetric_strain": -test.strain[:3].sum(),
+        "p_Pa": p - pore, "q_Pa": q, "shear_stress_Pa": test.stress[3], "excess_pore_pressure_Pa": pore,
+        "plastic_strain": test.state[0],
+    }  # fmt: skip
+
+
+def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
+    """All increments; why it ended early, if it did."""
+    history.add(**row(test))
+    for _ in range(a.steps):
+        try:
+            test.step(increment(a.test, a.strain / a.steps))
+        except mpm.RunError as error:
+            return str(error)
+        history.add(**row(test))
+    return None
+
+
+# --- 3. Pictures and the end -----------------------------------------------------------------------------------------
+
+
+def draw(history: History, a: Namespace, path: Path) -> None:
+    """Stress path, stress over strain, volume (or pore pressure) over strain."""
+    shear = a.test == "shear"
+    strain = history["shear_strain" if shear else "axial_strain"]
+    strain_label = "Shear strain [-]" if shear else "Axial strain, compression [-]"
+    pore = np.any(history["excess_pore_pressure_Pa"] != 0)
+    last = ("excess_pore_pressure_Pa", 1e-3, "Excess pore pressure [kPa]") if pore else (
+        "volumetric_strain", 1.0, "Volumetric strain, compression [-]")  # fmt: skip
+    panels = [
+        (history["p_Pa"] * 1e-3, history["q_Pa"] * 1e-3, "$p'$ [kPa]", "$q$ [kPa]"),
+        (strain, history["shear_stress_Pa" if shear else "q_Pa"] * 1e-3, strain_label, "Shear stress [kPa]" if shear else "$q$ [kPa]"),
+        (strain, history[last[0]] * last[1], strain_label, last[2]),
+    ]
+    with paper_style():
+        figure, axes = plt.subplots(1, 3, figsize=(10, 3.2), layout="constrained")
+        for ax, (x, y, x_label, y_label) in zip(axes, panels, strict=True):
+            ax.plot(x, y, color="#1f3b73")
+            ax.plot(x[:1], y[:1], "o", color="black", markersize=4, markerfacecolor="white")
+            ax.set_xlabel(x_label)
+            ax.set_ylabel(y_label)
+            ax.grid(linewidth=0.3, color="#d0d0d0")
+        figure.savefig(path, dpi=200)
+        plt.close(figure)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    p = parser()
+    a = p.parse_args(arguments)
+    law = chosen_law(p, a)
+    folder = results_folder("element_test", a.output)
+    test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
+    with History(folder / "history.csv", COLUMNS) as history:
+        stopped = run(test, a, history)
+        draw(history, a, folder / "stress_path.png")
+    end = {name: float(history[name][-1]) for name in COLUMNS}
+    write_summary(folder, a, {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end})
+    print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {history['q_Pa'].max() / 1e3:.4g} kPa")
+    if stopped:
+        print(f"the test ended early: {stopped}", file=sys.stderr)
+    print(f"results in {folder}")
+    return 1 if stopped else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except (mpm.InputError, OutputError) as error:
+        print(f"studies/run element_test: {error}", file=sys.stderr)
+        sys.exit(2)

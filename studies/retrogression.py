@@ -1,0 +1,208 @@
+"""A slope of sensitive clay: a disturbed toe slips, and the bank fails back piece by piece, on two mesh sizes.
+
+The clay does not drain and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell size).
+Finite elements find the stresses of the intact slope; the strength of a zone around the toe is then taken away, and the
+explicit scheme follows the failure to rest. The whole is done with the cell size given and with half of it: the softening
+scaled by the cell size is to give the same distances.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+import numpy as np
+from common.animation import Frame, save_animation
+from common.history import History
+from common.interrupt import Interrupt
+from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, save_history, save_particles
+from common.progress import Progress
+from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.summary import OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+COLUMNS = ["time_s", "retrogression_m", "runout_m", "kinetic_energy_J_per_m", "plastic_share", "dt_s"]
+AT_REST = 1e-3
+"""Share of the largest kinetic energy below which the slope is at rest."""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_slope_options(p)
+    change_defaults(
+        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=0.5, particles_per_cell=3, unit_weight=18e3,
+        material="softening", young=2e6, poisson=0.45, cohesion=18e3, friction_angle=0.0, residual_cohesion=1e3,
+        softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
+    )  # fmt: skip
+    add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
+    add_number(p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1)
+    add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
+    add_number(p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_number(p, "--time", 40.0, "s", "longest duration of the slide", above=0)
+    add_count(p, "--frames", 100, "times at which particles are drawn")
+    add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
+    add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
+    return p
+
+
+# --- 2. Start: stresses by finite elements, and a disturbed toe ------------------------------------------------------
+
+
+def start(case: SlopeCase) -> float:
+    """Stresses and states of the intact slope, by elasto-plastic finite elements. Out-of-balance ratio of the particles."""
+    fem = soil_fem(case)
+    fem.solve(bridge.Load(unit_weight=case.args.unit_weight))
+    if not fem.converged:
+        raise mpm.InputError(
+            f"--unit-weight is {case.args.unit_weight:g} N/m3, but the intact slope carries only {fem.load.unit_weight:g} N/m3"
+        )
+    return bridge.initialise(case.model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio
+
+
+def disturb(case: SlopeCase) -> None:
+    """Take strength from the clay around the toe."""
+    x = case.model.particles.position
+    near = np.hypot(x[:, 0] - case.toe, x[:, 1]) < case.args.disturbed
+    case.model.set_state("cohesion_deviation", np.where(near, -case.args.disturbed_loss, 0.0))
+
+
+# --- 3. The slide ----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Slide:
+    """What came of one mesh size."""
+
+    case: SlopeCase
+    cell_size: float
+    history: History
+    ratio: float
+    frames: list[Frame] = field(default_factory=list)
+    displacement: list[np.ndarray] = field(default_factory=list)
+    stopped: str | None = None
+    at_rest: bool = False
+
+    def look(self, report: mpm.Report) -> None:
+        """Note how far the slope has failed back and run out, and keep a frame. Collective."""
+        p, a = self.case.model.particles, self.case.args
+        moved = np.linalg.norm(p.displacement, axis=1)
+        failed = p.initial_position[moved > 0.1 * a.height, 0]
+        scarp = comm.allreduce(float(failed.min(initial=np.inf)), MPI.MIN)
+        front = comm.allreduce(float(p.position[:, 0].max(initial=-np.inf)), MPI.MAX)
+        self.history.add(
+            time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=front - self.case.toe,
+            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share, dt_s=report.dt,
+        )  # fmt: skip
+        parts = comm.gather((p.position, p.volume, p.plastic_strain, moved))
+        if parts is not None:
+            position, volume, strain, moved = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+            self.frames.append(Frame(report.time, position, volume, strain))
+            self.displacement.append(moved.astype(np.float32))
+
+
+def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> Slide:
+    """One mesh size, to rest, to the end of the time or to an interruption."""
+    case = build_slope(Namespace(**{**vars(args), "cell_size": size}), comm)
+    ratio = start(case)
+    disturb(case)
+    a, model = case.args, case.model
+    with History(folder / f"history_{size:g}.csv", COLUMNS, comm) as history, Progress(f"{size:g} m", a.time, comm) as progress:
+        result = Slide(case, size, history, ratio)
+        result.look(model.report())
+        try:
+            for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd):
+                result.look(report)
+                progress.show(report.time, report.steps, runout=f"{history['runout_m'][-1]:.2f} m")
+                energy = history["kinetic_energy_J_per_m"]
+                result.at_rest = bool(energy[-1] < AT_REST * energy.max() and len(energy) > 5)
+                if interrupt.requested():
+                    result.stopped = f"interrupted at {report.time:g} s"
+                if result.at_rest or result.stopped:
+                    break
+        except mpm.RunError as error:
+            result.stopped = str(error)
+    return result
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(result: Slide, folder: Path) -> None:
+    """Shear strain at four times, displacement in the end, and a film; on the first rank."""
+    scene = result.case.scene()
+    if scene is None:
+        return
+    shown = np.unique(np.linspace(0, len(result.frames) - 1, 5).astype(int)[1:])
+    for k in shown:
+        f = result.frames[k]
+        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f.position, f.volume, f.values, SHEAR_STRAIN,
+                       limits=(0, 2), title=f"$t$ = {f.time:.1f} s, cells of {result.cell_size:g} m")  # fmt: skip
+    last = result.frames[-1]
+    save_particles(folder / f"displacement_{result.cell_size:g}.png", scene, last.position, last.volume,
+                   result.displacement[-1], DISPLACEMENT, title=f"$t$ = {last.time:.1f} s")  # fmt: skip
+    save_animation(folder / f"retrogression_{result.cell_size:g}", scene, result.frames, SHEAR_STRAIN, limits=(0, 2))
+
+
+def compare(results: list[Slide], folder: Path) -> None:
+    """Retrogression and run-out over time on all mesh sizes; on the first rank."""
+    if comm.rank != 0:
+        return
+    time = max((r.history["time_s"] for r in results), key=len)
+    for column, label in [("retrogression_m", "Failed length of the crest [m]"), ("runout_m", "Run-out past the toe [m]")]:
+        curves = {f"cells of {r.cell_size:g} m": np.interp(time, r.history["time_s"], r.history[column]) for r in results}
+        save_history(folder / f"{column.removesuffix('_m')}.png", time, curves, label)
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    p = parser()
+    a = p.parse_args(arguments)
+    check_slope_options(p, a)
+    folder = results_folder("retrogression", a.output, comm)
+    results = []
+    with Interrupt(comm) as interrupt:
+        for size in [a.cell_size, a.cell_size / 2][: 1 if a.meshes == "one" else 2]:
+            if not interrupt.requested():
+                results.append(slide(a, size, folder, interrupt))
+                draw(results[-1], folder)
+        compare(results, folder)
+    found = {
+        f"{r.cell_size:g}_m": {
+            "retrogression_m": r.history["retrogression_m"][-1], "runout_m": r.history["runout_m"][-1],
+            "time_s": r.history["time_s"][-1], "at_rest": r.at_rest, "stopped_because": r.stopped,
+            "initial_out_of_balance_ratio": r.ratio, "particles": comm.allreduce(len(r.case.model.particles)),
+        }
+        for r in results
+    }  # fmt: skip
+    stopped = any(r.stopped for r in results)
+    write_summary(folder, a, {"finished_run": not stopped, "cells": found}, comm)
+    if comm.rank == 0:
+        for result in results:
+            if result.stopped:
+                print(f"the run with cells of {result.cell_size:g} m ended early: {result.stopped}", file=sys.stderr)
+        for size, f in found.items():
+            print(f"{size}: failed back {f['retrogression_m']:.2f} m, run-out {f['runout_m']:.2f} m, "
+                  f"{'at rest' if f['at_rest'] else 'not at rest'} after {f['time_s']:.1f} s")  # fmt: skip
+        print(f"results in {folder}")
+    return interrupt.exit_code or (1 if stopped else 0)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except (mpm.InputError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run retrogression: {error}", file=sys.stderr)
+        sys.exit(2)
