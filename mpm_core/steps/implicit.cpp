@@ -136,6 +136,7 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   impose_supports(model, step);
 
   const Vector<D> gravity = gravity_at(model, model.time + dt);
+  step.forces.assign(work.nodes.size(), {});
   step.external.resize(work.nodes.size());
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
     for (int a = 0; a < D; ++a)

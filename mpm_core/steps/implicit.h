@@ -89,6 +89,7 @@ template <int D>
 TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents);
 
 /// Ends the step with the iterate: moves and strains the particles, adds to the totals.
+/// @pre `find_residual` was called for the iterate, so that the work of its forces is known
 /// @returns whether it could; otherwise `work.trouble` says why, and the particles are as they were at the step's start
 /// @note Collective
 template <int D>

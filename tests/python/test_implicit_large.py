@@ -38,6 +38,7 @@ def test_rigid_rotation_turns_stresses_and_keeps_their_size():
     step.start(_core.ImplicitOptions(), dt)
     arm = step.points - 0.5
     step.velocity = (2 * np.tan(angle / 2) / dt * np.c_[-arm[:, 1], arm[:, 0]]).ravel()
+    assert step.trial()["failed"] == 0
     assert step.finish() == ""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     tensor = turn @ np.array([[5.0, 2.0], [2.0, -3.0]]) @ turn.T
