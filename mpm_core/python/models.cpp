@@ -4,6 +4,7 @@
 #include "particles/seed.h"
 #include "python/arrays.h"
 #include "steps/mapping.h"
+#include "steps/placement.h"
 #include "steps/run.h"
 
 namespace mpm::python
@@ -285,6 +286,12 @@ void bind_model(py::module_& m, const std::string& suffix)
            })
       .def("column", &column<D>)
       .def("set_column", &set_column<D>)
+      .def("place_particles",
+           [](M& model, const py::array& positions)
+           {
+             check_array<double>("position", positions, {static_cast<py::ssize_t>(model.particles.size()), D});
+             place_particles<D>(model, values<double>(positions));
+           })
       .def("set_materials",
            [](M& model, const py::array& numbers)
            {

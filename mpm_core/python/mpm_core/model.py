@@ -201,6 +201,23 @@ class Model:
             self._material(int(number))
         self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
 
+    def place(self, position: ArrayLike) -> None:
+        """Put the particles elsewhere: their cells are found anew, on whatever rank, and their displacement changes with it.
+
+        The particles may have another order, and other ranks, afterwards.
+
+        Args:
+            position: [m], shape (n, D), in the order of ``particles``.
+
+        Raises:
+            InputError: on all ranks, naming a particle that would be outside of the mesh; then none is moved.
+        """
+
+        def checked() -> NDArray[np.float64]:
+            return floats("position", position, (len(self.particles), self.mesh.dim))
+
+        self._core.place_particles(collectively(self.comm, checked))
+
     # --- supports and loads --------------------------------------------------------------------------------------
 
     def _support(
@@ -232,6 +249,11 @@ class Model:
     def outflow(self, facet_tag: int) -> None:
         """Let particles leave the mesh through facets with this tag; they are counted in the report."""
         self._core.outflow_tags = [*self._core.outflow_tags, self.mesh.require_tag("facet", facet_tag)]
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Gravity [m/s2], shape (D,), as it is after any ramp. Not collective."""
+        return np.array(self._core.gravity)
 
     def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
         """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
