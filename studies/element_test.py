@@ -115,7 +115,8 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         "volumetric_strain", 1.0, "Volumetric strain, compression [-]")  # fmt: skip
     panels = [
         (history["p_Pa"] * 1e-3, history["q_Pa"] * 1e-3, "$p'$ [kPa]", "$q$ [kPa]"),
-        (strain, history["shear_stress_Pa" if shear else "q_Pa"] * 1e-3, strain_label, "Shear stress [kPa]" if shear else "$q$ [kPa]"),
+        (strain, history["shear_stress_Pa" if shear else "q_Pa"] * 1e-3, strain_label,
+         "Shear stress [kPa]" if shear else "$q$ [kPa]"),
         (strain, history[last[0]] * last[1], strain_label, last[2]),
     ]
     with paper_style():
@@ -141,7 +142,8 @@ def main(arguments: list[str] | None = None) -> int:
         draw(history, a, folder / "stress_path.png")
     end = {name: float(history[name][-1]) for name in COLUMNS}
     write_summary(folder, a, {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end})
-    print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {history['q_Pa'].max() / 1e3:.4g} kPa")
+    largest = history["q_Pa"].max()
+    print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa")
     if stopped:
         print(f"the test ended early: {stopped}", file=sys.stderr)
     print(f"results in {folder}")

@@ -1,9 +1,8 @@
 """A slope of sensitive clay: a disturbed toe slips, and the bank fails back piece by piece, on two mesh sizes.
 
-The clay does not drain and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell size).
-Finite elements find the stresses of the intact slope; the strength of a zone around the toe is then taken away, and the
-explicit scheme follows the failure to rest. The whole is done with the cell size given and with half of it: the softening
-scaled by the cell size is to give the same distances.
+The clay does not drain and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell
+size). Finite elements find the stresses of the intact slope; the strength of a zone around the toe is then taken away, and
+the explicit scheme follows the failure to rest. All of it is done with the cell size given and with half of it.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1)
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
     add_number(p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
-    add_number(p, "--time", 40.0, "s", "longest duration of the slide", above=0)
+    add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")
     add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
     add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
@@ -64,7 +63,8 @@ def start(case: SlopeCase) -> float:
     fem.solve(bridge.Load(unit_weight=case.args.unit_weight))
     if not fem.converged:
         raise mpm.InputError(
-            f"--unit-weight is {case.args.unit_weight:g} N/m3, but the intact slope carries only {fem.load.unit_weight:g} N/m3"
+            f"--unit-weight is {case.args.unit_weight:g} N/m3, but the intact slope carries only "
+            f"{fem.load.unit_weight:g} N/m3"
         )
     return bridge.initialise(case.model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio
 
@@ -116,7 +116,10 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
     ratio = start(case)
     disturb(case)
     a, model = case.args, case.model
-    with History(folder / f"history_{size:g}.csv", COLUMNS, comm) as history, Progress(f"{size:g} m", a.time, comm) as progress:
+    with (
+        History(folder / f"history_{size:g}.csv", COLUMNS, comm) as history,
+        Progress(f"{size:g} m", a.time, comm) as progress,
+    ):
         result = Slide(case, size, history, ratio)
         result.look(model.report())
         try:
@@ -145,12 +148,14 @@ def draw(result: Slide, folder: Path) -> None:
     shown = np.unique(np.linspace(0, len(result.frames) - 1, 5).astype(int)[1:])
     for k in shown:
         f = result.frames[k]
-        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f.position, f.volume, f.values, SHEAR_STRAIN,
-                       limits=(0, 2), title=f"$t$ = {f.time:.1f} s, cells of {result.cell_size:g} m")  # fmt: skip
+        title = f"$t$ = {f.time:.1f} s, cells of {result.cell_size:g} m"
+        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f.position, f.volume, f.values,
+                       SHEAR_STRAIN, limits=(0, 2), title=title)  # fmt: skip
     last = result.frames[-1]
     save_particles(folder / f"displacement_{result.cell_size:g}.png", scene, last.position, last.volume,
                    result.displacement[-1], DISPLACEMENT, title=f"$t$ = {last.time:.1f} s")  # fmt: skip
-    save_animation(folder / f"retrogression_{result.cell_size:g}", scene, result.frames, SHEAR_STRAIN, limits=(0, 2))
+    name = f"retrogression_{result.cell_size:g}".replace(".", "_")  # what follows a point would be taken for the suffix
+    save_animation(folder / name, scene, result.frames, SHEAR_STRAIN, limits=(0, 2))
 
 
 def compare(results: list[Slide], folder: Path) -> None:

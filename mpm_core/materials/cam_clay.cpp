@@ -15,7 +15,10 @@ namespace
 double mean_growth(double y) { return std::abs(y) < 1e-8 ? 1 + y / 2 : std::expm1(y) / y; }
 
 /// Its derivative
-double mean_growth_slope(double y) { return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y; }
+double mean_growth_slope(double y)
+{
+  return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y;
+}
 
 /// A point at the start of an increment: pressures and volumetric strains are positive in compression here
 template <int D>

@@ -14,7 +14,8 @@ MATERIALS = ("mohr-coulomb", "softening", "tresca", "von-mises", "drucker-prager
 def add_law_options(parser: argparse.ArgumentParser) -> None:
     """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation."""
     p = parser
-    add_choice(p, "--material", MATERIALS[0], MATERIALS, "law of the soil; Tresca and von Mises: the cohesion is the shear strength")
+    add_choice(p, "--material", MATERIALS[0], MATERIALS,
+               "law of the soil; Tresca and von Mises: the cohesion is the shear strength")  # fmt: skip
     add_number(p, "--tension-cutoff", None, "Pa", "largest principal stress (default: that of the strength)", at_least=0)
     add_number(p, "--residual-cohesion", 200.0, "Pa", "softening: cohesion in the end", at_least=0)
     add_number(p, "--residual-friction-angle", 15.0, "degrees", "softening: friction angle in the end", at_least=0, below=90)

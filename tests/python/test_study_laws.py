@@ -81,8 +81,9 @@ def test_slope_of_any_soil(tmp_path, options):
 
 
 def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
-    result = study("retrogression", tmp_path, "--cell-size", "1", "--crest", "8", "--runout-length", "6", "--height", "4", "--angle", "45", "--mesh", "crossed", "--cohesion", "24e3", "--unit-weight", "24e3",
-                   "--reference-length", "1", "--time", "3", "--frames", "3", "--meshes", "two", "--disturbed", "2")  # fmt: skip
+    small = ["--cell-size", "1", "--crest", "8", "--runout-length", "6", "--height", "4", "--angle", "45", "--mesh", "crossed"]
+    soil = ["--unit-weight", "24e3", "--cohesion", "24e3", "--reference-length", "1", "--disturbed", "2"]
+    result = study("retrogression", tmp_path, *small, *soil, "--time", "3", "--frames", "3", "--meshes", "two")
     assert result.returncode == 0, result.stderr
     found = summary(tmp_path)["cells"]
     assert set(found) == {"1_m", "0.5_m"}
