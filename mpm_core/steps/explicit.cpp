@@ -75,7 +75,7 @@ void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double d
     add_momentum<D>(moments, affine_field<D>(model.mesh, c, acceleration), dt);
   }
   scatter_momentum<D>(model.mesh, work.moments, work.velocity);
-  sum_shared(model.exchange, work.velocity.data()->data(), D);
+  sum_shared(model.exchange, work.velocity);
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
     for (int a = 0; a < D; ++a)
       work.velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.velocity[i][a] / work.nodes[i].mass : 0;

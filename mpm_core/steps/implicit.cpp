@@ -65,7 +65,7 @@ void find_forces(Model<D>& model, ImplicitStep<D>& step)
     }
   }
   add_ghost_forces(model, step);
-  sum_shared(model.exchange, step.forces.data()->internal.data(), 2 * D);
+  sum_shared(model.exchange, step.forces);
   for (std::size_t i = 0; i < step.forces.size(); ++i)
     model.work.nodes[i].internal = step.forces[i].internal;
 }

@@ -158,7 +158,7 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
       sums[model.mesh.cells[run.cell][k]][1] += volume * p_wave_modulus(model.laws[run.material]) * dot<D>(g, g);
     }
   }
-  sum_shared(exchange, sums.data()->data(), 2);
+  sum_shared(exchange, sums);
   update(step.halos.nodes, sums.data()->data(), 2);
 
   system.owned = std::move(owned);
@@ -266,7 +266,7 @@ void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::spa
   std::fill(nodal.begin(), nodal.end(), Vector<D>{});
   for (std::size_t k = 0; k < system.owned.size(); ++k)
     std::copy_n(&values[k * D], D, nodal[system.owned[k]].begin());
-  sum_shared(exchange, nodal.data()->data(), D);
+  sum_shared(exchange, nodal);
 }
 
 #define INSTANTIATE(D)                                                                                                 \

@@ -7,7 +7,7 @@ void map_to_nodes(Model<D>& model)
 {
   Workspace<D>& work = model.work;
   scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
-  sum_shared(model.exchange, &work.nodes.data()->mass, node_sums_width<D>);
+  sum_shared(model.exchange, work.nodes);
 }
 
 template <int D>

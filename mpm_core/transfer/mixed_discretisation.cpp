@@ -14,7 +14,7 @@ void average_volumetric_strain(const Mesh<D>& mesh, std::span<const double> volu
         sums[node][0] += theta[c] * volume[c];
         sums[node][1] += volume[c];
       }
-  sum_shared(exchange, sums.data()->data(), 2);
+  sum_shared(exchange, sums);
   for (Index c = 0; c < mesh.owned_cells; ++c)
     if (volume[c] > 0)
     {

@@ -17,8 +17,6 @@ struct NodeSums
   Vector<D> internal;      ///< f_int,i (14)
   Vector<D> traction;      ///< the part of f_ext,i (15) that boundary particles carry
 };
-template <int D>
-inline constexpr int node_sums_width = sizeof(NodeSums<D>) / sizeof(double);
 
 /// f_int of a vertex of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function
 template <int D>
