@@ -75,7 +75,7 @@ TEST(Spectral, TheCheckForYieldingMissesNothing)
       const double size = std::abs(s1) + std::abs(s3) + m.cohesion_cos;
       const double out = 1e-10 * size, in = -1e-5 * size;
       EXPECT_TRUE(may_yield(m, recomposed({s1 + out, s2 + out, s3 - out}, frame)));
-      EXPECT_FALSE(may_yield(m, recomposed({s1 + in, std::clamp(s2, s3 - in, s1 + in), s3 - in}, frame)));
+      EXPECT_FALSE(may_yield(m, recomposed({s1 + in, std::min(std::max(s2, s3 - in), s1 + in), s3 - in}, frame)));
     }
   }
 }
