@@ -1,0 +1,26 @@
+"""The study scaling: what is counted follows from geometry where the cut is known."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+STUDIES = Path(__file__).parents[2] / "studies"
+
+
+def test_scaling_runs_small_and_counts_what_geometry_says(tmp_path):
+    command = [sys.executable, str(STUDIES / "scaling.py"), "--output", str(tmp_path)]
+    result = subprocess.run([*command, "--side-2d", "24", "--side-3d", "4", "--steps", "2"],
+                            capture_output=True, text=True, timeout=120)  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    with open(tmp_path / "counted.csv", newline="") as file:
+        rows = {(int(row["dimension"]), int(row["ranks"])): row for row in csv.DictReader(file)}
+    assert rows[2, 1]["messages"] == rows[3, 1]["bytes"] == "0"
+    two = rows[2, 2]
+    # Two parts have one neighbour each, three messages; no cut of a square into halves is shorter than its side.
+    assert (two["neighbours"], two["messages"]) == ("1", "3") and 24 <= int(two["shared_nodes"]) <= 2 * 24 + 1
+    assert int(two["bytes"]) == 8 * 9 * int(two["shared_nodes"])
+    # Four times the ranks, half the sides of a part, within the raggedness of cuts through whole cells.
+    assert 1.2 < int(rows[2, 16]["shared_nodes"]) / int(rows[2, 64]["shared_nodes"]) < 3
+    with open(tmp_path / "timed.csv", newline="") as file:
+        assert [row["kind"] for row in csv.DictReader(file)] == ["strong", "weak"] * 2
