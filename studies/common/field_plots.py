@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator
 
 from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, boundary_edges, colour_limits, discs, paper_style
 
@@ -120,19 +121,21 @@ def save_convergence(
 
 
 def save_log_log(
-    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, slope: float = 1.0
+    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, slope: float = 2.0
 ) -> None:
     """Draw differences over the mesh size in logarithmic axes, with a line of the given slope to compare with."""
     sizes = np.asarray(sizes)
     with paper_style():
         figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
         for k, (name, values) in enumerate(curves.items()):
-            axes.loglog(sizes, values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
+            axes.loglog(sizes, values, "os^v"[k % 4] + "-", color=CURVES[k % len(CURVES)], markersize=4, label=name)
         lowest = np.nanmin([value for values in curves.values() for value in values])
         axes.loglog(sizes, 0.8 * lowest * (sizes / sizes.min()) ** slope, "--", color="black", linewidth=0.9,
                     label=f"slope {slope:g}")  # fmt: skip
         axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
         axes.minorticks_off()
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.set_xlabel("Cell size [m]")
         axes.set_ylabel(label)
         axes.tick_params(top=True, right=True, which="both")
@@ -224,13 +227,10 @@ def save_side_by_side(
     """
     limits = colour_limits(quantity, panels.values())
     lower, upper = scene.limits([])
-    each = 0.46 * WIDTH
-    height = each * (upper[1] - lower[1]) / (upper[0] - lower[0])
+    height = (WIDTH / len(panels) - 0.3) * (upper[1] - lower[1]) / (upper[0] - lower[0])
     with paper_style():
-        figure = plt.figure(figsize=(WIDTH, 2 * height + 1.0), layout="constrained")
-        grid = figure.subplots(2, 2).ravel()
-        for axes in grid[len(panels):]:
-            axes.set_axis_off()
+        figure = plt.figure(figsize=(WIDTH, height + 1.4), layout="constrained")
+        grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axes, (name, values) in zip(grid, panels.items()):
             axes.set_aspect("equal")
             axes.set_xlim(lower[0], upper[0])
@@ -239,13 +239,12 @@ def save_side_by_side(
             collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0,
                                rasterized=True)  # fmt: skip
             collection.set_array(quantity.scale * values)
-            axes.set_title(name, loc="left", pad=4)
+            axes.set_title(f"{name}, up to {quantity.scale * values.max():.3g} {quantity.unit}", loc="left", pad=4, fontsize=8.5)
             axes.set_xlabel("$x$ [m]", labelpad=1)
-            axes.set_ylabel("$y$ [m]", labelpad=1)
-        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=grid[-1], location="top",
-                              ticks=ROUND_TICKS, shrink=0.9, aspect=24, extend="max")  # fmt: skip
-        bar.set_label(quantity.label)
-        figure.suptitle(title, fontsize=10)
+        grid[0].set_ylabel("$y$ [m]", labelpad=1)
+        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=list(grid), location="bottom",
+                              ticks=ROUND_TICKS, shrink=0.55, aspect=45, extend="max")  # fmt: skip
+        bar.set_label(f"{quantity.label}; {title}")
         _save(figure, path)
 
 

@@ -25,7 +25,7 @@ from matplotlib.ticker import MaxNLocator
 
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
-CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444")
+CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 ROUND_TICKS = MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
 WIDTH = 6.9  # in; a page's text width
 STYLE = {

@@ -1,0 +1,217 @@
+"""Particles against FEM below collapse: the displacements of both at rest, for several unit weights and mesh sizes.
+
+Particles are loaded by their weight, slowly and with damping, until they are at rest; quadratic finite elements on the finest
+mesh are the reference, and the difference of the displacements shrinks with the size of the particles' cells. The soil is a
+hundred times as stiff as in the study slope, so that strains are small, as the finite elements assume; with soft soil
+(--young 200e3) a difference of some percent remains, because particles follow the body as it deforms and cross into other cells.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import perf_counter
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+import numpy as np
+from common.field_plots import save_log_log, save_side_by_side
+from common.options import add_choice, add_count, add_number, change_defaults, study_parser
+from common.plots import Quantity
+from common.ranks import end_all_on_error
+from common.slope_case import (
+    GRAVITY, SUPPORTS, SlopeCase, add_geometry_options, add_slope_options, add_soil_options, build_slope, check_slope_options,
+    soil_of,
+)  # fmt: skip
+from common.slope_fem import mesh_sizes, step_line, weight
+from common.summary import OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+UNIT_WEIGHTS = (5e3, 10e3, 15e3, 20e3)
+"""[N/m3]"""
+DISPLACEMENT = Quantity("Displacement", "mm", scale=1e3)
+AT_REST = 1e-4
+"""Out-of-balance over external force at which the particles are at rest."""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_geometry_options(p, cell_size=0.05)
+    add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
+    add_count(p, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_soil_options(p, dilation_angle=None)
+    add_choice(p, "--scheme", "explicit", ("explicit", "implicit"), "how particles come to rest: damped motion, or without inertia")
+    add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
+    add_number(p, "--ramp", 30.0, "-", "time over which the weight rises in the explicit scheme, in times that a pressure wave "
+               "takes over the height", above=0)  # fmt: skip
+    change_defaults(p, young=20e6)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    if options.mesh is None and options.angle in (45, 90):
+        options.mesh = "fitted"  # as "crossed", for any cell size
+    check_slope_options(p, options)
+    return options
+
+
+# --- 2. Both methods -------------------------------------------------------------------------------------------------
+
+
+def finite_elements(a: Namespace) -> dict[float, bridge.QuasiStatic]:
+    """The reference under each unit weight; those beyond collapse are left out."""
+    background = bridge.slope_mesh(
+        comm, height=a.height, angle=a.angle, crest=a.crest, cell_size=a.cell_size, kind=a.mesh, runout=a.cell_size
+    )
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    solved = {}
+    for unit_weight in UNIT_WEIGHTS:
+        fem = bridge.QuasiStatic(domain, soil_of(a), facet_tags, SUPPORTS, degree=2)
+        fem.solve(weight(unit_weight), progress=step_line(f"FEM, {unit_weight / 1e3:g} kN/m3"))
+        if fem.converged:
+            solved[unit_weight] = fem
+    return solved
+
+
+def particles_at_rest(a: Namespace, cell_size: float, unit_weight: float) -> tuple[SlopeCase, mpm.Report]:
+    """Particles of a slope whose weight has risen from nothing, at rest."""
+    others = ArgumentParser()
+    add_slope_options(others)
+    options = {**vars(others.parse_args([])), **vars(a), "cell_size": cell_size, "unit_weight": unit_weight, "runout_length": 4 * cell_size}
+    case = build_slope(Namespace(**options), comm)
+    if a.scheme == "implicit":
+        case.model.set_gravity(case.model.gravity, ramp=1.0)
+        for _ in case.model.implicit(1.0, dt=0.1, quasi_static=True):
+            pass
+        return case, case.model.equilibrate()
+    ramp = a.ramp * a.height / wave_speed(a, unit_weight)
+    case.model.set_gravity(case.model.gravity, ramp=ramp)
+    for report in case.model.explicit(20 * ramp, every=0.25 * ramp, damping=a.damping):
+        if report.time > ramp and report.unbalanced_ratio < AT_REST:
+            break
+    return case, report
+
+
+def wave_speed(a: Namespace, unit_weight: float) -> float:
+    """Speed of pressure waves in the elastic soil [m/s]."""
+    modulus = a.young * (1 - a.poisson) / ((1 + a.poisson) * (1 - 2 * a.poisson))
+    return float(np.sqrt(modulus * GRAVITY / unit_weight))
+
+
+def compared(a: Namespace, fem: bridge.QuasiStatic, cell_size: float, unit_weight: float) -> tuple[dict, SlopeCase]:
+    """Numbers of one comparison, and the particles."""
+    case, report = particles_at_rest(a, cell_size, unit_weight)
+    difference = bridge.compare(fem, case.model)
+    crest_id = case.crest_particle()
+    row = np.flatnonzero(case.model.particles.id == crest_id)
+    moved, off = case.model.particles.displacement[row].sum(axis=0), difference["displacement"].here[row].sum(axis=0)
+    moved, off = comm.allreduce(moved), comm.allreduce(off)
+    reference = float(np.linalg.norm(moved - off))
+    return {
+        "unit_weight": unit_weight,
+        "cell_size_m": cell_size,
+        "displacement_difference_l2": difference["displacement"].l2,
+        "displacement_difference_maximum": difference["displacement"].maximum,
+        "stress_difference_l2": difference["stress"].l2,
+        "crest_displacement_fem_m": reference,
+        "crest_displacement_mpm_m": float(np.linalg.norm(moved)),
+        "crest_displacement_difference": float(np.linalg.norm(off)) / reference,
+        "out_of_balance_ratio": report.unbalanced_ratio,
+        "time_s": report.time,
+    }, case
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw_fields(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float, folder: Path) -> None:
+    """FEM, particles and their difference side by side. Collective."""
+    scene, p = case.scene(), case.model.particles
+    here = bridge.compare(fem, case.model)["displacement"].here
+    fields = {"finite elements": p.displacement - here, "particles": p.displacement, "difference": here}
+    values = {name: np.linalg.norm(field, axis=1) for name, field in fields.items()}
+    parts = comm.gather((p.initial_position, p.volume, values))
+    if parts is None:
+        return
+    position, volume = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    panels = {name: np.concatenate([part[2][name] for part in parts]) for name in values}
+    save_side_by_side(folder / f"side_by_side_{unit_weight / 1e3:g}kN.png", scene, position, volume, panels, DISPLACEMENT,
+                      f"{unit_weight / 1e3:g} kN/m$^3$, cells of {case.args.cell_size:g} m")  # fmt: skip
+
+
+def draw_convergence(rows: list[dict], sizes: list[float], folder: Path) -> None:
+    """Differences over the mesh size, in logarithmic axes."""
+    for key, label, name in (
+        ("displacement_difference_l2", "Difference in displacement, relative $L_2$ norm [-]", "convergence"),
+        ("crest_displacement_difference", "Difference in displacement at the crest, relative [-]", "convergence_crest"),
+    ):
+        curves = {}
+        for row in rows:
+            curves.setdefault(f"{row['unit_weight'] / 1e3:g} kN/m$^3$", []).append(row[key])
+        save_log_log(folder / f"{name}.png", sizes, curves, label)
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    start = perf_counter()
+    folder = results_folder("compare_fem", a.output, comm)
+    sizes = mesh_sizes(a)
+    fems = finite_elements(a)
+    rows = []
+    for unit_weight, fem in fems.items():
+        for size in sizes:
+            row, case = compared(a, fem, size, unit_weight)
+            rows.append(row)
+            if comm.rank == 0:
+                print(line(row), flush=True)
+        draw_fields(case, fem, unit_weight, folder)
+    if comm.rank == 0:
+        draw_convergence(rows, sizes, folder)
+    finest = {f"{row['unit_weight']:g}": row for row in rows if row["cell_size_m"] == sizes[-1]}
+    summary = {
+        "scheme": a.scheme,
+        "beyond_collapse_unit_weights": [unit_weight for unit_weight in UNIT_WEIGHTS if unit_weight not in fems],
+        "crest_displacement_difference_on_finest_mesh": {
+            key: row["crest_displacement_difference"] for key, row in finest.items()
+        },
+        "displacement_difference_l2_on_finest_mesh": {
+            key: row["displacement_difference_l2"] for key, row in finest.items()
+        },
+        "comparisons": rows,
+        "wall_seconds": perf_counter() - start,
+    }
+    write_summary(folder, a, summary, comm)
+    if comm.rank == 0:
+        print(f"results in {folder}")
+    return 0
+
+
+def line(row: dict) -> str:
+    """A comparison as it is printed."""
+    return (
+        f"{row['unit_weight'] / 1e3:4g} kN/m3, cells of {row['cell_size_m']:<6g} m: displacement differs by "
+        f"{row['displacement_difference_l2']:.2%} (L2), {row['displacement_difference_maximum']:.2%} (largest), at the crest "
+        f"{row['crest_displacement_difference']:.2%}; stress {row['stress_difference_l2']:.1%}; out of balance "
+        f"{row['out_of_balance_ratio']:.0e}"
+    )
+
+
+if __name__ == "__main__":
+    end_all_on_error(comm)
+    try:
+        sys.exit(main())
+    except (mpm.InputError, mpm.RunError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run compare_fem: {error}", file=sys.stderr)
+        sys.exit(2)

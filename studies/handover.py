@@ -1,0 +1,172 @@
+"""When to hand over: the load at which particles take over from FEM, and what it changes in the final run-out.
+
+The slope is brought to elasto-plastic equilibrium by FEM under a share of the unit weight at which it collapses; particles take
+that over; then the unit weight is raised at once to its full value and the slope slides, as in the study slope. A share of zero
+is the slide from nothing.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import perf_counter
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+import numpy as np
+from common.field_plots import save_curves
+from common.options import add_number, add_switch, study_parser
+from common.plots import save_history
+from common.ranks import end_all_on_error
+from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.slope_fem import step_line, weight
+from common.summary import OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+SHARES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
+"""Of the unit weight at collapse of the finite elements, at which particles take over."""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_slope_options(p)
+    add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    add_number(p, "--time", 34.8, "s", "duration of each slide", above=0)
+    add_switch(p, "--move", False, "move particles with the body's displacement in the FEM; otherwise they stay in place")
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check_slope_options(p, options)
+    return options
+
+
+# --- 2. Hand-over and slide ------------------------------------------------------------------------------------------
+
+
+def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
+    """Give the particles the equilibrium under a unit weight; None for zero, which needs none."""
+    if unit_weight == 0:
+        return None
+    fem = soil_fem(case)
+    fem.solve(weight(unit_weight))
+    case.model.set_gravity((0.0, -GRAVITY * unit_weight / case.args.unit_weight))
+    report = bridge.initialise(case.model, fem, move=case.args.move)
+    case.model.set_gravity((0.0, -GRAVITY))
+    return report
+
+
+def slide(case: SlopeCase, toe: float, crest_id: int) -> np.ndarray:
+    """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]."""
+    a, particles = case.args, case.model.particles
+
+    def farthest() -> float:
+        return comm.allreduce(particles.position[:, 0].max(initial=-np.inf), MPI.MAX) - toe
+
+    def crest() -> float:
+        mine = particles.displacement[particles.id == crest_id]
+        return comm.allreduce(float(np.linalg.norm(mine)))
+
+    rows = [(0.0, farthest(), crest())]
+    for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping):
+        rows.append((report.time, farthest(), crest()))
+    return np.array(rows)
+
+
+def run(a: Namespace, share: float, unit_weight: float) -> dict:
+    """One hand-over and slide; what is to be told about it."""
+    case = build_slope(a, comm)
+    toe = comm.allreduce(case.model.particles.position[:, 0].max(initial=-np.inf), MPI.MAX)
+    crest_id = case.crest_particle()
+    report = hand_over(case, unit_weight)
+    history = slide(case, toe, crest_id)
+    if comm.rank == 0:
+        print(f"handed over at {share:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
+              file=sys.stderr, flush=True)  # fmt: skip
+    return {"share": share, "unit_weight": unit_weight, "report": report, "history": history}
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(runs: list[dict], folder: Path) -> None:
+    """Run-out over the share, and over time; on the first rank."""
+    shares = np.array([run["share"] for run in runs])
+    final = {"run-out": (100 * shares, np.array([run["history"][-1, 1] for run in runs])),
+             "displacement at the crest": (100 * shares, np.array([run["history"][-1, 2] for run in runs]))}  # fmt: skip
+    save_curves(folder / "runout_over_share.png", final, ("Unit weight at hand-over [% of collapse]", "At the end [m]"),
+                limits=((-2, 102), (0, None)))  # fmt: skip
+    crest = {f"{run['share']:.0%}": run["history"][:, 2] for run in runs}
+    save_history(folder / "crest_over_time.png", runs[0]["history"][:, 0], crest, "Displacement of the particle at the crest [m]",
+                 limits=(0, 1.08 * max(curve.max() for curve in crest.values())))  # fmt: skip
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    start = perf_counter()
+    folder = results_folder("handover", a.output, comm)
+    fem = soil_fem(build_slope(a, comm))
+    collapse = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse")).value
+    runs = [run(a, share, share * collapse) for share in SHARES]
+    if comm.rank == 0:
+        draw(runs, folder)
+    runouts = [float(run["history"][-1, 1]) for run in runs]
+    summary = {
+        "collapse_unit_weight_of_the_finite_elements": collapse,
+        "runout_m_by_share_of_collapse": {f"{run['share']:g}": runout for run, runout in zip(runs, runouts)},
+        "largest_relative_change_of_runout": (max(runouts) - min(runouts)) / max(runouts) if max(runouts) > 0 else 0.0,
+        "handovers": [told(run) for run in runs],
+        "wall_seconds": perf_counter() - start,
+    }
+    write_summary(folder, a, summary, comm)
+    if comm.rank == 0:
+        tell(summary, folder)
+    return 0
+
+
+def told(run: dict) -> dict:
+    """A run as the summary has it."""
+    report = run["report"]
+    return {
+        "share_of_collapse": run["share"],
+        "unit_weight": run["unit_weight"],
+        "out_of_balance_ratio_before": report.unbalanced_ratio if report else None,
+        "out_of_balance_ratio_after": report.settled_ratio if report else None,
+        "newly_yielded_share": report.yielded_share if report else None,
+        "runout_m": run["history"][-1, 1],
+        "crest_displacement_m": run["history"][-1, 2],
+    }
+
+
+def tell(summary: dict, folder: Path) -> None:
+    print(f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3")
+    print("share  unit weight  out of balance before, after  newly yielded  run-out   crest")
+    for row in summary["handovers"]:
+        balance = "          -         -                -   "
+        if row["newly_yielded_share"] is not None:
+            balance = (f"{row['out_of_balance_ratio_before']:13.1e}{row['out_of_balance_ratio_after']:13.1e}"
+                       f"{row['newly_yielded_share']:17.2%}")  # fmt: skip
+        print(f"{row['share_of_collapse']:5.0%}{row['unit_weight'] / 1e3:8.2f} kN/m3{balance:>43}"
+              f"{row['runout_m']:9.4f} m{row['crest_displacement_m']:8.4f} m")  # fmt: skip
+    print(f"run-out changes by {summary['largest_relative_change_of_runout']:.1%} at most; results in {folder}")
+
+
+if __name__ == "__main__":
+    end_all_on_error(comm)
+    try:
+        sys.exit(main())
+    except (mpm.InputError, mpm.RunError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run handover: {error}", file=sys.stderr)
+        sys.exit(2)
