@@ -88,9 +88,10 @@ def run_implicit(
     """Step until a time; reports at intervals, or after each step."""
     stepper = Stepper(model, solver, options, dt)
     start, close = model.time, 1e-9 * abs(until)
-    count = 1 if interval is None else max(1, int(np.ceil((until - start) / interval - 1e-9)))
+    length = until - start if interval is None else interval
+    count = 1 if interval is None else max(1, int(np.ceil((until - start) / length - 1e-9)))
     for k in range(1, count + 1):
-        target = until if k == count else start + k * interval
+        target = until if k == count else start + k * length
         while target - model.time > close:
             stepper.advance(target)
             if target - model.time <= close:

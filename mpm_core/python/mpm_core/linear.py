@@ -15,11 +15,11 @@ from petsc4py import PETSc
 _DIRECT_LIMIT = {2: 150_000, 3: 20_000}
 """Nodes up to which the default is a direct solver, by dimension."""
 
-_DIRECT = {"ksp_type": "preonly", "pc_type": "lu"}
+_DIRECT: dict[str, Any] = {"ksp_type": "preonly", "pc_type": "lu"}
 if PETSc.Sys.hasExternalPackage("mumps"):
     _DIRECT["pc_factor_mat_solver_type"] = "mumps"
 
-_MULTIGRID = {
+_MULTIGRID: dict[str, Any] = {
     "ksp_type": "fgmres",
     "ksp_rtol": 1e-6,
     "ksp_gmres_restart": 100,

@@ -69,12 +69,11 @@ class NewtonSolver:
             if solution.iterations >= self._options.max_iterations:
                 solution.reason = f"|r| is {solution.residuals[-1]:.2e} after {solution.iterations} iterations"
                 return solution
-            correction = self._correction(step, dt)
+            correction = self._correction(step, dt, solution)
             if correction is None:
                 solution.reason = "the linear solver failed"
                 return solution
             solution.iterations += 1
-            solution.linear_iterations.append(self._tangent.iterations)
             report = self._search(step, correction, report)
             if report is None:
                 solution.reason = f"every part of the correction makes |r| = {solution.residuals[-1]:.2e} much larger"
@@ -84,14 +83,17 @@ class NewtonSolver:
         solution.easy = solution.iterations <= EASY_ITERATIONS
         return solution
 
-    def _correction(self, step: Any, dt: float) -> NDArray[np.float64] | None:
+    def _correction(self, step: Any, dt: float, solution: Solution) -> NDArray[np.float64] | None:
         """Change of v1 that the linearised residual asks for."""
         step.assemble()
         if self._tangent is None:
             self._tangent = Tangent(step, self._comm, self._dim, self._options.prefix)
         self._tangent.update(step)
         du = self._tangent.solve(step.residual)
-        return None if du is None else du / dt
+        if du is None:
+            return None
+        solution.linear_iterations.append(self._tangent.iterations)
+        return du / dt
 
     def _search(self, step: Any, correction: NDArray[np.float64], before: dict) -> dict | None:
         """Move by the largest of 1, 1/2, 1/4, ... of the correction that lowers |r|.
