@@ -1,4 +1,4 @@
-"""The paper's slope: initial stresses by FEM, then failure and slide by MPM with the explicit scheme.
+"""The paper's slope: initial stresses by FEM, then failure and slide by MPM, explicit or implicit.
 
 The elasto-plastic equilibrium of the soil body under its initial unit weight is found in DOLFINx; its stresses go to the
 particles; the unit weight is raised at once, and the slope slides until its geometry has changed enough to carry it. The
@@ -24,8 +24,10 @@ from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_lim
 from common.progress import Progress
 from common.report import Movie, Report, save_report
 from common.ranks import end_all_on_error
-from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
+from common.schemes import add_scheme_options, check_scheme_options, run_scheme
+from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
+from common.watch import Watch
 from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
 
@@ -45,13 +47,14 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_slope_options(p)
-    add_choice(p, "--initial", "fem", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
+    add_choice(p, "--initial", None, ("fem", "elastic", "k0", "zero"),
+               "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
-    add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
+    add_scheme_options(p)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
     add_output_options(p, FIELDS)
     add_checkpoint_options(p)
@@ -65,54 +68,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_slope_options(p, options)
     if options.paper:
         options.initial, options.dt = "zero", 1e-4
+    check_scheme_options(p, options)
     return options
 
 
-# --- 2. What is looked at over time ----------------------------------------------------------------------------------
-
-
-class Watch:
-    """The particle at the crest, the farthest particle, and frames of all particles for the pictures."""
-
-    def __init__(self, case: SlopeCase) -> None:
-        self.model = case.model
-        start = self.model.particles.initial_position
-        self.crest_id = case.crest_particle()
-        self.first_toe = comm.allreduce(start[:, 0].max(initial=-np.inf), MPI.MAX)
-        self.frames: list[dict[str, np.ndarray]] = []
-
-    def fields(self) -> dict[str, np.ndarray]:
-        p = self.model.particles
-        return {
-            "position": p.position, "displacement": p.displacement, "velocity": p.velocity, "stress": p.stress,
-            "deviatoric_strain": p.deviatoric_strain, "plastic_strain": p.plastic_strain, "volume": p.volume,
-            "id": p.id, "material": p.material,
-        }  # fmt: skip
-
-    def crest_displacement(self, fields: dict[str, np.ndarray]) -> float:
-        """Length of the displacement of the particle that started at the crest [m]. Collective."""
-        mine = fields["displacement"][fields["id"] == self.crest_id]
-        return comm.allreduce(float(np.linalg.norm(mine)))
-
-    def runout(self, fields: dict[str, np.ndarray]) -> float:
-        """Advance of the farthest particle past where the farthest one started [m]. Collective."""
-        return comm.allreduce(fields["position"][:, 0].max(initial=-np.inf), MPI.MAX) - self.first_toe
-
-    def keep(self, time: float, fields: dict[str, np.ndarray]) -> None:
-        """Store a frame for the pictures, on the first rank. Collective."""
-        shown = {
-            "position": fields["position"], "volume": fields["volume"], "id": fields["id"],
-            "displacement": np.linalg.norm(fields["displacement"], axis=1),
-            # Plastic, because elastic oscillations during the long creep add up in the total.
-            "shear_strain": fields["plastic_strain"], "vertical_stress": fields["stress"][:, 1],
-        }  # fmt: skip
-        parts = comm.gather({name: values if name == "id" else values.astype(np.float32) for name, values in shown.items()})
-        if parts is not None:
-            frame = {name: np.concatenate([part[name] for part in parts]) for name in shown}
-            self.frames.append({"time": np.float64(time), **frame})
-
-
-# --- 3. The slide ----------------------------------------------------------------------------------------------------
+# --- 2. The slide ----------------------------------------------------------------------------------------------------
 
 
 class Files:
@@ -171,8 +131,9 @@ def slide(
         report = model.report()
         done_before = report.particle_steps
         look(report)
-        run = model.explicit(a.time, every=a.time / a.frames, since=0.0, watch=between_steps,
-                             dt=a.dt, damping=a.damping, pic=a.pic, nmd=a.nmd)  # fmt: skip
+        if a.scheme == "quasi-static":
+            model.set_gravity((0.0, -GRAVITY), ramp=a.time)
+        run = run_scheme(a, model, a.time / a.frames, between_steps)
         started = perf_counter()
         try:
             for report in run:
@@ -192,7 +153,7 @@ def slide(
     return {**loop, "report": report, "particle_steps": report.particle_steps - done_before}
 
 
-# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
 def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
@@ -238,8 +199,8 @@ def write_page(case: SlopeCase, watch: Watch, history: History, folder: Path, su
     save_report(folder / "report.html", Report(
         title="A slope slides",
         subtitle=f"{case.args.height:g} m high, inclined by {case.args.angle:g} degrees, unit weight "
-                 f"{case.args.unit_weight / 1e3:g} kN/m\u00b3. Initial stresses: {case.args.initial}; slide by the explicit "
-                 "material point method.",
+                 f"{case.args.unit_weight / 1e3:g} kN/m\u00b3. Initial stresses: {case.args.initial}; slide by the "
+                 f"{case.args.scheme} material point method.",
         facts=facts,
         movies=[Movie("", scene, watch.frames, quantities)],
         history=history,
@@ -249,7 +210,7 @@ def write_page(case: SlopeCase, watch: Watch, history: History, folder: Path, su
     ))  # fmt: skip
 
 
-# --- 5. All together -------------------------------------------------------------------------------------------------
+# --- 4. All together -------------------------------------------------------------------------------------------------
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -285,6 +246,7 @@ def main(arguments: list[str] | None = None) -> int:
     names = list(clock)
     report = loop["report"]
     summary = {
+        "scheme": a.scheme,
         "finished_run": loop["stopped"] is None,
         "stopped_because": loop["stopped"],
         "time_s": report.time,
@@ -295,7 +257,8 @@ def main(arguments: list[str] | None = None) -> int:
         **start,
         "crest_displacement_m": history["crest_displacement_m"][-1],
         "runout_m": history["runout_m"][-1],
-        "energy_balance_error": loop["energy_balance_error"],
+        # Backward Euler takes energy out, and there is none to balance in a quasi-static run.
+        "energy_balance_error": loop["energy_balance_error"] if a.scheme == "explicit" else None,
         "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }

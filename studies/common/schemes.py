@@ -1,0 +1,72 @@
+"""The time schemes that studies can choose from on the command line, and their runs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+
+import mpm_core as mpm
+
+from .options import add_choice, add_number, check
+
+SCHEMES = ("explicit", "implicit", "quasi-static")
+SOLVERS = ("newton", "relaxation")
+IMPLICIT_STEP = 20.0
+"""Default step of the implicit schemes over the critical one."""
+
+
+def add_scheme_options(parser: argparse.ArgumentParser) -> None:
+    """Options ``--scheme``, ``--solver`` and ``--dt``."""
+    add_choice(parser, "--scheme", "explicit", SCHEMES,
+               "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
+    add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
+    add_number(parser, "--dt", None, "s", "longest time step (default: half of the critical one; 20 times the critical "
+               "one where implicit or quasi-static)", above=0)  # fmt: skip
+
+
+def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Fill in ``initial`` (default: fem, or zero where quasi-static), and end with an error where options do not fit."""
+    if options.initial is None:
+        options.initial = "zero" if options.scheme == "quasi-static" else "fem"
+    check(parser, options.scheme != "quasi-static" or options.initial == "zero",
+          lambda: f"--initial is {options.initial}, expected zero with --scheme quasi-static, which raises the unit weight "
+                  "from zero")  # fmt: skip
+
+
+def solver_named(name: str) -> mpm.Newton | mpm.Relaxation:
+    """The solver of an implicit step by its name on the command line."""
+    return mpm.Newton() if name == "newton" else mpm.Relaxation()
+
+
+def time_step(options: argparse.Namespace, model: mpm.Model) -> float | None:
+    """The step asked for or the scheme's default [s]; None leaves it to the explicit scheme. Collective."""
+    if options.dt is not None or options.scheme == "explicit":
+        return options.dt
+    return IMPLICIT_STEP * model.critical_time_step()
+
+
+def run_scheme(
+    options: argparse.Namespace, model: mpm.Model, every: float, watch: Callable[[], bool]
+) -> Iterator[mpm.Report]:
+    """Run a model to ``--time`` by the scheme asked for; yields reports.
+
+    Args:
+        options: with those of `add_scheme_options` and time, damping, pic and nmd.
+        every: time between reports, counted from zero [s].
+        watch: called between steps of the explicit scheme, before reports of the others; true ends the run after a report.
+
+    Raises:
+        RunError: see ``Model.explicit`` and ``Model.implicit``; quasi-static, beyond the collapse load.
+    """
+    a, dt = options, time_step(options, model)
+    common = {"damping": a.damping, "pic": a.pic, "nmd": a.nmd}
+    if a.scheme == "explicit":
+        yield from model.explicit(a.time, every=every, since=0.0, watch=watch, dt=dt, **common)
+        return
+    run = model.implicit(a.time, dt=dt, solver=solver_named(a.solver), every=every,
+                         quasi_static=a.scheme == "quasi-static", **common)  # fmt: skip
+    for report in run:
+        ends = watch()
+        yield report
+        if ends:
+            return

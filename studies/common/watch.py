@@ -1,0 +1,50 @@
+"""What studies of a sliding slope look at over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from .slope_case import SlopeCase
+
+
+class Watch:
+    """The particle at the crest, the farthest particle, and frames of all particles for the pictures."""
+
+    def __init__(self, case: SlopeCase) -> None:
+        self.model = case.model
+        start = self.model.particles.initial_position
+        self.crest_id = case.crest_particle()
+        self.first_toe = self.model.comm.allreduce(start[:, 0].max(initial=-np.inf), MPI.MAX)
+        self.frames: list[dict[str, np.ndarray]] = []
+
+    def fields(self) -> dict[str, np.ndarray]:
+        p = self.model.particles
+        return {
+            "position": p.position, "displacement": p.displacement, "velocity": p.velocity, "stress": p.stress,
+            "deviatoric_strain": p.deviatoric_strain, "plastic_strain": p.plastic_strain, "volume": p.volume,
+            "id": p.id, "material": p.material,
+        }  # fmt: skip
+
+    def crest_displacement(self, fields: dict[str, np.ndarray]) -> float:
+        """Length of the displacement of the particle that started at the crest [m]. Collective."""
+        mine = fields["displacement"][fields["id"] == self.crest_id]
+        return self.model.comm.allreduce(float(np.linalg.norm(mine)))
+
+    def runout(self, fields: dict[str, np.ndarray]) -> float:
+        """Advance of the farthest particle past where the farthest one started [m]. Collective."""
+        return self.model.comm.allreduce(fields["position"][:, 0].max(initial=-np.inf), MPI.MAX) - self.first_toe
+
+    def keep(self, time: float, fields: dict[str, np.ndarray]) -> None:
+        """Store a frame for the pictures, on the first rank. Collective."""
+        shown = {
+            "position": fields["position"], "volume": fields["volume"], "id": fields["id"],
+            "displacement": np.linalg.norm(fields["displacement"], axis=1),
+            # Plastic, because elastic oscillations during the long creep add up in the total.
+            "shear_strain": fields["plastic_strain"], "vertical_stress": fields["stress"][:, 1],
+        }  # fmt: skip
+        single = {name: values if name == "id" else values.astype(np.float32) for name, values in shown.items()}
+        parts = self.model.comm.gather(single)
+        if parts is not None:
+            frame = {name: np.concatenate([part[name] for part in parts]) for name in shown}
+            self.frames.append({"time": np.float64(time), **frame})
