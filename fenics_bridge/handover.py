@@ -27,14 +27,17 @@ class Handover:
     yielded_share: float
 
 
-def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate=True):
+def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True):
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
 
-    Particles stay where they are; each takes the stress and the state of the finite elements there, is returned to the
-    yield surface should it be outside, and loses its velocity. The model's gravity must be that of the equilibrium.
+    Each particle takes the stress and the state of the finite elements where it is, is returned to the yield surface
+    should it be outside, and loses its velocity. The model's gravity must be that of the equilibrium.
 
     model: `mpm_core.Model` with particles; fem: QuasiStatic, solved and converged, or ElasticSolution; the meshes and
         their partitions may differ
+    move: move particles with the body, by its displacement; otherwise they stay where they are. (Small strains: their
+        volumes stay in both cases.) A body that has moved does not fill cells as before and so is not in equilibrium at
+        once, not even on the same cells.
     count_displacement: displacements of particles include those of the finite elements; otherwise they start from zero
     smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
         equilibrium as it is; with other cells the smooth stress is far nearer to it.
@@ -55,14 +58,24 @@ def initialise(model, fem, *, count_displacement=True, smooth=False, equilibrate
     particles.set("stress", stress)
     particles.set("state", state)
     particles.set("velocity", np.zeros_like(particles.velocity))
-    if count_displacement:
-        particles.set("initial_position", particles.position - search.values(fem.displacement))
+    _displace(model, search.values(fem.displacement), move, count_displacement)
     before = model.out_of_balance()
-    had_yielded = int(np.sum(state[:, 0] > 0))
+    had_yielded = int(np.sum(particles.plastic_strain > 0))
     settled = model.equilibrate().unbalanced_ratio if equilibrate else None
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
     return Handover(before, settled, returned / count, yielded / count)
+
+
+def _displace(model, displacement, move, count):
+    """Move the particles, count the displacement as theirs, both or neither; rows may have another order afterwards."""
+    start = model.particles.position
+    if count:
+        model.particles.set("initial_position", start if move else start - displacement)
+    elif move:
+        model.particles.set("initial_position", start + displacement)
+    if move:
+        model.place(start + displacement)
 
 
 def _returned(laws, material, stress, state):

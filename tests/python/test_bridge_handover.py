@@ -50,6 +50,27 @@ def test_particles_take_the_values_of_the_finite_elements():
     bridge.initialise(slope_particles(UNIT_WEIGHT), fem, count_displacement=False, equilibrate=False)
 
 
+@pytest.mark.parametrize("count", [True, False])
+def test_particles_move_with_the_body(count):
+    """Then they no longer fill cells as before; a zero-load equilibration brings them back into balance."""
+    fem, model = solved(), slope_particles(UNIT_WEIGHT)
+    order = np.argsort(model.particles.id)
+    start = model.particles.position[order]
+    moved = fem.evaluate_at(start)["displacement"]
+    bridge.initialise(model, fem, move=True, count_displacement=count, equilibrate=False)
+    order = np.argsort(model.particles.id)
+    assert np.allclose(model.particles.position[order], start + moved, atol=1e-14)
+    assert np.allclose(model.particles.displacement[order], moved if count else 0.0, atol=1e-14)
+    assert np.abs(moved).max() > 0.01
+
+
+def test_particles_that_moved_come_into_equilibrium():
+    model = slope_particles(UNIT_WEIGHT)
+    report = bridge.initialise(model, solved(degree=1), move=True)
+    assert report.unbalanced_ratio > 1e-3 > report.settled_ratio
+    assert report.yielded_share < 0.05
+
+
 def test_smooth_stress_is_brought_inside_the_strength():
     model = slope_particles(UNIT_WEIGHT, cell_size=0.05)
     report = bridge.initialise(model, solved(), smooth=True, equilibrate=False)
