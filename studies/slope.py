@@ -117,7 +117,8 @@ def slide(
         crest, runout = watch.crest_displacement(fields), watch.runout(fields)
         history.add(
             time_s=report.time, crest_displacement_m=crest, runout_m=runout, kinetic_energy_J_per_m=report.kinetic_energy,
-            unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share, dt_s=report.dt,
+            unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share,
+            dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
         files.write(report.time, fields)
         watch.keep(report.time, fields)
