@@ -35,3 +35,18 @@ def test_quasi_static_slope_carries_what_it_can(tmp_path):
     assert summary["time_s"] == 1.0 and summary["steps"] == 4 and summary["energy_balance_error"] is None
     bad, _ = study("slope", tmp_path / "b", "--scheme", "quasi-static", "--initial", "fem")
     assert bad.returncode == 2 and "--initial is fem" in bad.stderr and "zero" in bad.stderr
+
+
+def test_both_schemes_side_by_side(tmp_path):
+    result, summary = study("slope_schemes", tmp_path, "--time", "2", "--implicit-time", "1",
+                            "--longer-steps", "1", "--frames", "5")  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    assert {path.name for path in tmp_path.glob("*.png")} == {
+        "displacement.png", "shear_strain.png", "vertical_stress.png", "crest.png"
+    }  # fmt: skip
+    newton, relaxation = (
+        next(row for name, row in summary["runs"].items() if f"{solver}, 20 " in name + " ") for solver in ("Newton", "relaxation")
+    )
+    # One residual and, as neither solver had to cut a step, the same steps: the solver does not change where the slope goes.
+    assert relaxation["steps"] == newton["steps"]
+    assert relaxation["crest_displacement_m"] == pytest.approx(newton["crest_displacement_m"], rel=1e-5)

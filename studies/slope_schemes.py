@@ -1,0 +1,209 @@
+"""The damped slope by the explicit and the implicit scheme: where it comes to rest, and what that takes.
+
+The paper's slope at once under its full weight, by the explicit scheme, by Newton's method with several time steps and by
+transient relaxation. A run counts as at rest from the time on from which the crest stays within 1 % of its last displacement.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import process_time
+
+import matplotlib.pyplot as plt
+import mpm_core as mpm
+import numpy as np
+from common.options import add_choice, add_count, add_number, add_switch, study_parser
+from common.plots import (
+    CURVES, DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, WIDTH, Quantity, Scene, colour_limits, discs, draw_bar,
+    draw_scene, paper_style,
+)  # fmt: skip
+from common.progress import Progress
+from common.ranks import end_all_on_error
+from common.schemes import run_scheme
+from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
+from common.summary import OutputError, results_folder, write_summary
+from common.watch import Watch
+from matplotlib.colors import Normalize
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+AT_REST = 0.01
+"""Share of the last displacement of the crest that it may still move by."""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_slope_options(p)
+    add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
+    add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
+    add_number(p, "--time", 200.0, "s", "duration of the explicit slide", above=0)
+    add_number(p, "--implicit-time", 20.0, "s", "duration of the implicit slides", above=0)
+    add_number(p, "--step", 20.0, "-", "shortest step of the implicit runs over the critical one", above=0)
+    add_count(p, "--longer-steps", 2, "further runs by Newton's method, with steps 2.5 and then 5 times as long", choices=(1, 2))
+    add_count(p, "--frames", 120, "times at which the crest is looked at in the explicit run")
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check_slope_options(p, options)
+    return options
+
+
+# --- 2. Runs ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Run:
+    """One slide; `curve` has rows of time [s] and displacement of the crest [m]."""
+
+    name: str
+    curve: list[tuple[float, float]] = field(default_factory=list)
+    frame: dict | None = None
+    steps: int = 0
+    iterations: int = 0
+    cpu_seconds: float = 0.0
+    unbalanced_ratio: float = 0.0
+    stopped: str | None = None
+
+    def summary(self) -> dict[str, object]:
+        """Numbers of the run by name."""
+        time, crest = np.array(self.curve).T
+        moving = np.flatnonzero(np.abs(crest - crest[-1]) > AT_REST * crest[-1])
+        return {
+            "crest_displacement_m": crest[-1], "at_rest_since_s": time[moving[-1] + 1] if len(moving) else 0.0,
+            "time_s": time[-1], "steps": self.steps, "iterations": self.iterations, "cpu_seconds": self.cpu_seconds,
+            "unbalanced_ratio": self.unbalanced_ratio, "stopped_because": self.stopped,
+        }  # fmt: skip
+
+
+def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | None) -> tuple[Run, Scene | None]:
+    """Run one slide; implicit, with steps `multiple` times the critical one at the start. Collective."""
+    case = build_slope(a, comm)
+    initialise(case, a.initial, a.initial_unit_weight)
+    watch, run = Watch(case), Run(name)
+    until = a.time if scheme == "explicit" else a.implicit_time
+    dt = None if multiple is None else multiple * case.model.critical_time_step()
+    options = Namespace(**{**vars(a), "scheme": scheme, "solver": solver, "dt": dt, "time": until})
+    run.curve.append((0.0, 0.0))
+    with Progress(name, until, comm) as progress:
+        started = process_time()
+        try:
+            # A report after each implicit step: a shorter interval would shorten the step.
+            for report in run_scheme(options, case.model, dt or until / a.frames, lambda: False):
+                run.cpu_seconds += process_time() - started
+                run.curve.append((report.time, watch.crest_displacement(watch.fields())))
+                run.unbalanced_ratio = report.unbalanced_ratio
+                run.iterations += getattr(report, "iterations", 0)
+                progress.show(report.time, report.steps, crest=f"{run.curve[-1][1]:.4f} m")
+                started = process_time()
+        except mpm.RunError as error:
+            run.stopped = str(error)
+    run.cpu_seconds, run.steps = comm.allreduce(run.cpu_seconds), case.model.steps
+    watch.keep(case.model.time, watch.fields())
+    run.frame = watch.frames[0] if watch.frames else None
+    return run, case.scene()
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def save_pair(path: Path, scene: Scene, runs: list[Run], key: str, quantity: Quantity) -> None:
+    """The soil at rest by two schemes, side by side, in one colour scale."""
+    limits = colour_limits(quantity, [run.frame[key] for run in runs])
+    lower, upper = scene.limits([run.frame["position"] for run in runs])
+    with paper_style():
+        figure, panels = plt.subplots(1, len(runs), figsize=(1.3 * WIDTH, 3.1), sharey=True)
+        figure.subplots_adjust(left=0.06, right=0.99, bottom=0.27, top=0.95, wspace=0.04)
+        for axes, run in zip(panels, runs):
+            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal", xlabel="$x$ [m]")
+            draw_scene(axes, scene)
+            drawn = discs(axes, run.frame["position"], run.frame["volume"], cmap=quantity.colours, norm=Normalize(*limits),
+                          linewidths=0)  # fmt: skip
+            drawn.set_array(quantity.scale * run.frame[key])
+            axes.set_title(f"{run.name}, $t$ = {run.frame['time']:.1f} s", loc="left")
+        panels[0].set_ylabel("$y$ [m]")
+        draw_bar(figure, figure.add_axes((0.3, 0.12, 0.4, 0.03)), quantity, limits, has_less=limits[0] != 0.0)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def save_crests(path: Path, runs: list[Run]) -> None:
+    """Displacement of the crest over time, on a logarithmic axis: one scheme takes ten times as long as the other."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(5.2, 3.3), layout="constrained")
+        for k, run in enumerate(runs):
+            time, crest = np.array(run.curve)[1:].T
+            axes.semilogx(time, crest, color=CURVES[k % len(CURVES)], linestyle="--" if k == len(runs) - 1 else "-", label=run.name)
+        axes.set(xlabel="Time [s]", ylabel="Displacement of the particle at the crest [m]", ylim=(0, None))
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(loc="lower right")
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def draw(runs: list[Run], scene: Scene | None, folder: Path) -> None:
+    """All pictures, on the first rank."""
+    if scene is None:
+        return
+    pair = [runs[0], runs[1]]
+    for name, quantity in (("displacement", DISPLACEMENT), ("shear_strain", SHEAR_STRAIN), ("vertical_stress", VERTICAL_STRESS)):
+        save_pair(folder / f"{name}.png", scene, pair, name, quantity)
+    save_crests(folder / "crest.png", runs)
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    folder = results_folder("slope_schemes", a.output, comm)
+    wanted = [("explicit", "explicit", "", None)]
+    for factor in (1.0, 2.5, 5.0)[: 1 + a.longer_steps]:
+        multiple = factor * a.step
+        wanted.append((f"implicit, Newton, {multiple:g} $\\Delta t_{{cr}}$", "implicit", "newton", multiple))
+    wanted.append((f"implicit, relaxation, {a.step:g} $\\Delta t_{{cr}}$", "implicit", "relaxation", a.step))
+    runs = []
+    for each in wanted:
+        run, scene = slide(a, *each)
+        runs.append(run)
+    table = {run.name.replace("$\\Delta t_{cr}$", "dt_cr"): run.summary() for run in runs}
+    reference = table["explicit"]["crest_displacement_m"]
+    for row in table.values():
+        row["over_explicit"] = row["crest_displacement_m"] / reference
+    draw(runs, scene, folder)
+    write_summary(folder, a, {"runs": table}, comm)
+    if comm.rank == 0:
+        tell(table, folder)
+    return 1 if any(run.stopped for run in runs) else 0
+
+
+def tell(table: dict[str, dict], folder: Path) -> None:
+    print(f"{'':36} crest [m]  over explicit  at rest since [s]  steps  iterations  CPU [s]  out of balance")
+    for name, r in table.items():
+        print(f"{name:36} {r['crest_displacement_m']:9.4f}  {r['over_explicit']:13.3f}  {r['at_rest_since_s']:17.2f}  "
+              f"{r['steps']:5}  {r['iterations']:10}  {r['cpu_seconds']:7.2f}  {r['unbalanced_ratio']:14.2e}")  # fmt: skip
+        if r["stopped_because"]:
+            print(f"  ended early: {r['stopped_because']}", file=sys.stderr)
+    print(f"results in {folder}")
+
+
+if __name__ == "__main__":
+    end_all_on_error(comm)
+    try:
+        sys.exit(main())
+    except (mpm.InputError, mpm.RunError, OutputError) as error:
+        if comm.rank == 0:
+            print(f"studies/run slope_schemes: {error}", file=sys.stderr)
+        sys.exit(2)
