@@ -1,9 +1,9 @@
 #include "materials/mohr_coulomb.h"
 
+#include "base/work_columns.h"
 #include "materials/mohr_coulomb_tangent.h"
 #include "materials/require.h"
 #include "materials/spectral.h"
-#include "materials/work_columns.h"
 
 // The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
 // turns a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)

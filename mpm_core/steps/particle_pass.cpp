@@ -1,6 +1,6 @@
 #include "steps/particle_pass.h"
 
-#include "materials/work_columns.h"
+#include "base/work_columns.h"
 #include "mesh/search.h"
 #include "steps/batches.h"
 #include "transfer/kinematics.h"
