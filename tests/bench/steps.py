@@ -60,7 +60,7 @@ def slope(size: float, law) -> mpm.Model:
 
 
 def block(n: int, law) -> mpm.Model:
-    """A cube of n^3 small cubes, six tetrahedra each with 8 particles, that compacts under its weight; half of the mesh is empty."""
+    """A box of n^3 small cubes, six tetrahedra each with 8 particles; soil on one side of it slumps to the other."""
     side = n + 1
     axis = np.arange(side) / n
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -69,12 +69,16 @@ def block(n: int, law) -> mpm.Model:
     orders = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
     cells = np.concatenate([np.cumsum([first] + [np.full_like(first, steps[a]) for a in o], axis=0).T for o in orders])
     faces = np.sort(cells[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
-    base = np.unique(faces[(points[faces][:, :, 2] == 0).all(axis=1)], axis=0)
-    soil = (points[cells].mean(axis=1)[:, 2] < 0.5).astype(np.int32)
-    mesh = mpm.Mesh(points, cells, cell_tags=soil, facets=base, facet_tags=np.ones(len(base), np.int32))
+    walls = [np.unique(faces[(points[faces][:, :, a] == end).all(axis=1)], axis=0) for a in range(3) for end in (0, 1)]
+    tags = np.repeat(np.arange(6, dtype=np.int32), [len(wall) for wall in walls])
+    centres = points[cells].mean(axis=1)
+    soil = ((centres[:, 0] < 0.6) & (centres[:, 2] < 0.6)).astype(np.int32)
+    mesh = mpm.Mesh(points, cells, cell_tags=soil, facets=np.concatenate(walls), facet_tags=tags)
     model = mpm.Model(mesh, law)
     model.seed(density=80e3 / 9.81, per_cell=8, cell_tag=1)
-    model.fix(1)
+    for tag in range(4):
+        model.roller(tag, np.eye(3)[tag // 2])
+    model.fix(4)
     model.set_gravity((0, 0, -9.81))
     return model
 
