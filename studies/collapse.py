@@ -6,7 +6,6 @@ result converges from above to that of limit analysis; flow without dilation is 
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
@@ -16,7 +15,7 @@ import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_switch, check, study_parser
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.slope_fem import (
     add_fem_slope_options, check_fem_slope_options, flow_name, mesh_sizes, slope_fem, step_line, weight,
 )  # fmt: skip
@@ -140,10 +139,4 @@ def tell(a: Namespace, sizes: list[float], results: dict, spiral: bridge.LogSpir
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run collapse: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)

@@ -8,7 +8,6 @@ hundred times as stiff as in the study slope, so that strains are small, as the 
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
@@ -19,7 +18,7 @@ import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
 from common.plots import Quantity
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.slope_case import (
     GRAVITY, SUPPORTS, SlopeCase, add_geometry_options, add_slope_options, add_soil_options, build_slope, check_slope_options,
     soil_of,
@@ -208,10 +207,4 @@ def line(row: dict) -> str:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, mpm.RunError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run compare_fem: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

@@ -6,7 +6,6 @@ Pressure at collapse = cohesion x Nc; with associated flow (the default) Nc conv
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_choice, add_count, add_number, check, study_parser
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.slope_case import soil_of
 from common.slope_fem import step_line
 from common.summary import ROOT, OutputError, results_folder, write_summary
@@ -177,10 +176,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run footing: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)

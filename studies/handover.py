@@ -18,7 +18,7 @@ import numpy as np
 from common.field_plots import save_curves
 from common.options import add_number, add_switch, study_parser
 from common.plots import save_history
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope_fem import step_line, weight
 from common.summary import OutputError, results_folder, write_summary
@@ -163,10 +163,4 @@ def tell(summary: dict, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, mpm.RunError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run handover: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

@@ -7,7 +7,6 @@ reported beside it.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +16,7 @@ import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_number, add_switch, study_parser
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.slope_fem import (
     add_fem_slope_options, check_fem_slope_options, flow_name, mesh_sizes, slope_fem, step_line, weight,
 )  # fmt: skip
@@ -128,10 +127,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run safety: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)

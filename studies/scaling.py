@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import math
-import sys
 from argparse import Namespace
 from pathlib import Path
 from time import perf_counter
@@ -20,7 +19,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 import numpy as np
 from common.options import add_count, study_parser
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
 
@@ -156,10 +155,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run scaling: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)

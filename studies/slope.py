@@ -23,7 +23,7 @@ from common.output_options import add_output_options
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
 from common.progress import Progress
 from common.report import Movie, Report, save_report
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
@@ -281,10 +281,4 @@ def tell(summary: dict, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, mpm.RunError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run slope: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

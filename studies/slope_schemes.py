@@ -21,7 +21,7 @@ from common.plots import (
     draw_scene, paper_style,
 )  # fmt: skip
 from common.progress import Progress
-from common.ranks import end_all_on_error
+from common.ranks import run_study
 from common.schemes import run_scheme
 from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
@@ -200,10 +200,4 @@ def tell(table: dict[str, dict], folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    end_all_on_error(comm)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, mpm.RunError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run slope_schemes: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

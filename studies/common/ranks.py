@@ -1,10 +1,13 @@
-"""Errors on one of several ranks."""
+"""How a study starts and ends, on any number of ranks."""
 
 from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
+from typing import NoReturn
 
 from mpi4py import MPI
 
@@ -21,3 +24,20 @@ def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         comm.Abort(1)
 
     sys.excepthook = end
+
+
+def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoReturn:
+    """Run a study's script and exit with what ``main`` returns.
+
+    Args:
+        main: the study.
+        expected: errors whose message is all that the user needs; they end the script with code 2.
+    """
+    comm = MPI.COMM_WORLD
+    end_all_on_error(comm)
+    try:
+        sys.exit(main())
+    except expected as error:
+        if comm.rank == 0:
+            print(f"studies/run {Path(sys.argv[0]).stem}: {error}", file=sys.stderr)
+        sys.exit(2)
