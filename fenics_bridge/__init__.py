@@ -22,6 +22,7 @@ from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOI
 from fenics_bridge.soil import soil_mesh
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
+# fmt: off
 __all__ = [
     "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
     "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "NewtonReport", "PointSearch", "QuasiStatic",
@@ -30,3 +31,4 @@ __all__ = [
     "log_spiral", "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]
+# fmt: on

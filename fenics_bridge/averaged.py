@@ -36,8 +36,9 @@ class AveragedKinematics:
         size = rows * points.size
         in_plane = np.tile(np.arange(points.size) < dim, rows)[:, None] / dim
         share = _matrix(comm, (size, rows), np.repeat(cell, points.size)[:, None], in_plane)
-        self._strain = _matrix(comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0),
-                               _strain_rows(gradients))
+        self._strain = _matrix(
+            comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0), _strain_rows(gradients)
+        )
         self._strain.axpy(1.0, share.matMult(spread))
         components = points.size * cell[:, None] + np.arange(points.size)
         self._columns = np.repeat(components, points.size, axis=0)

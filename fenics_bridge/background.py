@@ -48,7 +48,7 @@ def background_mesh(domain, cell_tags=None, facet_tags=None):
 
 def original_cells(domain):
     """Number that each owned cell had where the mesh was made (DOLFINx renumbers them): (m,) int64."""
-    return np.array(domain.topology.original_cell_index[:owned_cells(domain)], dtype=np.int64)
+    return np.array(domain.topology.original_cell_index[: owned_cells(domain)], dtype=np.int64)
 
 
 def global_numbers(index_map, count):

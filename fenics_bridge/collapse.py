@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import mpm_core as mpm
 import numpy as np
 from dolfinx import fem
 
+import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.load_steps import advance
 
@@ -73,10 +73,14 @@ def reduced_strength(law, factor):
         raise InputError(f"factor: got {factor!r}, expected a positive number")
     friction = math.degrees(math.atan(math.tan(math.radians(law.friction_angle)) / factor))
     associated = law.dilation_angle == law.friction_angle
-    return mpm.MohrCoulomb(young=law.young, poisson=law.poisson, cohesion=law.cohesion / factor,
-                           friction_angle=friction,
-                           dilation_angle=friction if associated else min(law.dilation_angle, friction),
-                           tension_cutoff=law.tension_cutoff)
+    return mpm.MohrCoulomb(
+        young=law.young,
+        poisson=law.poisson,
+        cohesion=law.cohesion / factor,
+        friction_angle=friction,
+        dilation_angle=friction if associated else min(law.dilation_angle, friction),
+        tension_cutoff=law.tension_cutoff,
+    )
 
 
 def _follow(model, equilibrate, start, first_step, tolerance, progress):

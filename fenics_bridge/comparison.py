@@ -40,16 +40,19 @@ def compare(fem, model, smooth=False, places=None):
     search = PointSearch(fem.displacement.function_space.mesh, particles.initial_position if places is None else places)
     search.require_all("particles")
     stress = search.values(fem.stress_function(smooth))
-    pairs = {"displacement": (particles.displacement, search.values(fem.displacement)),
-             "stress": (particles.stress, stress)}
+    pairs = {
+        "displacement": (particles.displacement, search.values(fem.displacement)),
+        "stress": (particles.stress, stress),
+    }
     return {name: _difference(model.comm, here, there, particles.volume) for name, (here, there) in pairs.items()}
 
 
 def _difference(comm, values, reference, volume):
     difference = values - reference
     sums = [comm.allreduce(float(np.sum(volume[:, None] * a**2))) for a in (difference, reference)]
-    largest = [comm.allreduce(float(np.linalg.norm(a, axis=1).max(initial=0.0)), MPI.MAX)
-               for a in (difference, reference)]
+    largest = [
+        comm.allreduce(float(np.linalg.norm(a, axis=1).max(initial=0.0)), MPI.MAX) for a in (difference, reference)
+    ]
     return Difference(_ratio(*sums) ** 0.5, _ratio(*largest), difference)
 
 

@@ -39,8 +39,9 @@ class ElasticSolution:
         return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth))
 
 
-def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, degree=1, traction=None,
-                  options_prefix="elastic_"):
+def solve_elastic(
+    domain, facet_tags, supports, young, poisson, unit_weight, degree=1, traction=None, options_prefix="elastic_"
+):
     """Small-strain equilibrium of a linear elastic body (plane strain or 3D) under its weight and its supports.
 
     supports: from `fixed`, `roller`, `prescribed`; at least enough of them to hold the body
@@ -65,8 +66,9 @@ def solve_elastic(domain, facet_tags, supports, young, poisson, unit_weight, deg
     return ElasticSolution(u, cell_function(domain, elastic_stress(strain(u), *stiffness), degree - 1, "stress"))
 
 
-def solve_nearly_incompressible(domain, facet_tags, supports, young, poisson, unit_weight, traction=None,
-                                options_prefix="mixed_"):
+def solve_nearly_incompressible(
+    domain, facet_tags, supports, young, poisson, unit_weight, traction=None, options_prefix="mixed_"
+):
     """The same by Taylor-Hood elements, which do not lock as the Poisson ratio nears 0.5.
 
     Displacement is quadratic, pressure linear; poisson: above 0. Other arguments, result and errors as for
@@ -85,8 +87,9 @@ def solve_nearly_incompressible(domain, facet_tags, supports, young, poisson, un
         return (ufl.inner(stress, strain(v)) - q * ufl.div(u) - flexibility * p * q) * ufl.dx
 
     load = elastic_load(v, domain, facet_tags, unit_weight, traction or {})
-    both = _solved(space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix,
-                   factor="mumps")
+    both = _solved(
+        space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix, factor="mumps"
+    )
     u = both.sub(0).collapse()
     u.name = "displacement"
     return ElasticSolution(u, cell_function(domain, _mixed_stress(*ufl.split(both), shear), 1, "stress"))

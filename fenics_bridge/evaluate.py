@@ -46,8 +46,10 @@ class PointSearch:
         message = None
         if len(lost):
             where = ", ".join(f"{x:.9g}" for x in self.points[lost[0]])
-            message = (f"{argument}: point {lost[0]} on rank {self._comm.rank} at ({where}) m is outside the mesh "
-                       f"({len(lost)} of {len(self.points)} points there are)")
+            message = (
+                f"{argument}: point {lost[0]} on rank {self._comm.rank} at ({where}) m is outside the mesh "
+                f"({len(lost)} of {len(self.points)} points there are)"
+            )
         agree(self._comm, message)
 
     def values(self, function):

@@ -32,8 +32,10 @@ def log_spiral(height, angle, cohesion, friction_angle, crest=0.0):
     Returns a LogSpiral.
     """
     if not 0 <= friction_angle < angle <= 90:
-        raise InputError(f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
-                         "0 <= friction_angle < angle <= 90")
+        raise InputError(
+            f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
+            "0 <= friction_angle < angle <= 90"
+        )
     if not (height > 0 and cohesion > 0):
         raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
     shape = (math.radians(angle), math.tan(math.radians(friction_angle)))

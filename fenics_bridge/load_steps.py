@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from mpi4py import MPI
 
-
 _MOST_STEPS = 1000
 _EASY = 8
 """Iterations of Newton's method up to which a step counts as easy."""
@@ -60,5 +59,9 @@ def print_step(step):
         return
     report = step.report
     state = "ok" if step.converged else "failed, halved"
-    print(f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
-          f"Newton {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}", file=sys.stderr, flush=True)
+    print(
+        f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
+        f"Newton {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
+        file=sys.stderr,
+        flush=True,
+    )

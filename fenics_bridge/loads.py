@@ -33,8 +33,9 @@ class Load:
 
         tags = {*self.pressure, *other.pressure}
         pressure = {tag: between(self.pressure.get(tag, 0.0), other.pressure.get(tag, 0.0)) for tag in tags}
-        return Load(between(self.unit_weight, other.unit_weight), pressure,
-                    between(self.displacement, other.displacement))
+        return Load(
+            between(self.unit_weight, other.unit_weight), pressure, between(self.displacement, other.displacement)
+        )
 
 
 class LoadVectors:

@@ -62,8 +62,13 @@ def arrays_from_model(dim, name):
     used = np.unique(cells)
     rows = order[np.searchsorted(tags, used, sorter=order)]
     inside = np.isin(facets, used).all(axis=1)
-    return MeshArrays(points[rows, :dim], np.searchsorted(used, cells), cell_values,
-                      np.searchsorted(used, facets[inside]), facet_values[inside])
+    return MeshArrays(
+        points[rows, :dim],
+        np.searchsorted(used, cells),
+        cell_values,
+        np.searchsorted(used, facets[inside]),
+        facet_values[inside],
+    )
 
 
 def _check_arguments(comm, path, dim, parameters):

@@ -87,8 +87,9 @@ class QuasiStatic:
         `converged` tells whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
         """
         start = self.load
-        steps = advance(lambda share: self.equilibrate(start.towards(load, share)), 0.0, 1.0, first_step, tolerance,
-                        progress)
+        steps = advance(
+            lambda share: self.equilibrate(start.towards(load, share)), 0.0, 1.0, first_step, tolerance, progress
+        )
         self.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
         return steps
 
@@ -124,8 +125,9 @@ class QuasiStatic:
         The cells' mean stress is admissible; the one with `smooth`, as for `stress_function`, may exceed the strength.
         Raises InputError, on all ranks, naming a point outside the body. Collective.
         """
-        return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth),
-                           state=self.state_function())
+        return evaluate_at(
+            points, displacement=self.displacement, stress=self.stress_function(smooth), state=self.state_function()
+        )
 
 
 class _Step:

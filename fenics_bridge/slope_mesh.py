@@ -64,8 +64,10 @@ def _checked(height, angle, crest, cell_size, runout, headroom):
 def _multiple(name, value, cell_size):
     count = round(value / cell_size)
     if abs(count * cell_size - value) > 1e-9 * value:
-        raise InputError(f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
-                         "needs; use kind='gmsh'")
+        raise InputError(
+            f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
+            "needs; use kind='gmsh'"
+        )
     return count
 
 
@@ -74,15 +76,19 @@ def _crossed(height, crest, base, size, runout, headroom):
     _require_multiple("crest", crest, size)
     run = base - crest
     if min(abs(run - height), run) > 1e-9 * height:
-        raise InputError(f"angle: got {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
-                         "degrees only, use kind='fitted' or 'gmsh'")
+        raise InputError(
+            f"angle: got {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
+            "degrees only, use kind='fitted' or 'gmsh'"
+        )
     return _fitted(height, crest, base, size, runout, headroom)
 
 
 def _require_multiple(name, value, cell_size):
     if abs(round(value / cell_size) * cell_size - value) > 1e-9 * value:
-        raise InputError(f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
-                         "needs; use kind='fitted' or 'gmsh'")
+        raise InputError(
+            f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
+            "needs; use kind='fitted' or 'gmsh'"
+        )
 
 
 def _angle(height, run):
@@ -93,14 +99,22 @@ def _fitted(height, crest, base, size, runout, headroom):
     """Rectangles cut in four; under the slope there are as many columns as rows, so that it runs along diagonals."""
     run = base - crest
     if run > 0 and not 0.2 <= height / run <= 5:
-        raise InputError(f"angle: got {_angle(height, run):.6g} degrees; kind='fitted' would need cells that are too "
-                         "long, expected 11.4 to 78.6, or 90, degrees; use kind='gmsh'")
+        raise InputError(
+            f"angle: got {_angle(height, run):.6g} degrees; kind='fitted' would need cells that are too "
+            "long, expected 11.4 to 78.6, or 90, degrees; use kind='gmsh'"
+        )
     rows, columns = round(height / size), round(crest / size)
     slope_columns = rows if run > 0 else 0
-    x = np.concatenate([np.linspace(0, crest, columns + 1), np.linspace(crest, base, slope_columns + 1)[1:],
-                        base + size * np.arange(1, math.ceil(runout / size - 1e-9) + 1)])
-    y = np.concatenate([np.linspace(0, height, rows + 1),
-                        height + size * np.arange(1, math.ceil(headroom / size - 1e-9) + 1)])
+    x = np.concatenate(
+        [
+            np.linspace(0, crest, columns + 1),
+            np.linspace(crest, base, slope_columns + 1)[1:],
+            base + size * np.arange(1, math.ceil(runout / size - 1e-9) + 1),
+        ]
+    )
+    y = np.concatenate(
+        [np.linspace(0, height, rows + 1), height + size * np.arange(1, math.ceil(headroom / size - 1e-9) + 1)]
+    )
     points, cells = _crossed_rectangles(x, y)
     centroids = points[cells].mean(axis=1)
     soil = (centroids[:, 1] < height) & (centroids[:, 0] < crest + run * (1 - centroids[:, 1] / height))
@@ -133,7 +147,9 @@ def _tagged_edges(points, cells, soil, crest):
     level = points[edges[:, 0], 1] == points[edges[:, 1], 1]
     values = np.select(
         [free & level & (x < crest), free, outer & (x == 0), outer & (y == 0), outer & (x == right), outer],
-        [CREST, SLOPE, LEFT, BASE, RIGHT, TOP], 0).astype(np.int32)
+        [CREST, SLOPE, LEFT, BASE, RIGHT, TOP],
+        0,
+    ).astype(np.int32)
     return edges[values > 0], values[values > 0]
 
 
@@ -151,10 +167,12 @@ def _slope_geometry(height, crest, base, size, runout, headroom):
     geo = gmsh.model.geo
     right, top = base + runout, height + headroom
     origin, toe, shoulder, back, end, corner, above = (
-        geo.addPoint(x, y, 0, size) for x, y in
-        ((0, 0), (base, 0), (crest, height), (0, height), (right, 0), (right, top), (0, top)))
+        geo.addPoint(x, y, 0, size)
+        for x, y in ((0, 0), (base, 0), (crest, height), (0, height), (right, 0), (right, top), (0, top))
+    )
     base_line, slope, crest_line, left = (
-        geo.addLine(a, b) for a, b in ((origin, toe), (toe, shoulder), (shoulder, back), (back, origin)))
+        geo.addLine(a, b) for a, b in ((origin, toe), (toe, shoulder), (shoulder, back), (back, origin))
+    )
     run, side = geo.addLine(toe, end), geo.addLine(end, corner)
     groups = {BASE: [base_line, run], SLOPE: [slope], CREST: [crest_line], LEFT: [left], RIGHT: [side]}
     if headroom > 0:

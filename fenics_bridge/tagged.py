@@ -26,8 +26,13 @@ class MeshArrays(NamedTuple):
 
 def empty_arrays(dim):
     """The share of a rank that has nothing."""
-    return MeshArrays(np.empty((0, dim)), np.empty((0, dim + 1), np.int64), np.empty(0, np.int32),
-                      np.empty((0, dim), np.int64), np.empty(0, np.int32))
+    return MeshArrays(
+        np.empty((0, dim)),
+        np.empty((0, dim + 1), np.int64),
+        np.empty(0, np.int32),
+        np.empty((0, dim), np.int64),
+        np.empty(0, np.int32),
+    )
 
 
 def distributed_mesh(comm, arrays, dim):

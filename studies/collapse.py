@@ -10,17 +10,25 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_switch, check, study_parser
 from common.ranks import run_study
+
 from common.slope_fem import (
-    add_fem_slope_options, check_fem_slope_options, flow_name, mesh_sizes, slope_fem, step_line, weight,
+    add_fem_slope_options,
+    check_fem_slope_options,
+    flow_name,
+    mesh_sizes,
+    slope_fem,
+    step_line,
+    weight,
 )  # fmt: skip
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 

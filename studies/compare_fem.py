@@ -12,20 +12,29 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
 from common.plots import Quantity
 from common.ranks import run_study
+
 from common.slope_case import (
-    GRAVITY, SUPPORTS, SlopeCase, add_geometry_options, add_slope_options, add_soil_options, build_slope, check_slope_options,
+    GRAVITY,
+    SUPPORTS,
+    SlopeCase,
+    add_geometry_options,
+    add_slope_options,
+    add_soil_options,
+    build_slope,
+    check_slope_options,
     soil_of,
 )  # fmt: skip
 from common.slope_fem import mesh_sizes, step_line, weight
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 UNIT_WEIGHTS = (5e3, 10e3, 15e3, 20e3)
@@ -45,7 +54,13 @@ def parser() -> ArgumentParser:
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_count(p, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_soil_options(p, dilation_angle=None)
-    add_choice(p, "--scheme", "explicit", ("explicit", "implicit"), "how particles come to rest: damped motion, or without inertia")
+    add_choice(
+        p,
+        "--scheme",
+        "explicit",
+        ("explicit", "implicit"),
+        "how particles come to rest: damped motion, or without inertia",
+    )
     add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
     add_number(p, "--ramp", 30.0, "-", "time over which the weight rises in the explicit scheme, in times that a pressure wave "
                "takes over the height", above=0)  # fmt: skip
@@ -84,7 +99,13 @@ def particles_at_rest(a: Namespace, cell_size: float, unit_weight: float) -> tup
     """Particles of a slope whose weight has risen from nothing, at rest."""
     others = ArgumentParser()
     add_slope_options(others)
-    options = {**vars(others.parse_args([])), **vars(a), "cell_size": cell_size, "unit_weight": unit_weight, "runout_length": 4 * cell_size}
+    options = {
+        **vars(others.parse_args([])),
+        **vars(a),
+        "cell_size": cell_size,
+        "unit_weight": unit_weight,
+        "runout_length": 4 * cell_size,
+    }
     case = build_slope(Namespace(**options), comm)
     if a.scheme == "implicit":
         case.model.set_gravity(case.model.gravity, ramp=1.0)

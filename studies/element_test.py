@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
-import mpm_core as mpm
 import numpy as np
 from common.history import History
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -21,6 +20,8 @@ from common.plots import paper_style
 from common.slope_case import add_soil_options
 from common.soils import add_law_options, law_of
 from common.summary import OutputError, results_folder, write_summary
+
+import mpm_core as mpm
 
 TESTS = ("oedometer", "drained", "undrained", "shear")
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
@@ -115,8 +116,12 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         "volumetric_strain", 1.0, "Volumetric strain, compression [-]")  # fmt: skip
     panels = [
         (history["p_Pa"] * 1e-3, history["q_Pa"] * 1e-3, "$p'$ [kPa]", "$q$ [kPa]"),
-        (strain, history["shear_stress_Pa" if shear else "q_Pa"] * 1e-3, strain_label,
-         "Shear stress [kPa]" if shear else "$q$ [kPa]"),
+        (
+            strain,
+            history["shear_stress_Pa" if shear else "q_Pa"] * 1e-3,
+            strain_label,
+            "Shear stress [kPa]" if shear else "$q$ [kPa]",
+        ),
         (strain, history[last[0]] * last[1], strain_label, last[2]),
     ]
     with paper_style():
@@ -141,7 +146,9 @@ def main(arguments: list[str] | None = None) -> int:
         stopped = run(test, a, history)
         draw(history, a, folder / "stress_path.png")
     end = {name: float(history[name][-1]) for name in COLUMNS}
-    write_summary(folder, a, {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end})
+    write_summary(
+        folder, a, {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
+    )
     largest = history["q_Pa"].max()
     print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa")
     if stopped:

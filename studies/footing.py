@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -21,6 +19,9 @@ from common.slope_case import soil_of
 from common.slope_fem import step_line
 from common.summary import ROOT, OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 AXIS, BASE, FAR, FOOTING = 1, 2, 3, 5
@@ -40,7 +41,9 @@ def parser() -> ArgumentParser:
     add_number(p, "--young", 100e3, "Pa", "Young's modulus", above=0)
     add_number(p, "--poisson", 0.3, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--half-width", 0.5, "m", "half of the footing's width", above=0)
-    add_number(p, "--cell-size", 0.05, "m", "triangles below the footing; a fifth of it at its edge, more far away", above=0)
+    add_number(
+        p, "--cell-size", 0.05, "m", "triangles below the footing; a fifth of it at its edge, more far away", above=0
+    )
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
     return p
@@ -145,7 +148,9 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     folder = results_folder("footing", a.output, comm)
     expected = prandtl_factor(a.friction_angle)
-    sizes = [a.cell_size * 2**k for k in reversed(range(a.meshes)) if a.cell_size * 2**k <= a.half_width * (1 + 1e-9)]
+    sizes = [
+        a.cell_size * 2**k for k in reversed(range(a.meshes)) if a.cell_size * 2**k <= a.half_width * (1 + 1e-9)
+    ]
     runs = [footing(a, size, 0.03 * expected * a.cohesion) for size in sizes]
     draw(a, runs, folder)
 

@@ -12,8 +12,6 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import save_curves
 from common.options import add_number, add_switch, study_parser
@@ -23,6 +21,9 @@ from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope
 from common.slope_fem import step_line, weight
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 SHARES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
@@ -38,7 +39,9 @@ def parser() -> ArgumentParser:
     add_slope_options(p)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_number(p, "--time", 34.8, "s", "duration of each slide", above=0)
-    add_switch(p, "--move", False, "move particles with the body's displacement in the FEM; otherwise they stay in place")
+    add_switch(
+        p, "--move", False, "move particles with the body's displacement in the FEM; otherwise they stay in place"
+    )
     return p
 
 
@@ -150,7 +153,9 @@ def told(run: dict) -> dict:
 
 
 def tell(summary: dict, folder: Path) -> None:
-    print(f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3")
+    print(
+        f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3"
+    )
     print("share  unit weight  out of balance before, after  newly yielded  run-out   crest")
     for row in summary["handovers"]:
         balance = "          -         -                -   "

@@ -7,12 +7,10 @@ point method with plain triangles and with nodal mixed discretisation (NMD), for
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from pathlib import Path
 
-import fenics_bridge as bridge
 import matplotlib.pyplot as plt
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import save_log_log
 from common.options import add_count, study_parser
@@ -21,6 +19,9 @@ from common.ranks import end_all_on_error
 from common.summary import ROOT, OutputError, results_folder, write_summary
 from matplotlib.colors import Normalize
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_SELF
 SHEAR = 0.375
@@ -119,7 +120,9 @@ def main(arguments: list[str] | None = None) -> int:
                       f"error {rows[-1]['error']:.2%}", flush=True)  # fmt: skip
             if poisson in (POISSON[0], POISSON[-1]):
                 curves[f"{name}, $\\nu$ = {poisson:.9g}"] = [row["error"] for row in rows[-len(divisions) :]]
-    save_log_log(folder / "error.png", [44 / n for n in divisions], curves, "Relative error of the deflection [-]", slope=1.0)
+    save_log_log(
+        folder / "error.png", [44 / n for n in divisions], curves, "Relative error of the deflection [-]", slope=1.0
+    )
     save_pressures(folder / "pressure.png", models)
     write_summary(folder, a, {"cook": rows}, comm)
     print(f"results in {folder}")

@@ -12,8 +12,6 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.animation import Frame, save_animation
 from common.history import History
@@ -24,6 +22,9 @@ from common.progress import Progress
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 COLUMNS = ["time_s", "retrogression_m", "runout_m", "kinetic_energy_J_per_m", "plastic_share", "dt_s"]
@@ -44,9 +45,13 @@ def parser() -> ArgumentParser:
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
     add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
-    add_number(p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1)
+    add_number(
+        p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1
+    )
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
-    add_number(p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_number(
+        p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1
+    )
     add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")
     add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
@@ -163,8 +168,13 @@ def compare(results: list[Slide], folder: Path) -> None:
     if comm.rank != 0:
         return
     time = max((r.history["time_s"] for r in results), key=len)
-    for column, label in [("retrogression_m", "Failed length of the crest [m]"), ("runout_m", "Run-out past the toe [m]")]:
-        curves = {f"cells of {r.cell_size:g} m": np.interp(time, r.history["time_s"], r.history[column]) for r in results}
+    for column, label in [
+        ("retrogression_m", "Failed length of the crest [m]"),
+        ("runout_m", "Run-out past the toe [m]"),
+    ]:
+        curves = {
+            f"cells of {r.cell_size:g} m": np.interp(time, r.history["time_s"], r.history[column]) for r in results
+        }
         save_history(folder / f"{column.removesuffix('_m')}.png", time, curves, label)
 
 

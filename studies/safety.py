@@ -11,17 +11,25 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_number, add_switch, study_parser
 from common.ranks import run_study
+
 from common.slope_fem import (
-    add_fem_slope_options, check_fem_slope_options, flow_name, mesh_sizes, slope_fem, step_line, weight,
+    add_fem_slope_options,
+    check_fem_slope_options,
+    flow_name,
+    mesh_sizes,
+    slope_fem,
+    step_line,
+    weight,
 )  # fmt: skip
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 
@@ -59,7 +67,9 @@ def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Coll
 def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
     """Slip line of limit analysis with the strength divided by the factor of safety; None where the surface slides."""
     reduced = float(np.degrees(np.arctan(np.tan(np.radians(a.friction_angle)) / factor)))
-    return bridge.log_spiral(a.height, a.angle, a.cohesion / factor, reduced, a.crest).curve if reduced < a.angle else None
+    return (
+        bridge.log_spiral(a.height, a.angle, a.cohesion / factor, reduced, a.crest).curve if reduced < a.angle else None
+    )
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------

@@ -15,13 +15,14 @@ from pathlib import Path
 from time import perf_counter
 
 import dolfinx
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from common.options import add_count, study_parser
 from common.ranks import run_study
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 RANKS = (1, 2, 4, 8, 16, 32, 64)

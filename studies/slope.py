@@ -12,7 +12,6 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import mpm_core as mpm
 import numpy as np
 from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
@@ -20,16 +19,26 @@ from common.history import History
 from common.interrupt import Interrupt
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, colour_limits, save_history, save_mesh, save_particles
+from common.plots import (
+    DISPLACEMENT,
+    SHEAR_STRAIN,
+    VERTICAL_STRESS,
+    colour_limits,
+    save_history,
+    save_mesh,
+    save_particles,
+)
 from common.progress import Progress
-from common.report import Movie, Report, save_report
 from common.ranks import run_study
+from common.report import Movie, Report, save_report
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
 from common.watch import Watch
 from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
+
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 COLUMNS = [
@@ -51,7 +60,9 @@ def parser() -> ArgumentParser:
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
-    add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_number(
+        p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1
+    )
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_scheme_options(p)
@@ -143,7 +154,9 @@ def slide(
                 look(report)
                 if interrupt.requested():
                     checkpoints.save()
-                    loop["stopped"] = f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
+                    loop[
+                        "stopped"
+                    ] = f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
                     break
                 started = perf_counter()
         except mpm.RunError as error:

@@ -13,12 +13,22 @@ from pathlib import Path
 from time import process_time
 
 import matplotlib.pyplot as plt
-import mpm_core as mpm
 import numpy as np
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
+
 from common.plots import (
-    CURVES, DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, WIDTH, Quantity, Scene, colour_limits, discs, draw_bar,
-    draw_scene, paper_style,
+    CURVES,
+    DISPLACEMENT,
+    SHEAR_STRAIN,
+    VERTICAL_STRESS,
+    WIDTH,
+    Quantity,
+    Scene,
+    colour_limits,
+    discs,
+    draw_bar,
+    draw_scene,
+    paper_style,
 )  # fmt: skip
 from common.progress import Progress
 from common.ranks import run_study
@@ -28,6 +38,8 @@ from common.summary import OutputError, results_folder, write_summary
 from common.watch import Watch
 from matplotlib.colors import Normalize
 from mpi4py import MPI
+
+import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 AT_REST = 0.01
@@ -44,12 +56,20 @@ def parser() -> ArgumentParser:
     add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
-    add_number(p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1)
+    add_number(
+        p, "--pic", 0.0, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1
+    )
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 200.0, "s", "duration of the explicit slide", above=0)
     add_number(p, "--implicit-time", 20.0, "s", "duration of the implicit slides", above=0)
     add_number(p, "--step", 20.0, "-", "shortest step of the implicit runs over the critical one", above=0)
-    add_count(p, "--longer-steps", 2, "further runs by Newton's method, with steps 2.5 and then 5 times as long", choices=(1, 2))
+    add_count(
+        p,
+        "--longer-steps",
+        2,
+        "further runs by Newton's method, with steps 2.5 and then 5 times as long",
+        choices=(1, 2),
+    )
     add_count(p, "--frames", 120, "times at which the crest is looked at in the explicit run")
     return p
 
@@ -145,7 +165,13 @@ def save_crests(path: Path, runs: list[Run]) -> None:
         figure, axes = plt.subplots(figsize=(5.2, 3.3), layout="constrained")
         for k, run in enumerate(runs):
             time, crest = np.array(run.curve)[1:].T
-            axes.semilogx(time, crest, color=CURVES[k % len(CURVES)], linestyle="--" if k == len(runs) - 1 else "-", label=run.name)
+            axes.semilogx(
+                time,
+                crest,
+                color=CURVES[k % len(CURVES)],
+                linestyle="--" if k == len(runs) - 1 else "-",
+                label=run.name,
+            )
         axes.set(xlabel="Time [s]", ylabel="Displacement of the particle at the crest [m]", ylim=(0, None))
         axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower right")
@@ -158,7 +184,11 @@ def draw(runs: list[Run], scene: Scene | None, folder: Path) -> None:
     if scene is None:
         return
     pair = [runs[0], runs[1]]
-    for name, quantity in (("displacement", DISPLACEMENT), ("shear_strain", SHEAR_STRAIN), ("vertical_stress", VERTICAL_STRESS)):
+    for name, quantity in (
+        ("displacement", DISPLACEMENT),
+        ("shear_strain", SHEAR_STRAIN),
+        ("vertical_stress", VERTICAL_STRESS),
+    ):
         save_pair(folder / f"{name}.png", scene, pair, name, quantity)
     save_crests(folder / "crest.png", runs)
 

@@ -13,7 +13,7 @@ using Matrix = std::array<Vector<D>, D>; // row-major
 
 /// Number of independent entries of a symmetric D x D matrix (in plane strain without zz).
 template <int D>
-inline constexpr int n_symmetric = D * (D + 1) / 2;
+inline constexpr int n_symmetric = D*(D + 1) / 2;
 
 /// Row and column of entry k of a symmetric matrix: xx yy xy, or xx yy zz xy yz xz.
 template <int D>

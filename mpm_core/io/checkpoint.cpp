@@ -155,7 +155,8 @@ std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, P
                            if (name == "cell")
                              cells = values;
                            else
-                             std::transform(values.begin(), values.end(), column.begin(), [](std::int64_t value)
+                             std::transform(values.begin(), values.end(), column.begin(),
+                                            [](std::int64_t value)
                                             { return static_cast<std::remove_cvref_t<decltype(column[0])>>(value); });
                          });
   return cells;

@@ -3,9 +3,9 @@
 /// The complete state of a run in one parallel HDF5 file.
 ///
 /// Layout: `particles/NAME` has a row per particle for each field of the one list, `cell` by its number over all ranks;
-/// `cells/NAME` are tables with some rows per rank; `ranks/NAME` have one row per rank, among them the numbers of rows of the
-/// others; the attribute `description` is a text that says what the run is. Rows are by rising rank. The first 512 bytes are
-/// the file's stamp.
+/// `cells/NAME` are tables with some rows per rank; `ranks/NAME` have one row per rank, among them the numbers of rows
+/// of the others; the attribute `description` is a text that says what the run is. Rows are by rising rank. The first
+/// 512 bytes are the file's stamp.
 
 #include "base/table.h"
 #include "parallel/node_exchange.h"
@@ -22,7 +22,8 @@ struct StateTables
   std::vector<Table> cells; ///< any number of rows; the first number is the cell over all ranks
 };
 
-/// Writes a checkpoint aside, sees to it that it is whole and on the disk, then renames it; whatever was there stays until then.
+/// Writes a checkpoint aside, sees to it that it is whole and on the disk, then renames it; whatever was there stays
+/// until then.
 /// @throws RunError on all ranks, with path and reason; nothing is left behind
 /// @note Collective
 template <int D>
@@ -38,8 +39,8 @@ template <int D>
 struct Checkpoint
 {
   Particles<D> particles;
-  /// The partition is that of the file: particles are in its order and `state` is this rank's. Otherwise particles are in the
-  /// order of their numbers, `state.ranks` has the rows of all ranks of the file, and `state.cells` is empty.
+  /// The partition is that of the file: particles are in its order and `state` is this rank's. Otherwise particles are
+  /// in the order of their numbers, `state.ranks` has the rows of all ranks of the file, and `state.cells` is empty.
   bool same_parts;
   StateTables state;
 };

@@ -72,8 +72,8 @@ private:
 
   MPI_Comm _comm;
   std::filesystem::path _path;
-  std::int64_t _file = -1;    ///< hid_t, which is not named here so that only sources of this folder see HDF5
-  std::string _failure;       ///< what failed first on this rank; empty if nothing did
+  std::int64_t _file = -1; ///< hid_t, which is not named here so that only sources of this folder see HDF5
+  std::string _failure;    ///< what failed first on this rank; empty if nothing did
   int _compression = 0;
   std::int64_t _reserved = 0; ///< bytes that the file may have come to need
 };

@@ -6,8 +6,9 @@
 
 namespace mpm
 {
-/// An HDF5 file opened by all ranks for reading. As with `Hdf5File`, a rank on which something fails goes on through the same
-/// calls as the others, with values of zero, and `check` raises the error on all. Every function is collective.
+/// An HDF5 file opened by all ranks for reading. As with `Hdf5File`, a rank on which something fails goes on through
+/// the same calls as the others, with values of zero, and `check` raises the error on all. Every function is
+/// collective.
 class Hdf5Input
 {
 public:

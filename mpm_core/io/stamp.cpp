@@ -116,7 +116,8 @@ std::string read_stamp(const std::filesystem::path& path, Stamp& stamp)
     return "its first bytes are damaged";
   const std::int64_t size = ::lseek(file.number(), 0, SEEK_END);
   if (size != stamp.bytes)
-    return "it has " + std::to_string(size) + " bytes, expected " + std::to_string(stamp.bytes) + "; it is truncated or damaged";
+    return "it has " + std::to_string(size) + " bytes, expected " + std::to_string(stamp.bytes) +
+           "; it is truncated or damaged";
   return {};
 }
 } // namespace

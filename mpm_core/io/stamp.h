@@ -1,7 +1,8 @@
 #pragma once
 /// @file
-/// The stamp of a checkpoint: a few lines of text in the first 512 bytes of its file, which HDF5 leaves to the user. They name
-/// the format and hold length and checksum of the rest, so that a damaged file is known before anything reads it.
+/// The stamp of a checkpoint: a few lines of text in the first 512 bytes of its file, which HDF5 leaves to the user.
+/// They name the format and hold length and checksum of the rest, so that a damaged file is known before anything reads
+/// it.
 
 #include "base/types.h"
 
@@ -28,8 +29,8 @@ inline std::uint64_t mixed(std::uint64_t z)
 /// @note Collective
 void stamp_file(MPI_Comm comm, const std::filesystem::path& path);
 
-/// @throws RunError on all ranks: the file cannot be read, is no checkpoint, has a format that is not known here, is truncated
-/// or damaged
+/// @throws RunError on all ranks: the file cannot be read, is no checkpoint, has a format that is not known here, is
+/// truncated or damaged
 /// @note Collective
 void check_stamp(MPI_Comm comm, const std::filesystem::path& path);
 } // namespace mpm

@@ -19,8 +19,8 @@ struct PointBatch
   std::array<const double*, n_stress<D>> strain_increment{};
   /// Cauchy stress [Pa]: at the start of the increment on entry, at its end on return
   std::array<double*, n_stress<D>> stress{};
-  /// State variables, `n_state(law)` columns, updated in place; all zero at the start. Column 0 of every law is the accumulated
-  /// plastic deviatoric strain, the sum of sqrt(2/3 de_p : de_p).
+  /// State variables, `n_state(law)` columns, updated in place; all zero at the start. Column 0 of every law is the
+  /// accumulated plastic deviatoric strain, the sum of sqrt(2/3 de_p : de_p).
   double* const* state = nullptr;
   /// Consistent tangent d stress / d strain, row-major (size, components, components); null if not wanted
   double* tangent = nullptr;

@@ -24,14 +24,14 @@ double mean_growth_slope(double y)
 template <int D>
 struct Start
 {
-  double elastic, plastic;  ///< v / kappa and v / (lambda - kappa)
-  double shear_ratio;       ///< G / K
-  double slope_squared;     ///< M^2
-  double pressure;          ///< p
-  double preconsolidation;  ///< p_c
-  double volumetric;        ///< volumetric strain increment
-  SymTensor<D> deviator;    ///< of the stress
-  SymTensor<D> strain;      ///< deviatoric strain increment, tensor components
+  double elastic, plastic; ///< v / kappa and v / (lambda - kappa)
+  double shear_ratio;      ///< G / K
+  double slope_squared;    ///< M^2
+  double pressure;         ///< p
+  double preconsolidation; ///< p_c
+  double volumetric;       ///< volumetric strain increment
+  SymTensor<D> deviator;   ///< of the stress
+  SymTensor<D> strain;     ///< deviatoric strain increment, tensor components
 };
 
 /// What follows from the plastic part x of the volumetric strain and the plastic multiplier m
@@ -39,12 +39,12 @@ template <int D>
 struct Result
 {
   double x, multiplier;
-  double y;                ///< ln of the growth of the pressure
+  double y; ///< ln of the growth of the pressure
   double pressure, preconsolidation;
-  double shear;            ///< secant shear modulus
-  double ratio;            ///< of the deviator to that of the trial
-  SymTensor<D> trial;      ///< trial deviator
-  double trial_q;          ///< its sqrt(3 J2)
+  double shear;       ///< secant shear modulus
+  double ratio;       ///< of the deviator to that of the trial
+  SymTensor<D> trial; ///< trial deviator
+  double trial_q;     ///< its sqrt(3 J2)
 
   double yield(double slope_squared) const
   {
@@ -71,8 +71,8 @@ Result<D> result_of(const Start<D>& a, double x, double multiplier)
 }
 
 /// The return, for a point that yields. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the
-/// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between them
-/// the yield function has its root. The unknown is the share of that x.
+/// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between
+/// them the yield function has its root. The unknown is the share of that x.
 template <int D>
 Result<D> returned(const Start<D>& a)
 {

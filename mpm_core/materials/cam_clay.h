@@ -12,8 +12,8 @@ namespace mpm
 /// The flow is associated; p_c hardens by dp_c / p_c = -v / (compression - swelling) de_v^p. Elasticity has the bulk
 /// modulus K = v p / swelling and a constant Poisson's ratio. The specific volume v is that at the start of each
 /// increment.
-/// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit return
-/// with secant moduli).
+/// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit
+/// return with secant moduli).
 struct CamClay
 {
   /// Slope lambda of the virgin compression line in v and ln p [-], > swelling
@@ -32,8 +32,8 @@ struct CamClay
   /// compression: one at zero pressure has no stiffness, and its update fails.
   double attraction = 0;
 
-  /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with another
-  /// one; `log_volume` is ln of the specific volume over that of the start.
+  /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with
+  /// another one; `log_volume` is ln of the specific volume over that of the start.
   static constexpr std::array state_names{"plastic_strain", "log_preconsolidation", "log_volume"};
 
   bool operator==(const CamClay&) const = default;

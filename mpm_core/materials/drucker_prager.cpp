@@ -81,8 +81,8 @@ void write_tangent(const Cone& c, const Returned& returned, const SymTensor<D>& 
     const double by_radius = c.bulk * c.dilation / stiffness;
     const double mean_by_volume = c.bulk - by_volume;
     return write_deviatoric_tangent<D>(
-        s, r, shear,
-        {mean_by_volume, -by_radius, -c.friction * mean_by_volume / j, (c.friction * by_radius - r) / j}, tangent);
+        s, r, shear, {mean_by_volume, -by_radius, -c.friction * mean_by_volume / j, (c.friction * by_radius - r) / j},
+        tangent);
   }
 }
 } // namespace

@@ -11,8 +11,8 @@ namespace mpm
 /// With the mean stress p (tension positive) and the second invariant J2 of the deviator a stress is admissible when
 ///     sqrt(J2) + friction p - strength <= 0   and   p <= tension_cutoff.
 /// The flow on the cone is that of the same cone with `dilation` in place of `friction`; the flow on the cut-off is
-/// associated. Where the cut-off lies beyond the apex, p = strength / friction, the apex takes its place: a trial stress
-/// that the flow does not lead to the cone is returned there. Without friction it is the criterion of von Mises.
+/// associated. Where the cut-off lies beyond the apex, p = strength / friction, the apex takes its place: a trial
+/// stress that the flow does not lead to the cone is returned there. Without friction it is the criterion of von Mises.
 /// Source: de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, sections 6.4.3 and 8.3.
 struct DruckerPrager
 {

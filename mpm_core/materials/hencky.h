@@ -9,10 +9,10 @@ namespace mpm
 /// A law taken between Kirchhoff stress and logarithmic strain, for strains that are not small.
 ///
 /// The law works on the Kirchhoff stress tau = J sigma, with J the ratio of volume to that at the start; the strain
-/// increments add up to the logarithmic strain. So an elastic law becomes Hencky's, tau linear in the logarithmic strain,
-/// as far as the principal directions of strain turn with the material; the rate form in the Cauchy stress is softer in
-/// compression. The points' stress stays the Cauchy stress.
-/// Source: de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, section 14.3.
+/// increments add up to the logarithmic strain. So an elastic law becomes Hencky's, tau linear in the logarithmic
+/// strain, as far as the principal directions of strain turn with the material; the rate form in the Cauchy stress is
+/// softer in compression. The points' stress stays the Cauchy stress. Source: de Souza Neto, Peric, Owen (2008),
+/// Computational Methods for Plasticity, section 14.3.
 struct Hencky
 {
   LawList<> law;

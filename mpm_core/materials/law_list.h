@@ -1,7 +1,7 @@
 #pragma once
 /// @file
-/// The list of laws that stand for themselves, and what can be asked of any law. A new law is one file beside the others
-/// and one entry here.
+/// The list of laws that stand for themselves, and what can be asked of any law. A new law is one file beside the
+/// others and one entry here.
 
 #include "materials/cam_clay.h"
 #include "materials/drucker_prager.h"
@@ -18,32 +18,23 @@ namespace mpm
 {
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
-using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw, Umat,
-                             Wrapper...>;
+using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw,
+                             Umat, Wrapper...>;
 
 /// Number of state variables of a law
 template <class L>
-  requires requires { L::state_names; }
-int n_state(const L&)
-{
-  return static_cast<int>(L::state_names.size());
-}
+requires requires { L::state_names; }
+int n_state(const L&) { return static_cast<int>(L::state_names.size()); }
 
 /// Names of a law's state variables, in their order; the first is `plastic_strain` in every law
 template <class L>
-  requires requires { L::state_names; }
-std::vector<std::string> state_names(const L&)
-{
-  return {L::state_names.begin(), L::state_names.end()};
-}
+requires requires { L::state_names; }
+std::vector<std::string> state_names(const L&) { return {L::state_names.begin(), L::state_names.end()}; }
 
 /// Shear modulus [Pa] of a law with Young's modulus and Poisson's ratio
 template <class L>
-  requires requires(L law) { law.young + law.poisson; }
-double shear_modulus(const L& law)
-{
-  return law.young / (2 * (1 + law.poisson));
-}
+requires requires(L law) { law.young + law.poisson; }
+double shear_modulus(const L& law) { return law.young / (2 * (1 + law.poisson)); }
 
 template <class... L>
 int n_state(const std::variant<L...>& law)

@@ -153,7 +153,8 @@ void check(const SofteningMohrCoulomb& law)
   require(law.residual_friction_angle >= 0 && law.residual_friction_angle <= law.peak.friction_angle,
           "residual_friction_angle", law.residual_friction_angle, "between 0 and the friction angle [degrees]");
   require(law.residual_dilation_angle >= 0 && law.residual_dilation_angle <= law.residual_friction_angle,
-          "residual_dilation_angle", law.residual_dilation_angle, "between 0 and the residual friction angle [degrees]");
+          "residual_dilation_angle", law.residual_dilation_angle,
+          "between 0 and the residual friction angle [degrees]");
   require(law.softening_strain > 0 && std::isfinite(law.softening_strain), "softening_strain", law.softening_strain,
           "positive and finite");
   require(law.reference_length > 0 && std::isfinite(law.reference_length), "reference_length", law.reference_length,

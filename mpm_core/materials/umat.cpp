@@ -54,11 +54,11 @@ void call(const Umat& law, Index i, Arguments<D>& a)
   const double duration = 1, zero = 0, length = 1;
   std::array<char, 80> name;
   name.fill(' ');
-  law.function(a.stress.data(), a.variables.data(), a.ddsdde.data(), &sse, &spd, &scd, &rpl, ddsddt.data(), drplde.data(),
-               &drpldt, a.strain.data(), a.increment.data(), time.data(), &duration, &zero, &zero, &zero, &zero,
-               name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties, coords.data(),
-               identity.data(), &a.new_step, &length, identity.data(), identity.data(), &one, &point, &none, &one,
-               step.data(), &one, name.size());
+  law.function(a.stress.data(), a.variables.data(), a.ddsdde.data(), &sse, &spd, &scd, &rpl, ddsddt.data(),
+               drplde.data(), &drpldt, a.strain.data(), a.increment.data(), time.data(), &duration, &zero, &zero, &zero,
+               &zero, name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties,
+               coords.data(), identity.data(), &a.new_step, &length, identity.data(), identity.data(), &one, &point,
+               &none, &one, step.data(), &one, name.size());
 }
 
 /// Whether the call succeeded; the stress is looked at as a sum of squares
@@ -108,8 +108,8 @@ std::vector<std::string> state_names(const Umat& law)
 void check(const Umat& law)
 {
   require(law.n_variables >= 0 && law.n_variables <= max_states - 9, "n_variables", law.n_variables, "from 0 to 55");
-  require(law.plastic_strain_variable >= 0 && law.plastic_strain_variable <= law.n_variables,
-          "plastic_strain_variable", law.plastic_strain_variable, "0, or the number of a state variable");
+  require(law.plastic_strain_variable >= 0 && law.plastic_strain_variable <= law.n_variables, "plastic_strain_variable",
+          law.plastic_strain_variable, "0, or the number of a state variable");
   require(law.wave_modulus > 0 && std::isfinite(law.wave_modulus), "p_wave_modulus", law.wave_modulus,
           "positive and finite [Pa]");
 }

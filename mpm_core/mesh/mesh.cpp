@@ -142,7 +142,8 @@ void connect(Mesh<D>& mesh, const MeshInput<D>& input)
     std::copy_n(input.facets.begin() + static_cast<std::ptrdiff_t>(f * D), D, nodes.begin());
     add(nodes, static_cast<Index>(f), -1);
   }
-  std::sort(facets.begin(), facets.end(), [](const auto& a, const auto& b)
+  std::sort(facets.begin(), facets.end(),
+            [](const auto& a, const auto& b)
             { return std::tie(a.nodes, a.vertex, a.cell) < std::tie(b.nodes, b.vertex, b.cell); });
 
   for (std::size_t begin = 0, end; begin < facets.size(); begin = end)

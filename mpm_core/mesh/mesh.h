@@ -25,14 +25,14 @@ inline constexpr Index none = -1;
 template <int D>
 struct MeshInput
 {
-  std::span<const double> points;              ///< node coordinates [m], row-major (nodes, D)
-  std::span<const Index> cells;                ///< nodes of each cell, row-major (cells, D+1); owned cells first
-  std::span<const Index> cell_tags;            ///< (cells), or empty
-  std::span<const Index> facets;               ///< nodes of each tagged facet, row-major (facets, D)
-  std::span<const Index> facet_tags;           ///< (facets)
-  std::span<const GlobalIndex> global_nodes;   ///< (nodes), or empty on one rank
-  std::span<const GlobalIndex> global_cells;   ///< (cells), or empty on one rank
-  std::span<const Index> cell_owners;          ///< rank that owns each cell (cells), or empty on one rank
+  std::span<const double> points;            ///< node coordinates [m], row-major (nodes, D)
+  std::span<const Index> cells;              ///< nodes of each cell, row-major (cells, D+1); owned cells first
+  std::span<const Index> cell_tags;          ///< (cells), or empty
+  std::span<const Index> facets;             ///< nodes of each tagged facet, row-major (facets, D)
+  std::span<const Index> facet_tags;         ///< (facets)
+  std::span<const GlobalIndex> global_nodes; ///< (nodes), or empty on one rank
+  std::span<const GlobalIndex> global_cells; ///< (cells), or empty on one rank
+  std::span<const Index> cell_owners;        ///< rank that owns each cell (cells), or empty on one rank
 };
 
 template <int D>

@@ -49,7 +49,8 @@ Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
 {
   Location location;
   Index c = start;
-  // A straight walk crosses a few cells for each bin on its way; far more than that is a circle, which only bins can end.
+  // A straight walk crosses a few cells for each bin on its way; far more than that is a circle, which only bins can
+  // end.
   Index longest_walk = 64;
   for (Index count : mesh.bins.counts)
     longest_walk += 4 * count;

@@ -19,13 +19,14 @@ struct Location
   int exit_facet = -1;
 };
 
-/// The walk of `find_cell` alone, without the bins; where it ends outside, or goes round in circles, `exit_cell` is the last one.
+/// The walk of `find_cell` alone, without the bins; where it ends outside, or goes round in circles, `exit_cell` is the
+/// last one.
 template <int D>
 Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 
 /// The cell of point x, found by walking from cell `start` over neighbours, each time across the facet that x lies
-/// farthest behind. Where the walk ends at a boundary or goes round in circles, the bins of the mesh decide, so the answer
-/// is right on any mesh. A point that is not finite is outside.
+/// farthest behind. Where the walk ends at a boundary or goes round in circles, the bins of the mesh decide, so the
+/// answer is right on any mesh. A point that is not finite is outside.
 template <int D>
 Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 

@@ -12,8 +12,8 @@ namespace
 /// How far the walk to a point has come; numbers of one type, so that ranks agree by taking the largest.
 struct Walk
 {
-  GlobalIndex cell;      ///< where the point is; or, when `under_way`, where the walk goes on
-  GlobalIndex rank;      ///< that owns this cell
+  GlobalIndex cell; ///< where the point is; or, when `under_way`, where the walk goes on
+  GlobalIndex rank; ///< that owns this cell
   GlobalIndex exit_tag;
   GlobalIndex under_way;
 };
@@ -87,8 +87,8 @@ void carry_on(const Mesh<D>& mesh, const std::unordered_map<GlobalIndex, Index>&
       entry.walk = {none, none, none, 0};
 }
 
-/// Looks for the points whose walk ended outside in the bins of all ranks. Of several cells that hold a point the one with
-/// the highest number takes it, on any partition.
+/// Looks for the points whose walk ended outside in the bins of all ranks. Of several cells that hold a point the one
+/// with the highest number takes it, on any partition.
 template <int D>
 void look_into_bins(const Mesh<D>& mesh, const NodeExchange& exchange, std::vector<Entry<D>>& entries)
 {

@@ -27,11 +27,12 @@ struct Place
 struct FarSearch
 {
   std::vector<Place> places; ///< one for each point of this rank
-  std::vector<int> partners; ///< ranks that hold one of this rank's points, or own one that this rank holds; by rising rank
+  std::vector<int>
+      partners; ///< ranks that hold one of this rank's points, or own one that this rank holds; by rising rank
 };
 
-/// Places of points that are anywhere in the mesh. The walk goes on from rank to rank, and where it ends outside of the mesh
-/// all ranks look into their bins, so the answer is that of `find_cell` on one rank.
+/// Places of points that are anywhere in the mesh. The walk goes on from rank to rank, and where it ends outside of the
+/// mesh all ranks look into their bins, so the answer is that of `find_cell` on one rank.
 /// @param owned_cells  local number of each owned cell, by its global number
 /// @note Collective over all ranks
 template <int D>

@@ -19,7 +19,8 @@ std::array<Index, D + 1> corners_by_number(const Mesh<D>& mesh, Index cell)
 }
 
 /// Sends each rank a list of numbers and returns the lists that came, by rank.
-std::map<int, std::vector<GlobalIndex>> exchange_lists(const std::map<int, std::vector<GlobalIndex>>& lists, MPI_Comm comm)
+std::map<int, std::vector<GlobalIndex>> exchange_lists(const std::map<int, std::vector<GlobalIndex>>& lists,
+                                                       MPI_Comm comm)
 {
   int size;
   MPI_Comm_size(comm, &size);
@@ -91,11 +92,13 @@ void update(const Halo& halo, double* values, int width)
   {
     const auto& [rank, give, take] = halo.links[l];
     taken[l].resize(take.size() * w);
-    MPI_Irecv(taken[l].data(), static_cast<int>(taken[l].size()), MPI_DOUBLE, rank, 4, halo.comm, &requests.emplace_back());
+    MPI_Irecv(taken[l].data(), static_cast<int>(taken[l].size()), MPI_DOUBLE, rank, 4, halo.comm,
+              &requests.emplace_back());
     for (Index entry : give)
       given[l].insert(given[l].end(), values + static_cast<std::size_t>(entry) * w,
                       values + (static_cast<std::size_t>(entry) + 1) * w);
-    MPI_Isend(given[l].data(), static_cast<int>(given[l].size()), MPI_DOUBLE, rank, 4, halo.comm, &requests.emplace_back());
+    MPI_Isend(given[l].data(), static_cast<int>(given[l].size()), MPI_DOUBLE, rank, 4, halo.comm,
+              &requests.emplace_back());
   }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
   for (std::size_t l = 0; l < halo.links.size(); ++l)

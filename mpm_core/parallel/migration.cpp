@@ -89,7 +89,8 @@ Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const 
   std::vector<MPI_Request> requests(partners.size());
   const int tag = 2;
   for (std::size_t n = 0; n < partners.size(); ++n)
-    MPI_Isend(send[n].data(), static_cast<int>(send[n].size()), MPI_BYTE, partners[n], tag, exchange.comm, &requests[n]);
+    MPI_Isend(send[n].data(), static_cast<int>(send[n].size()), MPI_BYTE, partners[n], tag, exchange.comm,
+              &requests[n]);
   std::sort(numbers.begin(), numbers.end());
   remove<D>(particles, numbers);
 

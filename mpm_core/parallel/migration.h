@@ -30,8 +30,8 @@ struct Departures
 template <int D>
 std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh);
 
-/// Sends leavers, with all their columns, to the ranks that own their cells, takes them out here, and appends those that
-/// arrive, by rising rank. One packed message per neighbour and far partner.
+/// Sends leavers, with all their columns, to the ranks that own their cells, takes them out here, and appends those
+/// that arrive, by rising rank. One packed message per neighbour and far partner.
 /// @param cell_numbers  of this rank's owned cells, as `owned_cell_numbers` gives them
 /// @pre The ranks of leavers are neighbours or far partners
 /// @returns number of particles that arrived; they are the last ones

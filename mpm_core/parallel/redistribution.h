@@ -6,8 +6,8 @@
 
 namespace mpm
 {
-/// Sends each particle to the rank that owns its cell, wherever that is; afterwards the particles are in the order of their
-/// numbers, so that it does not matter where they came from.
+/// Sends each particle to the rank that owns its cell, wherever that is; afterwards the particles are in the order of
+/// their numbers, so that it does not matter where they came from.
 /// @param cells  number of each particle's cell over all ranks; the column `cell` is set from it
 /// @throws RunError on all ranks: a cell that no rank owns
 /// @note Collective

@@ -42,8 +42,10 @@ void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials)
 {
   const std::size_t n = particles.id.size();
   auto key = [&](std::size_t p)
-  { return static_cast<std::size_t>(particles.cell[p]) * static_cast<std::size_t>(n_materials) +
-           static_cast<std::size_t>(n_materials > 1 ? particles.material[p] : 0); };
+  {
+    return static_cast<std::size_t>(particles.cell[p]) * static_cast<std::size_t>(n_materials) +
+           static_cast<std::size_t>(n_materials > 1 ? particles.material[p] : 0);
+  };
   std::vector<Index> start(static_cast<std::size_t>(n_cells) * static_cast<std::size_t>(n_materials) + 1, 0);
   for (std::size_t p = 0; p < n; ++p)
     ++start[key(p) + 1];
@@ -103,7 +105,7 @@ double bytes_per_particle(const Particles<D>& particles)
 #define INSTANTIATE(D)                                                                                                 \
   template void resize(Particles<D>&, Index);                                                                          \
   template void require_traction(Particles<D>&);                                                                       \
-  template void reorder(Particles<D>&, std::span<const Index>);                                                         \
+  template void reorder(Particles<D>&, std::span<const Index>);                                                        \
   template void sort_by_cell(Particles<D>&, Index, Index);                                                             \
   template void remove(Particles<D>&, std::span<const Index>);                                                         \
   template void find_runs(const Particles<D>&, Index, std::vector<Run>&);                                              \

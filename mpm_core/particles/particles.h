@@ -21,24 +21,24 @@ struct Run
 template <int D>
 struct Particles
 {
-  std::vector<GlobalIndex> id;               ///< unique over all ranks, never changes
-  std::array<Column, D> position;            ///< [m]
-  std::array<Column, D> velocity;            ///< [m/s]
-  std::array<Column, n_stress<D>> stress;    ///< Cauchy stress [Pa]
-  Column volume;                             ///< [m^D]; per metre of thickness in plane strain
-  Column mass;                               ///< [kg], [kg/m] in plane strain
-  Column deviatoric_strain;                  ///< accumulated deviatoric strain, sum of sqrt(2/3 de : de)
-  std::vector<Column> state;                 ///< state variables of the law; 0 is the accumulated plastic deviatoric strain
-  std::array<Column, D> initial_position;    ///< [m]; displacement is position minus this
-  std::array<Column, D> traction;            ///< force from a loaded boundary, t_p of (15) [N], moves with the particle
-  std::vector<Index> material;               ///< number of the law
-  std::vector<Index> cell;                   ///< cell on this rank that holds the particle
+  std::vector<GlobalIndex> id;            ///< unique over all ranks, never changes
+  std::array<Column, D> position;         ///< [m]
+  std::array<Column, D> velocity;         ///< [m/s]
+  std::array<Column, n_stress<D>> stress; ///< Cauchy stress [Pa]
+  Column volume;                          ///< [m^D]; per metre of thickness in plane strain
+  Column mass;                            ///< [kg], [kg/m] in plane strain
+  Column deviatoric_strain;               ///< accumulated deviatoric strain, sum of sqrt(2/3 de : de)
+  std::vector<Column> state; ///< state variables of the law; 0 is the accumulated plastic deviatoric strain
+  std::array<Column, D> initial_position; ///< [m]; displacement is position minus this
+  std::array<Column, D> traction;         ///< force from a loaded boundary, t_p of (15) [N], moves with the particle
+  std::vector<Index> material;            ///< number of the law
+  std::vector<Index> cell;                ///< cell on this rank that holds the particle
 
   Index size() const { return static_cast<Index>(id.size()); }
 };
 
-/// The one list of fields: calls f(name, component, column) for every column. Sorting, migration, checkpoints and output
-/// iterate this list, so a field that is added here is everywhere.
+/// The one list of fields: calls f(name, component, column) for every column. Sorting, migration, checkpoints and
+/// output iterate this list, so a field that is added here is everywhere.
 /// @note A column of an optional field may be empty.
 template <class P, class F>
 void for_each_column(P& particles, F&& f)

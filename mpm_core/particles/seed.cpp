@@ -15,8 +15,8 @@ using Barycentric = std::array<double, D + 1>;
 
 int lattice_size(int dimension, int k) { return dimension == 2 ? k * (k + 1) / 2 : k * (k + 1) * (k + 2) / 6; }
 
-/// Points (i + a, j + a, ...) / (k - 1 + (D+1) a) with i + j + ... = k - 1. With a = 1/(D+1) the outermost layer stands off
-/// the faces by as much as a point of equal share should.
+/// Points (i + a, j + a, ...) / (k - 1 + (D+1) a) with i + j + ... = k - 1. With a = 1/(D+1) the outermost layer stands
+/// off the faces by as much as a point of equal share should.
 template <int D>
 void add_lattice(int k, int left, int depth, std::array<int, D + 1>& numbers, std::vector<Barycentric<D>>& points)
 {
@@ -37,7 +37,8 @@ void add_lattice(int k, int left, int depth, std::array<int, D + 1>& numbers, st
   }
 }
 
-/// The cell cut into 2^D cells of equal volume by its mid-edges: the corners, then the octahedron's four or the middle one.
+/// The cell cut into 2^D cells of equal volume by its mid-edges: the corners, then the octahedron's four or the middle
+/// one.
 template <int D>
 std::vector<std::array<Barycentric<D>, D + 1>> children(const std::array<Barycentric<D>, D + 1>& v)
 {
@@ -54,10 +55,10 @@ std::vector<std::array<Barycentric<D>, D + 1>> children(const std::array<Barycen
             {mid(0, 2), mid(1, 2), v[2]},
             {mid(0, 1), mid(1, 2), mid(0, 2)}};
   else
-    return {{v[0], mid(0, 1), mid(0, 2), mid(0, 3)},         {mid(0, 1), v[1], mid(1, 2), mid(1, 3)},
-            {mid(0, 2), mid(1, 2), v[2], mid(2, 3)},         {mid(0, 3), mid(1, 3), mid(2, 3), v[3]},
-            {mid(0, 1), mid(0, 2), mid(0, 3), mid(1, 3)},    {mid(0, 1), mid(0, 2), mid(1, 2), mid(1, 3)},
-            {mid(0, 2), mid(0, 3), mid(1, 3), mid(2, 3)},    {mid(0, 2), mid(1, 2), mid(1, 3), mid(2, 3)}};
+    return {{v[0], mid(0, 1), mid(0, 2), mid(0, 3)},      {mid(0, 1), v[1], mid(1, 2), mid(1, 3)},
+            {mid(0, 2), mid(1, 2), v[2], mid(2, 3)},      {mid(0, 3), mid(1, 3), mid(2, 3), v[3]},
+            {mid(0, 1), mid(0, 2), mid(0, 3), mid(1, 3)}, {mid(0, 1), mid(0, 2), mid(1, 2), mid(1, 3)},
+            {mid(0, 2), mid(0, 3), mid(1, 3), mid(2, 3)}, {mid(0, 2), mid(1, 2), mid(1, 3), mid(2, 3)}};
 }
 
 /// Lattice number k and number of divisions s for a count, the fewest divisions first.
@@ -164,8 +165,8 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
 }
 
 template <int D>
-Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes, SeedMaterial soil,
-                  GlobalIndex first_id, Particles<D>& particles)
+Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes,
+                  SeedMaterial soil, GlobalIndex first_id, Particles<D>& particles)
 {
   check_soil<D>(soil);
   Index added = 0;
@@ -216,7 +217,7 @@ double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& tracti
 
 #define INSTANTIATE(D)                                                                                                 \
   template std::vector<std::array<double, D + 1>> even_points<D>(int);                                                 \
-  template Index seed_cells(const Mesh<D>&, std::optional<Index>, int, SeedMaterial, GlobalIndex, Particles<D>&);       \
+  template Index seed_cells(const Mesh<D>&, std::optional<Index>, int, SeedMaterial, GlobalIndex, Particles<D>&);      \
   template Index seed_points(const Mesh<D>&, std::span<const double>, std::span<const double>, SeedMaterial,           \
                              GlobalIndex, Particles<D>&);                                                              \
   template double load_facets<D>(const Mesh<D>&, Index, const Vector<D>&, Particles<D>&);

@@ -9,9 +9,10 @@
 
 namespace mpm
 {
-/// Barycentric coordinates of `count` points placed evenly in a simplex, each standing for the same share of its volume.
-/// Rows of D+1 numbers. The points are the lattice of 1, 3, 6, 10, 15, ... points (triangle) or 1, 4, 10, 20, ... (tetrahedron),
-/// in the cell itself or in each of the 4^s (8^s) cells it divides into: 1 3 4 6 10 12 15 16 21 24 ... in a triangle.
+/// Barycentric coordinates of `count` points placed evenly in a simplex, each standing for the same share of its
+/// volume. Rows of D+1 numbers. The points are the lattice of 1, 3, 6, 10, 15, ... points (triangle) or 1, 4, 10, 20,
+/// ... (tetrahedron), in the cell itself or in each of the 4^s (8^s) cells it divides into: 1 3 4 6 10 12 15 16 21 24
+/// ... in a triangle.
 /// @throws InputError a count that has no such arrangement; the message names the nearest ones that have
 template <int D>
 std::vector<std::array<double, D + 1>> even_points(int count);
@@ -36,12 +37,12 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
 /// @param volumes  (n) [m^D]
 /// @returns number of particles added on this rank
 template <int D>
-Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes, SeedMaterial soil,
-                  GlobalIndex first_id, Particles<D>& particles);
+Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes,
+                  SeedMaterial soil, GlobalIndex first_id, Particles<D>& particles);
 
 /// Loads the particles next to the facets with this tag: in each filled cell behind such a facet, the force
-/// `traction * facet area` is shared evenly by the particles nearest to it. The force is dead: it moves with its particles
-/// and keeps its direction.
+/// `traction * facet area` is shared evenly by the particles nearest to it. The force is dead: it moves with its
+/// particles and keeps its direction.
 /// @returns area [m^(D-1)] of the loaded facets on this rank
 template <int D>
 double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& traction, Particles<D>& particles);

@@ -34,15 +34,14 @@ void bind(py::module_& m)
 {
   m.def("save", &save<D>);
   m.def("restore", &restore<D>);
-  m.def("mesh_fingerprint", [](const Model<D>& model)
-        { return mesh_fingerprint<D>(model.exchange.comm, model.mesh); });
+  m.def("mesh_fingerprint", [](const Model<D>& model) { return mesh_fingerprint<D>(model.exchange.comm, model.mesh); });
 }
 } // namespace
 
 void bind_checkpoints(py::module_& m)
 {
-  m.def("checkpoint_description", [](std::uintptr_t comm, const std::string& path)
-        { return checkpoint_description(communicator(comm), path); });
+  m.def("checkpoint_description",
+        [](std::uintptr_t comm, const std::string& path) { return checkpoint_description(communicator(comm), path); });
   bind<2>(m);
   bind<3>(m);
 }

@@ -42,8 +42,9 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 void bind_io(py::module_& m)
 {
   py::class_<ParticleSeries>(m, "ParticleSeries")
-      .def(py::init([](std::uintptr_t comm, const std::string& path, bool float32, int compression)
-                    { return std::make_unique<ParticleSeries>(communicator(comm), path, storage(float32, compression)); }),
+      .def(py::init(
+               [](std::uintptr_t comm, const std::string& path, bool float32, int compression)
+               { return std::make_unique<ParticleSeries>(communicator(comm), path, storage(float32, compression)); }),
            py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"))
       .def(
           "write",
@@ -60,10 +61,12 @@ void bind_io(py::module_& m)
                [](std::uintptr_t comm, const std::string& path, bool float32, int compression, const RealArray& points,
                   const IntegerArray& cells)
                {
-                 return std::make_unique<MeshSeries>(communicator(comm), path, storage(float32, compression), width(points),
-                                                     values<double>(points), values<std::int64_t>(cells));
+                 return std::make_unique<MeshSeries>(communicator(comm), path, storage(float32, compression),
+                                                     width(points), values<double>(points),
+                                                     values<std::int64_t>(cells));
                }),
-           py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"), py::arg("points"), py::arg("cells"))
+           py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"), py::arg("points"),
+           py::arg("cells"))
       .def(
           "write",
           [](MeshSeries& series, double time, const RealFields& node_fields, const RealFields& cell_fields)

@@ -94,7 +94,8 @@ BatchReport update_arrays(const L& law, const py::array& strain_increment, py::a
                     : update_rows<3>(law, strain, stress_data, state_data, tangent_data, static_cast<Index>(n));
 }
 
-inline constexpr const char* update_text = R"(Update points by a strain increment, in place; all arrays float64, row by row.
+inline constexpr const char* update_text =
+    R"(Update points by a strain increment, in place; all arrays float64, row by row.
 
 Args:
     strain_increment: engineering shear, shape (n, S) with S = 4 in plane strain or 6.
@@ -112,13 +113,17 @@ py::class_<L> bind_law(py::module_& m, const char* name, const char* text)
 {
   py::class_<L> type(m, name, text);
   m.attr("law_types").cast<py::list>().append(type);
-  return type.def_property_readonly("n_state", [](const L& law) { return n_state(law); },
-                                    "Number of state variables")
-      .def_property_readonly("state_names", [](const L& law) { return state_names(law); },
-                             "Names of the state variables; the first is plastic_strain, accumulated and deviatoric")
-      .def_property_readonly("p_wave_modulus", [](const L& law) { return p_wave_modulus(law); },
-                             "Modulus of the compression wave, K + 4G/3 [Pa]")
-      .def("__eq__", [](const L& law, const py::object& other) { return py::isinstance<L>(other) && law == other.cast<L>(); })
+  return type
+      .def_property_readonly(
+          "n_state", [](const L& law) { return n_state(law); }, "Number of state variables")
+      .def_property_readonly(
+          "state_names", [](const L& law) { return state_names(law); },
+          "Names of the state variables; the first is plastic_strain, accumulated and deviatoric")
+      .def_property_readonly(
+          "p_wave_modulus", [](const L& law) { return p_wave_modulus(law); },
+          "Modulus of the compression wave, K + 4G/3 [Pa]")
+      .def("__eq__",
+           [](const L& law, const py::object& other) { return py::isinstance<L>(other) && law == other.cast<L>(); })
       .def("update", &update_arrays<L>, py::arg("strain_increment"), py::arg("stress"), py::arg("state"),
            py::arg("tangent") = py::none(), update_text);
 }

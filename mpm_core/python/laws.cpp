@@ -16,7 +16,10 @@ void bind_elastic(py::module_& m)
 Args:
     young: Young's modulus [Pa], positive.
     poisson: Poisson's ratio [-], in (-1, 0.5).)")
-      .def(py::init([](double young, double poisson) { return checked(LinearElastic{young, poisson}); }),
+      .def(py::init(
+               [](double young, double poisson) {
+                 return checked(LinearElastic{young, poisson});
+               }),
            py::kw_only(), py::arg("young"), py::arg("poisson"))
       .def_readonly("young", &LinearElastic::young)
       .def_readonly("poisson", &LinearElastic::poisson);
@@ -24,7 +27,9 @@ Args:
 
 void bind_mohr_coulomb(py::module_& m)
 {
-  bind_law<MohrCoulomb>(m, "MohrCoulomb", R"(Mohr-Coulomb, linear elastic and perfectly plastic, with non-associated flow and a tension cut-off.
+  bind_law<MohrCoulomb>(
+      m, "MohrCoulomb",
+      R"(Mohr-Coulomb, linear elastic and perfectly plastic, with non-associated flow and a tension cut-off.
 
 Args:
     young: Young's modulus [Pa], positive.
@@ -52,11 +57,10 @@ Args:
 
 void bind_softening(py::module_& m)
 {
-  py::enum_<Softening>(m, "Softening")
-      .value("LINEAR", Softening::linear)
-      .value("EXPONENTIAL", Softening::exponential);
+  py::enum_<Softening>(m, "Softening").value("LINEAR", Softening::linear).value("EXPONENTIAL", Softening::exponential);
   using L = SofteningMohrCoulomb;
-  bind_law<L>(m, "SofteningMohrCoulomb", R"(Mohr-Coulomb whose strength falls with the accumulated plastic deviatoric strain.
+  bind_law<L>(m, "SofteningMohrCoulomb",
+              R"(Mohr-Coulomb whose strength falls with the accumulated plastic deviatoric strain.
 
 Args:
     peak: MohrCoulomb law with elasticity, peak strength and tension cut-off.
@@ -71,8 +75,9 @@ Args:
 The state cohesion_deviation is the relative deviation of a point's cohesion from the law's, for random fields.)")
       .def(py::init(
                [](const MohrCoulomb& peak, double cohesion, double friction_angle, double dilation_angle, double strain,
-                  double length, Softening shape)
-               { return checked(L{peak, cohesion, friction_angle, dilation_angle, strain, length, shape}); }),
+                  double length, Softening shape) {
+                 return checked(L{peak, cohesion, friction_angle, dilation_angle, strain, length, shape});
+               }),
            py::arg("peak"), py::kw_only(), py::arg("residual_cohesion"), py::arg("residual_friction_angle"),
            py::arg("residual_dilation_angle") = 0.0, py::arg("softening_strain"), py::arg("reference_length"),
            py::arg("shape") = Softening::exponential)
@@ -97,7 +102,9 @@ void bind_drucker_prager(py::module_& m)
       .value("PLANE_STRAIN", ConeMatch::plane_strain);
   m.def("cone_slope", &cone_slope, py::arg("angle"), py::arg("match"));
   m.def("cone_strength", &cone_strength, py::arg("cohesion"), py::arg("friction_angle"), py::arg("match"));
-  bind_law<DruckerPrager>(m, "DruckerPrager", R"(Drucker-Prager, linear elastic and perfectly plastic: sqrt(J2) + friction * p <= strength with the mean stress p.
+  bind_law<DruckerPrager>(
+      m, "DruckerPrager",
+      R"(Drucker-Prager, linear elastic and perfectly plastic: sqrt(J2) + friction * p <= strength with the mean stress p.
 
 Args:
     young: Young's modulus [Pa], positive.
@@ -110,8 +117,7 @@ Args:
 See also matched_drucker_prager and von_mises.)")
       .def(py::init(
                [](double young, double poisson, double strength, double friction, double dilation,
-                  std::optional<double> tension_cutoff)
-               {
+                  std::optional<double> tension_cutoff) {
                  return checked(
                      DruckerPrager{young, poisson, strength, friction, dilation, tension_cutoff.value_or(infinity)});
                }),
@@ -143,10 +149,9 @@ The state log_preconsolidation is ln of the preconsolidation pressure over that 
 set it for points that begin with another one. The modulus for the time step is that of twice the preconsolidation.)")
       .def(py::init(
                [](double compression, double swelling, double critical_slope, double poisson, double preconsolidation,
-                  double void_ratio, double attraction)
-               {
-                 return checked(CamClay{compression, swelling, critical_slope, poisson, preconsolidation, void_ratio,
-                                        attraction});
+                  double void_ratio, double attraction) {
+                 return checked(
+                     CamClay{compression, swelling, critical_slope, poisson, preconsolidation, void_ratio, attraction});
                }),
            py::kw_only(), py::arg("compression"), py::arg("swelling"), py::arg("critical_slope"), py::arg("poisson"),
            py::arg("preconsolidation"), py::arg("void_ratio"), py::arg("attraction") = 0.0)
@@ -161,7 +166,8 @@ set it for points that begin with another one. The modulus for the time step is 
 
 void bind_wrappers(py::module_& m)
 {
-  bind_law<Hencky>(m, "Hencky", R"(A law between Kirchhoff stress and logarithmic strain, for strains that are not small.
+  bind_law<Hencky>(m, "Hencky",
+                   R"(A law between Kirchhoff stress and logarithmic strain, for strains that are not small.
 
 Args:
     law: any law but Undrained. It works on the Kirchhoff stress; points carry the Cauchy stress.
@@ -178,8 +184,10 @@ Args:
 
 Points carry the total stress; the state excess_pore_pressure [Pa], positive in compression, is what the effective stress
 exceeds it by (tension positive). Where there is a steady pore pressure, stresses are less that one.)")
-      .def(py::init([](const LawList<Hencky>& skeleton, double water_modulus, double porosity)
-                    { return checked(Undrained{skeleton, water_modulus, porosity}); }),
+      .def(py::init(
+               [](const LawList<Hencky>& skeleton, double water_modulus, double porosity) {
+                 return checked(Undrained{skeleton, water_modulus, porosity});
+               }),
            py::arg("skeleton"), py::kw_only(), py::arg("water_modulus") = 2.2e9, py::arg("porosity"))
       .def_readonly("skeleton", &Undrained::skeleton)
       .def_readonly("water_modulus", &Undrained::water_modulus)

@@ -25,11 +25,11 @@ std::shared_ptr<Mesh<D>> mesh_from_arrays(const py::array& points, const py::arr
   check_array<GlobalIndex>("global_nodes", global_nodes, {-1});
   check_array<GlobalIndex>("global_cells", global_cells, {-1});
   check_array<Index>("cell_owners", cell_owners, {-1});
-  return std::make_shared<Mesh<D>>(make_mesh<D>(
-      {values<double>(points), values<Index>(cells), values<Index>(cell_tags), values<Index>(facets),
-       values<Index>(facet_tags), values<GlobalIndex>(global_nodes), values<GlobalIndex>(global_cells),
-       values<Index>(cell_owners)},
-      rank));
+  return std::make_shared<Mesh<D>>(
+      make_mesh<D>({values<double>(points), values<Index>(cells), values<Index>(cell_tags), values<Index>(facets),
+                    values<Index>(facet_tags), values<GlobalIndex>(global_nodes), values<GlobalIndex>(global_cells),
+                    values<Index>(cell_owners)},
+                   rank));
 }
 
 /// Columns of a vector or tensor field as rows of a new array.
@@ -163,10 +163,9 @@ py::dict as_dict(const Diagnostics& d)
 {
   using namespace py::literals;
   return py::dict("particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
-                  "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3),
-                  "kinetic_energy"_a = d.kinetic_energy, "external_work"_a = d.external_work,
-                  "internal_work"_a = d.internal_work, "damping_work"_a = d.damping_work,
-                  "support_work"_a = d.support_work,
+                  "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
+                  "external_work"_a = d.external_work, "internal_work"_a = d.internal_work,
+                  "damping_work"_a = d.damping_work, "support_work"_a = d.support_work,
                   "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
                   "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
                   "plastic_share"_a = d.plastic_share, "unbalanced_ratio"_a = d.unbalanced_ratio);

@@ -24,7 +24,8 @@ void copy_back(const py::array_t<double>& array, double* const* columns, int wid
       columns[k][i] = in[static_cast<std::ptrdiff_t>(i) * width + k];
 }
 
-/// Takes over what a law has written. Points whose stress or state is not finite have failed; then all is left as it was.
+/// Takes over what a law has written. Points whose stress or state is not finite have failed; then all is left as it
+/// was.
 template <int D>
 BatchReport stored(const PointBatch<D>& points, const py::array_t<double>& stress, const py::array_t<double>& state,
                    const py::array_t<double>& tangent, int states)

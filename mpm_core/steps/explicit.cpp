@@ -24,8 +24,7 @@ void solve_momentum(Model<D>& model, double damping, double dt)
     for (int a = 0; a < D; ++a)
     {
       const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double drag =
-          local_damping(damping, residual, work.start_velocity[i][a], residual * dt / node.mass);
+      const double drag = local_damping(damping, residual, work.start_velocity[i][a], residual * dt / node.mass);
       work.acceleration[i][a] = node.mass > work.least_mass ? (residual - drag) / node.mass : 0;
     }
   }

@@ -10,15 +10,15 @@ namespace mpm
 enum class StressUpdate
 {
   modified_last, ///< MUSL: last, with velocities mapped back from the moved particles (19)
-  last,          ///< USL: last, with v_i + dt a_i; needs a smaller step where nodes carry little mass, f_int / m_i being large
-  first          ///< USF: before the momentum equation, with the velocities at the step's start
+  last, ///< USL: last, with v_i + dt a_i; needs a smaller step where nodes carry little mass, f_int / m_i being large
+  first ///< USF: before the momentum equation, with the velocities at the step's start
 };
 
 struct ExplicitOptions
 {
   StressUpdate stress_update = StressUpdate::modified_last;
-  double damping = 0;         ///< local damping alpha of FLAC, in [0, 1)
-  double pic_share = 0;       ///< in [0, 1]
+  double damping = 0;   ///< local damping alpha of FLAC, in [0, 1)
+  double pic_share = 0; ///< in [0, 1]
   bool mixed_discretisation = false;
 };
 
@@ -29,8 +29,9 @@ struct ExplicitOptions
 template <int D>
 void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
 
-/// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported directions do not
-/// count above. Without external force, as under prescribed velocities, reactions take its place; 0 without either.
+/// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported
+/// directions do not count above. Without external force, as under prescribed velocities, reactions take its place; 0
+/// without either.
 /// @note Collective
 template <int D>
 double out_of_balance(const Model<D>& model, const Vector<D>& gravity);

@@ -38,8 +38,9 @@ void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
                                      {
                                        Vector<D> value;
                                        for (int a = 0; a < D; ++a)
-                                         value[a] = facet.stiffness * step.dt * work.velocity[i][a] +
-                                                    facet.mass * inertia * (work.velocity[i][a] - work.start_velocity[i][a]);
+                                         value[a] =
+                                             facet.stiffness * step.dt * work.velocity[i][a] +
+                                             facet.mass * inertia * (work.velocity[i][a] - work.start_velocity[i][a]);
                                        return value;
                                      });
     for (int k = 0; k < D + 2; ++k)
@@ -70,7 +71,8 @@ void find_forces(Model<D>& model, ImplicitStep<D>& step)
     model.work.nodes[i].internal = step.forces[i].internal;
 }
 
-/// Work done in the step: forces act at its end, over its whole displacement. That of the ghost penalty counts as damping.
+/// Work done in the step: forces act at its end, over its whole displacement. That of the ghost penalty counts as
+/// damping.
 template <int D>
 void tally(Model<D>& model, const ImplicitStep<D>& step)
 {
@@ -195,7 +197,8 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   const Particles<D> start = model.particles;
   // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
   const double pic = options.quasi_static ? 1 : options.pic_share;
-  particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation}); // (18), (20), stresses
+  particle_pass<D>(model,
+                   {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)
   {

@@ -4,9 +4,9 @@
 ///
 ///     r(v1) = f_ext - f_int(u) - D - M (v1 - v0) / dt,   u = dt v1
 ///
-/// Stresses go from the step's start over the whole increment u; gradients and volumes are those of the start, so that the
-/// first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite elements.
-/// A trial leaves the particles as they are: only sums over cells are kept of it.
+/// Stresses go from the step's start over the whole increment u; gradients and volumes are those of the start, so that
+/// the first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite
+/// elements. A trial leaves the particles as they are: only sums over cells are kept of it.
 
 #include "steps/implicit_ghost.h"
 #include "steps/implicit_inertia.h"
@@ -15,11 +15,11 @@ namespace mpm
 {
 struct ImplicitOptions
 {
-  double damping = 0;       ///< local damping alpha, in [0, 1); not used in quasi-static steps
-  double pic_share = 0;     ///< in [0, 1]
+  double damping = 0;   ///< local damping alpha, in [0, 1); not used in quasi-static steps
+  double pic_share = 0; ///< in [0, 1]
   bool mixed_discretisation = false;
-  GhostOptions ghost;        ///< of the remedy for nodes with hardly any mass
-  bool quasi_static = false; ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
+  GhostOptions ghost;          ///< of the remedy for nodes with hardly any mass
+  bool quasi_static = false;   ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
   bool hold_positions = false; ///< stresses and volumes change, places do not; for quasi-static steps without new load
 };
 
@@ -37,9 +37,9 @@ struct CellTangent
 struct TrialReport
 {
   double residual = 0;
-  double scale = 0;              ///< largest of |f_ext|, |f_int|, |M (v1 - v0) / dt|, reactions included
-  std::int64_t plastic = 0;      ///< particles that yield
-  std::int64_t failed = 0;       ///< particles whose law failed, and cells that would lose their volume
+  double scale = 0;         ///< largest of |f_ext|, |f_int|, |M (v1 - v0) / dt|, reactions included
+  std::int64_t plastic = 0; ///< particles that yield
+  std::int64_t failed = 0;  ///< particles whose law failed, and cells that would lose their volume
 };
 
 /// What the cells of a trial give a node [N], summed over ranks.
@@ -55,22 +55,22 @@ template <int D>
 struct ImplicitStep
 {
   ImplicitOptions options;
-  double dt = 0;                                         ///< [s]
-  std::vector<Vector<D>> external;                       ///< f_ext at the step's end
-  std::vector<Vector<D>> residual;                       ///< zero along supported directions
+  double dt = 0;                                          ///< [s]
+  std::vector<Vector<D>> external;                        ///< f_ext at the step's end
+  std::vector<Vector<D>> residual;                        ///< zero along supported directions
   std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
   /// Sum V dsigma/dstrain of each owned cell, without zz in plane strain; engineering shear
   std::vector<std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>> stiffness;
-  std::vector<CellTangent<D>> tangents;                  ///< of each owned cell
+  std::vector<CellTangent<D>> tangents; ///< of each owned cell
   std::vector<TrialForces<D>> forces;
-  std::vector<GhostFacet<D>> ghosts;                     ///< stabilised facets
-  Halos halos;                                           ///< of the mesh, for those between ranks; made by the first step
+  std::vector<GhostFacet<D>> ghosts; ///< stabilised facets
+  Halos halos;                       ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
-  std::vector<unsigned char> active;                     ///< per node: 1 where a filled cell touches it
+  std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
 
-/// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under the
-/// supports, as first iterate.
+/// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under
+/// the supports, as first iterate.
 /// @note Collective
 template <int D>
 void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt);

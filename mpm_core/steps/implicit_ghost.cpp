@@ -1,6 +1,5 @@
 #include "steps/implicit_ghost.h"
 
-
 #include <algorithm>
 
 namespace mpm
@@ -12,7 +11,7 @@ struct CellContents
 {
   double volume; ///< filled
   double mass;
-  double shear;  ///< integral of the shear modulus over the filled volume
+  double shear; ///< integral of the shear modulus over the filled volume
 };
 
 template <int D>

@@ -7,9 +7,10 @@
 ///
 ///     f_i = sum_F |F| [dN_i/dn] ( gamma_K G h [du/dn] + gamma_M rho h^3 [da/dn] ),   [.] the jump over F,
 ///
-/// of the step's displacement u and acceleration a = (v1 - v0)/dt (Burman 2010; Sticko & Kreiss 2016 for the mass; Coombs
-/// 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly filled cells have it, so a body whose
-/// cells are filled is not touched. A cell that has no filled neighbour is tied to a gradient of zero instead.
+/// of the step's displacement u and acceleration a = (v1 - v0)/dt (Burman 2010; Sticko & Kreiss 2016 for the mass;
+/// Coombs 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly filled cells have it, so a
+/// body whose cells are filled is not touched. A cell that has no filled neighbour is tied to a gradient of zero
+/// instead.
 
 #include "parallel/halo.h"
 #include "steps/model.h"
@@ -27,8 +28,9 @@ struct GhostOptions
 template <int D>
 struct GhostFacet
 {
-  std::array<Index, D + 2> nodes;  ///< those of the facet, then the one opposite in each cell, that of the owned cell first
-  std::array<double, D + 2> jump;  ///< [dN/dn] of each node [1/m]
+  std::array<Index, D + 2>
+      nodes; ///< those of the facet, then the one opposite in each cell, that of the owned cell first
+  std::array<double, D + 2> jump; ///< [dN/dn] of each node [1/m]
   /// Share of the force at each node that this rank adds: a facet to a ghost cell is on both ranks
   std::array<double, D + 2> share;
   double stiffness; ///< |F| gamma_K G h

@@ -22,9 +22,9 @@ struct Inertia
 ///
 ///     R dt = m [ (w - v0) / (1 + alpha) + (v1 - w) / (1 - alpha) ],   w = v1 clipped to between 0 and v0.
 ///
-/// This is r(v1) = R - D - m (v1 - v0) / dt = 0 with D the mean over the step, solved for R: continuous and increasing in
-/// v1, where sign(v1) would make the residual jump. With alpha = 0 it is plain backward Euler; for small steps it is the
-/// explicit D.
+/// This is r(v1) = R - D - m (v1 - v0) / dt = 0 with D the mean over the step, solved for R: continuous and increasing
+/// in v1, where sign(v1) would make the residual jump. With alpha = 0 it is plain backward Euler; for small steps it is
+/// the explicit D.
 inline Inertia damped_inertia(double mass, double v0, double v1, double dt, double alpha)
 {
   const double w = std::clamp(v1, std::min(0.0, v0), std::max(0.0, v0));

@@ -12,7 +12,8 @@ namespace
 constexpr double margin = 1.05;
 constexpr double local_damping_share = 0.8; ///< beta, the customary value in FLAC
 
-/// Largest sum over a row of vertex k of |elastic stiffness of a whole cell|, and of the part that turns its stress [N/m]
+/// Largest sum over a row of vertex k of |elastic stiffness of a whole cell|, and of the part that turns its stress
+/// [N/m]
 template <int D>
 double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& moduli, double stress)
 {
@@ -37,7 +38,8 @@ double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& modu
 template <int D>
 std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
 {
-  std::vector<double> rows(model.mesh.points.size(), 0.0), cell(static_cast<std::size_t>(model.mesh.owned_cells) * (D + 1), 0.0);
+  std::vector<double> rows(model.mesh.points.size(), 0.0),
+      cell(static_cast<std::size_t>(model.mesh.owned_cells) * (D + 1), 0.0);
   for (const Run& run : model.work.runs)
   {
     double stress = 0, filled = 0;
@@ -59,7 +61,8 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
   }
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
     for (int k = 0; k <= D; ++k)
-      rows[model.mesh.cells[c][k]] += step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
+      rows[model.mesh.cells[c][k]] +=
+          step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
   const double inertia = step.options.quasi_static ? 0 : 1 / step.dt;
   for (const GhostFacet<D>& facet : step.ghosts)
   {
@@ -67,7 +70,8 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
     for (double jump : facet.jump)
       sum += std::abs(jump);
     for (int k = 0; k < D + 2; ++k)
-      rows[facet.nodes[k]] += facet.share[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
+      rows[facet.nodes[k]] +=
+          facet.share[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
   }
   sum_shared(model.exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
@@ -101,7 +105,8 @@ double nodal_sum(const Model<D>& model, F&& term)
   return sum;
 }
 
-/// c of Underwood (1983), critical for the mode that the iteration moves in: 2 sqrt(w J w / w M w), J w from the last change of r.
+/// c of Underwood (1983), critical for the mode that the iteration moves in: 2 sqrt(w J w / w M w), J w from the last
+/// change of r.
 template <int D>
 double critical_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
 {
@@ -130,7 +135,8 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
       next[a] = residual[a] / mass;
       break;
     case RelaxationKind::local:
-      next[a] = rate[a] + (residual[a] - (rate[a] == 0 ? 0 : std::copysign(damping * std::abs(residual[a]), rate[a]))) / mass;
+      next[a] =
+          rate[a] + (residual[a] - (rate[a] == 0 ? 0 : std::copysign(damping * std::abs(residual[a]), rate[a]))) / mass;
       break;
     case RelaxationKind::kinetic: // where it has passed the peak of its kinetic energy, it begins anew from rest
       next[a] = rate[a] * residual[a] < 0 ? 0.5 * residual[a] / mass : rate[a] + residual[a] / mass;
@@ -160,7 +166,8 @@ template <int D>
 int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, double tolerance, int most)
 {
   int done = 0;
-  while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale && relaxation.report.failed == 0)
+  while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale &&
+         relaxation.report.failed == 0)
   {
     double damping = local_damping_share;
     if (relaxation.kind == RelaxationKind::viscous)
@@ -169,7 +176,8 @@ int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, dou
     {
       if (!step.active[i])
         continue;
-      relaxation.rate[i] = next_rate<D>(relaxation.kind, relaxation.rate[i], step.residual[i], relaxation.mass[i], damping);
+      relaxation.rate[i] =
+          next_rate<D>(relaxation.kind, relaxation.rate[i], step.residual[i], relaxation.mass[i], damping);
       for (int a = 0; a < D; ++a)
         model.work.velocity[i][a] += relaxation.rate[i][a];
     }

@@ -13,13 +13,13 @@ namespace mpm
 template <int D>
 struct ImplicitSystem
 {
-  std::vector<GlobalIndex> number;   ///< per node: its number over all ranks, or `none` where it is not active
-  std::vector<Index> owned;          ///< nodes whose rows this rank has, by rising number
-  std::vector<Index> cells;          ///< filled cells of this rank
+  std::vector<GlobalIndex> number;          ///< per node: its number over all ranks, or `none` where it is not active
+  std::vector<Index> owned;                 ///< nodes whose rows this rank has, by rising number
+  std::vector<Index> cells;                 ///< filled cells of this rank
   std::vector<std::array<Index, 2>> ghosts; ///< opposite nodes of the stabilised facets
-  std::vector<Index> support;        ///< per node: its support, or `none`
-  std::vector<double> diagonal;      ///< per node: elastic stiffness, the scale of its entries [N/m]
-  GlobalIndex total = 0;             ///< nodes over all ranks
+  std::vector<Index> support;               ///< per node: its support, or `none`
+  std::vector<double> diagonal;             ///< per node: elastic stiffness, the scale of its entries [N/m]
+  GlobalIndex total = 0;                    ///< nodes over all ranks
 };
 
 /// Entries that are added up where rows and columns repeat. Rows may be another rank's.
@@ -37,12 +37,14 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
 
 /// J = d (f_int + inertia) / du; with nodal mixed discretisation at constant averaged volumetric strain.
 /// @pre the step's tangents belong to the iterate
-/// @post the order of the entries is always the same for the same system; rows and columns are filled when they are empty
+/// @post the order of the entries is always the same for the same system; rows and columns are filled when they are
+/// empty
 template <int D>
 void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
                        CooEntries& entries);
 
-/// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes, ...
+/// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes,
+/// ...
 template <int D>
 void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
                               CooEntries& entries);

@@ -32,8 +32,8 @@ constexpr std::array<std::array<int, 2>, D*(D - 1) / 2> spin_pairs = []
   return pairs;
 }();
 
-/// d Omega = dR R^T for each pair b < m of axes, per du_b/dx_m; its negative belongs to du_m/dx_b. The Cayley transform R of
-/// the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
+/// d Omega = dR R^T for each pair b < m of axes, per du_b/dx_m; its negative belongs to du_m/dx_b. The Cayley transform
+/// R of the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
 template <int D>
 std::array<Matrix<D>, D*(D - 1) / 2> spins(const Matrix<D>& rotation)
 {
@@ -75,8 +75,8 @@ Symmetric<D> turned_by(const Matrix<D>& omega, const Symmetric<D>& s)
 
 /// The tangent of a cell from C = sum V dsigma/dstrain and the sum of V sigma at the increment's end.
 ///
-/// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R turns by
-/// Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
+/// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R
+/// turns by Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
 template <int D>
 CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
                             const CellStrain<D>& strain, bool averaged)
@@ -222,7 +222,8 @@ TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tange
     const Batch batch = next_batch(runs, r);
     for (r = batch.first_run; r < batch.last_run; ++r)
       load_run(model, runs[r], cell_strain(model, step, runs[r].cell, count), runs[r].first - batch.first, scratch);
-    const BatchReport report = update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
+    const BatchReport report =
+        update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
     count.plastic += report.plastic;
     count.failed += report.failed;
     for (r = batch.first_run; r < batch.last_run; ++r)
@@ -237,9 +238,9 @@ TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tange
   TrialCount counted;
   for (std::size_t c = 0; tangents && c < cells; ++c)
     if (model.work.moments[c].volume > 0)
-      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c],
-                                         cell_strain(model, step, static_cast<Index>(c), counted),
-                                         step.options.mixed_discretisation);
+      step.tangents[c] =
+          cell_tangent<D>(step.stiffness[c], step.stress[c], cell_strain(model, step, static_cast<Index>(c), counted),
+                          step.options.mixed_discretisation);
   return count;
 }
 

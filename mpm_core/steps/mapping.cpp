@@ -16,7 +16,8 @@ void find_start_velocity(Model<D>& model)
   Workspace<D>& work = model.work;
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
     for (int a = 0; a < D; ++a)
-      work.start_velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
+      work.start_velocity[i][a] =
+          work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
   for (const Support<D>& support : model.supports)
     impose<D>(support, work.start_velocity[support.node]);
 }

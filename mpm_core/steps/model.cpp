@@ -79,7 +79,8 @@ void prepare(Model<D>& model)
     if (loaded)
       gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.tractions[run.cell]);
   }
-  // Only particles within round-off of the opposite facet touch a node with less than this share of a whole particle's mass.
+  // Only particles within round-off of the opposite facet touch a node with less than this share of a whole particle's
+  // mass.
   const auto heaviest = std::max_element(model.particles.mass.begin(), model.particles.mass.end());
   work.least_mass = heaviest == model.particles.mass.end() ? 0 : 1e-12 * *heaviest;
   MPI_Allreduce(MPI_IN_PLACE, &work.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);

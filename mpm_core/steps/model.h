@@ -71,22 +71,22 @@ struct Workspace
   std::vector<CellMoments<D>> moments;       ///< of the particles as they are now
   std::vector<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
   std::vector<NodeSums<D>> nodes;
-  std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
-  std::vector<Vector<D>> acceleration;       ///< a_i
-  std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
-  std::vector<NodalMotion<D>> motion;        ///< of the nodes, as the particles take it
-  std::vector<double> cell_volume;           ///< filled volume, at the step's start
-  std::vector<double> volumetric_strain;     ///< theta_c, averaged; used with nodal mixed discretisation
+  std::vector<Vector<D>> start_velocity; ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;   ///< a_i
+  std::vector<Vector<D>> velocity;       ///< v_i that moves and strains the particles
+  std::vector<NodalMotion<D>> motion;    ///< of the nodes, as the particles take it
+  std::vector<double> cell_volume;       ///< filled volume, at the step's start
+  std::vector<double> volumetric_strain; ///< theta_c, averaged; used with nodal mixed discretisation
   VolumetricSums volumetric_sums;
   std::vector<Leaver> leavers;
   std::vector<Index> outflow;
-  std::vector<Index> lost;                   ///< particles that no cell known to this rank's neighbourhood holds
-  std::vector<int> far_partners;             ///< ranks beyond the neighbours that exchange particles after this pass
+  std::vector<Index> lost;       ///< particles that no cell known to this rank's neighbourhood holds
+  std::vector<int> far_partners; ///< ranks beyond the neighbours that exchange particles after this pass
   std::unordered_map<GlobalIndex, Index> owned_cells;
   std::optional<Trouble<D>> trouble;
-  double least_mass = 0;                     ///< nodes below this mass are not moved [kg]
+  double least_mass = 0; ///< nodes below this mass are not moved [kg]
   std::int64_t last_sort = 0;
-  Index strays = 0;                          ///< particles that changed cell since the last sort
+  Index strays = 0; ///< particles that changed cell since the last sort
 };
 
 template <int D>
@@ -102,7 +102,7 @@ struct Model
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
   double time = 0;         ///< [s]
   Totals totals;
-  Inventory inventory;     ///< when the particles were last changed by anything but a step
+  Inventory inventory; ///< when the particles were last changed by anything but a step
   LastStep last;
   Workspace<D> work;
 };
@@ -134,10 +134,12 @@ void prepare(Model<D>& model);
 
 /// Notes what stops the run and where, unless something was noted before.
 template <int D>
-void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& strain_increment);
+void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
+                  const SymTensor<D>& strain_increment);
 
-/// Settles with all ranks what became of the particles in `work.lost`: they are in a cell of some rank and leave for it, went
-/// through an outflow facet, or are trouble. Then makes `work.trouble` known to all: that of the lowest rank that has one.
+/// Settles with all ranks what became of the particles in `work.lost`: they are in a cell of some rank and leave for
+/// it, went through an outflow facet, or are trouble. Then makes `work.trouble` known to all: that of the lowest rank
+/// that has one.
 /// @note Collective
 template <int D>
 void agree_on_trouble(Model<D>& model);

@@ -29,9 +29,9 @@ void find_motion(Model<D>& model, const PassOptions& options)
 template <int D>
 struct BatchScratch
 {
-  WorkColumns<Matrix<D>> gradient;  ///< of the velocity, per run
-  WorkColumn<double> theta;         ///< averaged volumetric strain, per run
-  WorkColumns<CellStrain<D>> cells; ///< per run
+  WorkColumns<Matrix<D>> gradient;                    ///< of the velocity, per run
+  WorkColumn<double> theta;                           ///< averaged volumetric strain, per run
+  WorkColumns<CellStrain<D>> cells;                   ///< per run
   alignas(64) double strain[n_stress<D>][batch_size]; ///< per particle, one column per component
 };
 
@@ -208,7 +208,8 @@ void settle_particles(Model<D>& model)
     gather_run<D>(model, p, p + 1, model.particles.cell[p]);
   work.strays += arrived;
 
-  // Strays cut the runs of two cells; sorting costs about two steps, so it waits until a tenth of the particles strayed.
+  // Strays cut the runs of two cells; sorting costs about two steps, so it waits until a tenth of the particles
+  // strayed.
   if (work.strays > model.particles.size() / 10 && model.totals.steps - work.last_sort > 50)
     sort_particles(model);
   else if (gone || arrived > 0)

@@ -20,8 +20,8 @@ struct Destination
   int rank;
 };
 
-/// Destinations of this rank's particles, and the ranks beyond its neighbours with which it will exchange particles. Points in
-/// cells that this rank knows are found here; only the others are looked for with all ranks.
+/// Destinations of this rank's particles, and the ranks beyond its neighbours with which it will exchange particles.
+/// Points in cells that this rank knows are found here; only the others are looked for with all ranks.
 template <int D>
 std::vector<int> find_destinations(const Model<D>& model, const std::unordered_map<GlobalIndex, Index>& owned,
                                    std::vector<Destination<D>>& destinations)
@@ -55,12 +55,14 @@ std::vector<int> find_destinations(const Model<D>& model, const std::unordered_m
 template <int D>
 void require_cells(const Model<D>& model, const std::vector<Destination<D>>& destinations)
 {
-  const auto outside = std::find_if(destinations.begin(), destinations.end(), [](const auto& to) { return to.cell == none; });
+  const auto outside =
+      std::find_if(destinations.begin(), destinations.end(), [](const auto& to) { return to.cell == none; });
   if (outside == destinations.end())
     return;
   std::ostringstream out;
   out.precision(9);
-  out << "position of particle " << model.particles.id[static_cast<std::size_t>(outside - destinations.begin())] << " is (";
+  out << "position of particle " << model.particles.id[static_cast<std::size_t>(outside - destinations.begin())]
+      << " is (";
   for (int i = 0; i < D; ++i)
     out << (i ? ", " : "") << outside->position[i];
   out << ") m, which is outside of the mesh";

@@ -6,8 +6,8 @@
 
 namespace mpm
 {
-/// Gives particles new positions, finds their cells anew, anywhere in the mesh, and sends them to the ranks that own these.
-/// Initial positions stay as they are.
+/// Gives particles new positions, finds their cells anew, anywhere in the mesh, and sends them to the ranks that own
+/// these. Initial positions stay as they are.
 /// @param positions  [m], (n, D), one row for each particle of this rank in the present order
 /// @throws InputError on all ranks, naming a particle that would be outside of the mesh; then no particle is changed
 /// @post Particles may have another order, and other ranks

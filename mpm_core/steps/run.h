@@ -8,11 +8,11 @@ namespace mpm
 {
 struct RunOptions
 {
-  double until = 0;             ///< time at which to stop, met exactly [s]
-  std::optional<double> dt;     ///< step [s]; by default `courant` times the critical one
-  double courant = 0.5;         ///< alpha_c of (17)
-  bool allow_unstable = false;  ///< take `dt` even above the critical step
-  std::int64_t max_steps = 0;   ///< return earlier, after this many steps; a multiple of `control_interval`
+  double until = 0;            ///< time at which to stop, met exactly [s]
+  std::optional<double> dt;    ///< step [s]; by default `courant` times the critical one
+  double courant = 0.5;        ///< alpha_c of (17)
+  bool allow_unstable = false; ///< take `dt` even above the critical step
+  std::int64_t max_steps = 0;  ///< return earlier, after this many steps; a multiple of `control_interval`
 };
 
 /// Steps between two looks at the critical time step.
@@ -45,8 +45,8 @@ struct Diagnostics
   double outflow_particles;
   double outflow_mass;
   double particle_steps;
-  double plastic_share;     ///< of the particles, in the last step
-  double unbalanced_ratio;  ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
+  double plastic_share;    ///< of the particles, in the last step
+  double unbalanced_ratio; ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
 };
 
 /// @throws RunError on all ranks: particles, mass or momentum were lost or counted twice

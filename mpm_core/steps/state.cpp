@@ -85,8 +85,10 @@ template <int D>
 std::vector<Table> rank_state(const Model<D>& model)
 {
   std::vector<Table> tables;
-  for_each_number(model, [&](const char* name, Kind, const auto& number)
-                  { tables.push_back({name, 1, {static_cast<double>(number)}}); });
+  for_each_number(model,
+                  [&](const char* name, Kind, const auto& number) {
+                    tables.push_back({name, 1, {static_cast<double>(number)}});
+                  });
   return tables;
 }
 
@@ -102,7 +104,8 @@ std::vector<Table> cell_state(const Model<D>& model)
 template <int D>
 std::vector<Table> empty_cell_state()
 {
-  return {{"moments", moments_width<CellMoments<D>> + 1, {}}, {"traction_moments", moments_width<TractionMoments<D>> + 1, {}}};
+  return {{"moments", moments_width<CellMoments<D>> + 1, {}},
+          {"traction_moments", moments_width<TractionMoments<D>> + 1, {}}};
 }
 
 template <int D>

@@ -12,8 +12,9 @@ namespace mpm
 template <int D>
 std::vector<Table> rank_state(const Model<D>& model);
 
-/// Sums over the filled cells of this rank, as they were gathered: taken anew from the particles they would differ in their
-/// last bits, and a run that goes on with them would be another one. The first number of a row is the cell over all ranks.
+/// Sums over the filled cells of this rank, as they were gathered: taken anew from the particles they would differ in
+/// their last bits, and a run that goes on with them would be another one. The first number of a row is the cell over
+/// all ranks.
 /// @pre prepare(model) has been called
 template <int D>
 std::vector<Table> cell_state(const Model<D>& model);
@@ -22,8 +23,8 @@ std::vector<Table> cell_state(const Model<D>& model);
 template <int D>
 std::vector<Table> empty_cell_state();
 
-/// Puts particles and state of a run into the model, as they were on the same rank; the next step is then the same to the last
-/// bit.
+/// Puts particles and state of a run into the model, as they were on the same rank; the next step is then the same to
+/// the last bit.
 /// @note Collective
 template <int D>
 void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<Table>& ranks,

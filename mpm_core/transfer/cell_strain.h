@@ -28,8 +28,8 @@ inline double deviatoric_size(const SymTensor<D>& e, double volumetric)
   return std::sqrt(2.0 / 3.0 * (normal + 0.5 * shear));
 }
 
-/// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980), so
-/// that stresses turn without a change of size however large the step.
+/// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980),
+/// so that stresses turn without a change of size however large the step.
 template <int D>
 inline CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double dt)
 {

@@ -99,7 +99,8 @@ int move_particles(Particles<D>& particles, const Run& run, const Mesh<D>& mesh,
   }
   int outside = 0;
   for_each_lanes(columns, run.first, run.last,
-                 [&](const MotionColumns<D>& at, int first) { outside += move_lanes<D>(at, first, shape, cell, keep); });
+                 [&](const MotionColumns<D>& at, int first)
+                 { outside += move_lanes<D>(at, first, shape, cell, keep); });
   return outside;
 }
 
@@ -173,7 +174,7 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template int move_particles<D>(Particles<D>&, const Run&, const Mesh<D>&, std::span<const NodalMotion<D>>, double);     \
+  template int move_particles<D>(Particles<D>&, const Run&, const Mesh<D>&, std::span<const NodalMotion<D>>, double);  \
   template void rotate<D>(const SymmetricColumns<D>&, Index, Index, const Matrix<D>&);                                 \
   template void strain_particles(Particles<D>&, Index, Index, const CellStrain<D>&);
 INSTANTIATE(2)

@@ -9,8 +9,8 @@
 
 namespace mpm
 {
-/// What a node does to the particles over a step: change of velocity [m/s], then displacement [m]. Together, since both are
-/// wanted at once at the nodes of a cell.
+/// What a node does to the particles over a step: change of velocity [m/s], then displacement [m]. Together, since both
+/// are wanted at once at the nodes of a cell.
 template <int D>
 using NodalMotion = std::array<double, 2 * D>;
 

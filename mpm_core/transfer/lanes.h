@@ -12,8 +12,8 @@ namespace mpm
 /// Particles that a kernel treats at once: one vector register of AVX-512, two of AVX2, four of SSE2 or NEON.
 inline constexpr int lanes = 8;
 
-/// Calls `kernel(at, first)` on pieces of `lanes` entries of the columns [first, last): `at` is where the piece begins in
-/// each column, and only the lanes from `first` on are to be written or counted. The last piece reaches back over
+/// Calls `kernel(at, first)` on pieces of `lanes` entries of the columns [first, last): `at` is where the piece begins
+/// in each column, and only the lanes from `first` on are to be written or counted. The last piece reaches back over
 /// entries before it.
 template <std::size_t N, class Kernel>
 inline void for_each_lanes(const std::array<double*, N>& columns, Index first, Index last, Kernel&& kernel)

@@ -12,8 +12,8 @@ namespace mpm
 using VolumetricSums = std::vector<std::array<double, 2>>;
 
 /// Replaces the volumetric strain of each filled cell by the mean of its nodes' values, which are the averages over the
-/// filled cells around them, weighted by filled volume (method of Detournay & Dzik 2006; volume weights keep the tangent
-/// symmetric).
+/// filled cells around them, weighted by filled volume (method of Detournay & Dzik 2006; volume weights keep the
+/// tangent symmetric).
 /// @param volume  filled volume per owned cell; 0 where empty
 /// @param theta   volumetric strain per owned cell, changed in place
 /// @note Collective

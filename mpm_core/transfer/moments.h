@@ -4,7 +4,8 @@
 ///
 /// A linear shape function is affine inside a cell, so each nodal sum over the particles of a cell, such as
 /// sum m_p N_i(x_p), follows from a few moments of the particles about the cell's centre. They are gathered in one pass
-/// over the particles and scattered to nodes once per cell, instead of evaluating shape functions per particle and node.
+/// over the particles and scattered to nodes once per cell, instead of evaluating shape functions per particle and
+/// node.
 
 #include "mesh/mesh.h"
 #include "particles/particles.h"
@@ -68,8 +69,8 @@ template <int D>
 void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
             TractionMoments<D>& moments);
 
-/// Adds `factor * sum m_p f(x_p)` and its first moment to the momentum, for an affine field f. This is what the momentum
-/// becomes when each particle's velocity changes by f at its place, without visiting the particles.
+/// Adds `factor * sum m_p f(x_p)` and its first moment to the momentum, for an affine field f. This is what the
+/// momentum becomes when each particle's velocity changes by f at its place, without visiting the particles.
 template <int D>
 inline void add_momentum(CellMoments<D>& moments, const AffineField<D>& f, double factor)
 {

@@ -48,8 +48,8 @@ void scatter_momentum(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template void scatter<D>(const Mesh<D>&, std::span<const CellMoments<D>>, std::span<const TractionMoments<D>>,          \
-                        std::span<NodeSums<D>>);                                                                       \
+  template void scatter<D>(const Mesh<D>&, std::span<const CellMoments<D>>, std::span<const TractionMoments<D>>,       \
+                           std::span<NodeSums<D>>);                                                                    \
   template void scatter_momentum<D>(const Mesh<D>&, std::span<const CellMoments<D>>, std::span<Vector<D>>);
 INSTANTIATE(2)
 INSTANTIATE(3)

@@ -12,10 +12,10 @@ namespace mpm
 template <int D>
 struct NodeSums
 {
-  double mass;             ///< m_i (11)
-  Vector<D> momentum;      ///< sum m_p N_i v_p
-  Vector<D> internal;      ///< f_int,i (14)
-  Vector<D> traction;      ///< the part of f_ext,i (15) that boundary particles carry
+  double mass;        ///< m_i (11)
+  Vector<D> momentum; ///< sum m_p N_i v_p
+  Vector<D> internal; ///< f_int,i (14)
+  Vector<D> traction; ///< the part of f_ext,i (15) that boundary particles carry
 };
 
 /// f_int of a vertex of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function

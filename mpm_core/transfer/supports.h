@@ -23,7 +23,7 @@ template <int D>
 struct SupportRequest
 {
   Index facet_tag;
-  bool whole;      ///< true: `vector` is the prescribed velocity; false: v . vector = 0 (roller)
+  bool whole; ///< true: `vector` is the prescribed velocity; false: v . vector = 0 (roller)
   Vector<D> vector;
 };
 

@@ -7,8 +7,9 @@ import csv
 import time
 from pathlib import Path
 
-import mpm_core as mpm
 from mpi4py import MPI
+
+import mpm_core as mpm
 
 from .history import History
 
@@ -43,7 +44,9 @@ def _read(text: str) -> tuple[float, str]:
     except ValueError:
         value = 0
     if not 0 < value < 1e12:
-        raise argparse.ArgumentTypeError(f"is '{text}', expected a number of steps such as 500, or of minutes such as 5min")
+        raise argparse.ArgumentTypeError(
+            f"is '{text}', expected a number of steps such as 500, or of minutes such as 5min"
+        )
     return value, unit
 
 

@@ -6,15 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import fenics_bridge as bridge
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator
+
+import fenics_bridge as bridge
 
 from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, boundary_edges, colour_limits, discs, paper_style
 
@@ -102,7 +103,11 @@ def save_curves(
 
 
 def save_convergence(
-    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, reference: tuple[float, str] | None
+    path: Path,
+    sizes: Sequence[float],
+    curves: Mapping[str, Sequence[float]],
+    label: str,
+    reference: tuple[float, str] | None,
 ) -> None:
     """Draw results over the mesh size.
 
@@ -166,7 +171,12 @@ def _finish(axes: Axes, labels: tuple[str, str], limits: tuple) -> None:
 
 
 def save_mechanism(
-    path: Path, field: Field, title: str, *, line: np.ndarray | None = None, line_name: str = "",
+    path: Path,
+    field: Field,
+    title: str,
+    *,
+    line: np.ndarray | None = None,
+    line_name: str = "",
     box: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> None:
     """Draw a displacement increment: its length with arrows, and below it its shear strain.
@@ -216,7 +226,12 @@ def _arrows(axes: Axes, field: Field, lower: np.ndarray, upper: np.ndarray) -> N
 
 
 def save_side_by_side(
-    path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray, panels: Mapping[str, np.ndarray], quantity: Quantity,
+    path: Path,
+    scene: Scene,
+    position: np.ndarray,
+    volume: np.ndarray,
+    panels: Mapping[str, np.ndarray],
+    quantity: Quantity,
     title: str,
 ) -> None:
     """Draw several quantities of the same material points one below the other, in one colour scale from zero.
@@ -239,7 +254,9 @@ def save_side_by_side(
             collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0,
                                rasterized=True)  # fmt: skip
             collection.set_array(quantity.scale * values)
-            axes.set_title(f"{name}, up to {quantity.scale * values.max():.3g} {quantity.unit}", loc="left", pad=4, fontsize=8.5)
+            axes.set_title(
+                f"{name}, up to {quantity.scale * values.max():.3g} {quantity.unit}", loc="left", pad=4, fontsize=8.5
+            )
             axes.set_xlabel("$x$ [m]", labelpad=1)
         grid[0].set_ylabel("$y$ [m]", labelpad=1)
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=list(grid), location="bottom",

@@ -35,7 +35,9 @@ class Interrupt:
         self._signal = number
         self._restore()  # so that the next one has its usual effect
         if self._comm.rank == 0:
-            print("\ninterrupted: ending after this step and writing what there is; again to end at once", file=sys.stderr)
+            print(
+                "\ninterrupted: ending after this step and writing what there is; again to end at once", file=sys.stderr
+            )
 
     def requested(self) -> bool:
         """Whether the run should end; true on all ranks once a signal came on any.

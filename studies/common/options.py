@@ -80,7 +80,13 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
 
 
 def _add(parser: argparse.ArgumentParser, name: str, default: object, text: str, **kind: object) -> None:
-    shown = "" if default is None else f" (default: {default:g})" if isinstance(default, float) else f" (default: {default})"
+    shown = (
+        ""
+        if default is None
+        else f" (default: {default:g})"
+        if isinstance(default, float)
+        else f" (default: {default})"
+    )
     parser.add_argument(name, default=default, help=(text + shown).replace("%", "%%"), **kind)  # type: ignore[arg-type]
 
 
@@ -138,7 +144,9 @@ def add_count(
     _add(parser, name, default, text, type=count, metavar="N")
 
 
-def add_choice(parser: argparse.ArgumentParser, name: str, default: str | None, choices: Sequence[str], text: str) -> None:
+def add_choice(
+    parser: argparse.ArgumentParser, name: str, default: str | None, choices: Sequence[str], text: str
+) -> None:
     """Add an option that takes one of some words."""
 
     def choice(value: str) -> str:

@@ -31,5 +31,9 @@ def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) ->
     )  # fmt: skip
     parser.add_argument("--float64", action="store_true", help="store fields in double precision")
     parser.add_argument(
-        "--compression", type=level, default=0, metavar="N", help="level of compression of the files, 0 to 9 (default: 0)"
+        "--compression",
+        type=level,
+        default=0,
+        metavar="N",
+        help="level of compression of the files, 0 to 9 (default: 0)",
     )

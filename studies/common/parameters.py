@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import tomllib
 
 NOT_PARAMETERS = ("help", "output", "parameters", "restart")
 """Options that say where things are, not what is computed; they do not belong into a file of parameters."""

@@ -178,7 +178,9 @@ def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) 
     return collection
 
 
-def draw_bar(figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[float, float], has_less: bool = True) -> None:
+def draw_bar(
+    figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[float, float], has_less: bool = True
+) -> None:
     """The colour bar, with arrows where values beyond its ends may occur."""
     colours = ScalarMappable(Normalize(*limits), quantity.colours)
     extend = "both" if has_less else "max"

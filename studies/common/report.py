@@ -86,7 +86,9 @@ def save_report(path: Path, report: Report) -> None:
     filled = {
         "title": html.escape(report.title),
         "subtitle": html.escape(report.subtitle),
-        "facts": "".join(f"<li><b>{html.escape(v)}</b><span>{html.escape(k)}</span></li>" for k, v in report.facts.items()),
+        "facts": "".join(
+            f"<li><b>{html.escape(v)}</b><span>{html.escape(k)}</span></li>" for k, v in report.facts.items()
+        ),
         "figures": _figures(report.figures),
         "tables": _tables(report.parameters, report.results),
         "footer": html.escape(report.footer),
@@ -121,8 +123,12 @@ def _data(report: Report) -> dict:
         "quantities": {k: {"name": q.name, "unit": q.unit, "colours": q.colours} for k, q in quantities.items()},
         "first": next(iter(quantities), None),
         "limits": limits,
-        "extent": [np.min([c[0] for c in corners], 0).tolist(), np.max([c[1] for c in corners], 0).tolist()] if corners else [],
-        "maps": {name: _base64(_colours(name)) for name in dict.fromkeys([*MAPS, *(q.colours for q in quantities.values())])},
+        "extent": [np.min([c[0] for c in corners], 0).tolist(), np.max([c[1] for c in corners], 0).tolist()]
+        if corners
+        else [],
+        "maps": {
+            name: _base64(_colours(name)) for name in dict.fromkeys([*MAPS, *(q.colours for q in quantities.values())])
+        },
         "history": _history(report.history) if report.history is not None and len(report.history) else None,
     }
 
@@ -213,7 +219,14 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     """A column such as kinetic_energy_J_per_m as ("Kinetic energy", "J/m")."""
     if column == "dt_s":
         return "Time step", "s"
-    for ending, unit in (("_J_per_m", "J/m"), ("_N_per_m", "N/m"), ("_kPa", "kPa"), ("_Pa", "Pa"), ("_m", "m"), ("_s", "s")):
+    for ending, unit in (
+        ("_J_per_m", "J/m"),
+        ("_N_per_m", "N/m"),
+        ("_kPa", "kPa"),
+        ("_Pa", "Pa"),
+        ("_m", "m"),
+        ("_s", "s"),
+    ):
         if column.endswith(ending):
             return column.removesuffix(ending).replace("_", " ").capitalize(), unit
     return column.replace("_", " ").capitalize(), "-"
@@ -239,7 +252,8 @@ def _tables(parameters: Sequence[Parameter], results: Mapping[str, object]) -> s
     )
     first = f"<div><h2>Parameters</h2><table>{rows}</table></div>" if rows else ""
     rows = "".join(
-        f"<tr><td>{html.escape(name)}</td><td class='number'>{_shown(value)}</td></tr>" for name, value in results.items()
+        f"<tr><td>{html.escape(name)}</td><td class='number'>{_shown(value)}</td></tr>"
+        for name, value in results.items()
     )
     second = f"<div><h2>Results</h2><table>{rows}</table></div>" if rows else ""
     return f'<section class="tables">{first}{second}</section>' if first or second else ""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
-import fenics_bridge as bridge
-import mpm_core as mpm
 import numpy as np
 from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene

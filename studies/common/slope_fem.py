@@ -6,8 +6,9 @@ import argparse
 import sys
 from collections.abc import Callable
 
-import fenics_bridge as bridge
 from mpi4py import MPI
+
+import fenics_bridge as bridge
 
 from .options import add_choice, add_count, check
 from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_slope_options, soil_of

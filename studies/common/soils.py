@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 import mpm_core as mpm
+
 from .options import add_choice, add_number, add_switch
 
 MATERIALS = ("mohr-coulomb", "softening", "tresca", "von-mises", "drucker-prager", "cam-clay", "elastic")
@@ -16,9 +17,13 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     p = parser
     add_choice(p, "--material", MATERIALS[0], MATERIALS,
                "law of the soil; Tresca and von Mises: the cohesion is the shear strength")  # fmt: skip
-    add_number(p, "--tension-cutoff", None, "Pa", "largest principal stress (default: that of the strength)", at_least=0)
+    add_number(
+        p, "--tension-cutoff", None, "Pa", "largest principal stress (default: that of the strength)", at_least=0
+    )
     add_number(p, "--residual-cohesion", 200.0, "Pa", "softening: cohesion in the end", at_least=0)
-    add_number(p, "--residual-friction-angle", 15.0, "degrees", "softening: friction angle in the end", at_least=0, below=90)
+    add_number(
+        p, "--residual-friction-angle", 15.0, "degrees", "softening: friction angle in the end", at_least=0, below=90
+    )
     add_number(p, "--softening-strain", 0.3, "-", "softening: plastic strain over which strength falls, in a band of the "
                "reference length", above=0)  # fmt: skip
     add_number(p, "--reference-length", 0.1, "m", "softening: cell size for which the softening strain holds", above=0)

@@ -12,8 +12,9 @@ import platform
 import time
 from pathlib import Path
 
-import mpm_core as mpm
 import numpy as np
+
+import mpm_core as mpm
 
 MOVED_BYTES = {2: 8 * (2 * (2 + 2 + 4 + 1 + 1 + 1) + 1), 3: 8 * (2 * (3 + 3 + 6 + 1 + 1 + 1) + 1)}
 """Bytes that a particle-step must move: position, velocity, stress, volume, accumulated deviatoric and plastic strain are read
@@ -124,7 +125,9 @@ def main() -> None:
         held = model._core.bytes_per_particle()
         rows.append({"case": name, "particles": report.particles, "particle_steps_per_second": speed,
                      "share_of_bandwidth": share, "plastic_share": report.plastic_share, "bytes_held": held})  # fmt: skip
-        print(f"{name:34} {report.particles:10d} {speed / 1e6:10.1f} {share:13.0%} {report.plastic_share:8.0%} {held:11.0f}")
+        print(
+            f"{name:34} {report.particles:10d} {speed / 1e6:10.1f} {share:13.0%} {report.plastic_share:8.0%} {held:11.0f}"
+        )
     if a.json:
         machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count(),
                    "compiler": mpm.compiler, "program": mpm.__version__}  # fmt: skip

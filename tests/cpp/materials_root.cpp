@@ -26,7 +26,8 @@ TEST(Root, IsFoundToRoundOff)
   int evaluations;
   EXPECT_NEAR(root_of([](double x) { return x * x - 2; }, 0, 2, evaluations), std::sqrt(2.0), 1e-15);
   EXPECT_LT(evaluations, 15);
-  EXPECT_NEAR(root_of([](double x) { return std::exp(-1e6 * x) - 0.5; }, 0, 1, evaluations), std::log(2.0) * 1e-6, 1e-20);
+  EXPECT_NEAR(root_of([](double x) { return std::exp(-1e6 * x) - 0.5; }, 0, 1, evaluations), std::log(2.0) * 1e-6,
+              1e-20);
   EXPECT_LT(evaluations, 60);
 }
 

@@ -1,5 +1,5 @@
-#include "mesh/search.h"
 #include "boxes.h"
+#include "mesh/search.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -12,8 +12,16 @@ import fenics_bridge as bridge
 from fenics_bridge.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
-from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_stress, interior_points,  # noqa: E402
-                          slope_model, slope_particles)
+from bridge_cases import (
+    POISSON,
+    UNIT_WEIGHT,
+    YOUNG,
+    column,
+    column_stress,
+    interior_points,  # noqa: E402
+    slope_model,
+    slope_particles,
+)
 
 COMM = MPI.COMM_WORLD
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
@@ -104,9 +112,7 @@ def test_errors_reach_every_rank():
         bridge.solve_elastic(domain, facet_tags, [bridge.fixed(99)], YOUNG, POISSON, UNIT_WEIGHT)
 
 
-@pytest.mark.parametrize(
-    ("dilation_angle", "options"), [(25.0, {}), (0.0, {}), (25.0, {"degree": 1, "nmd": True})]
-)
+@pytest.mark.parametrize(("dilation_angle", "options"), [(25.0, {}), (0.0, {}), (25.0, {"degree": 1, "nmd": True})])
 def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle, options):
     points = np.array([[1.1, 1.0], [0.53, 0.45], [1.62, 0.31]])
     results = []
@@ -122,8 +128,10 @@ def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle, op
 
 
 def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
-    factors = [bridge.factor_of_safety(slope_model(comm=comm), bridge.Load(unit_weight=20e3)).value
-               for comm in (COMM, MPI.COMM_SELF)]
+    factors = [
+        bridge.factor_of_safety(slope_model(comm=comm), bridge.Load(unit_weight=20e3)).value
+        for comm in (COMM, MPI.COMM_SELF)
+    ]
     assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails
 
 

@@ -174,7 +174,9 @@ def test_every_flipped_bit_is_found(comm, checkpoint):
 def test_a_checkpoint_that_cannot_be_written_or_read(comm, shared_path, checkpoint):
     model = sliding_slope(comm)
     raised_everywhere(comm, mpm.RunError, "No such file or directory", lambda: model.restore(shared_path / "none.h5"))
-    raised_everywhere(comm, mpm.RunError, "No such file or directory", lambda: model.save(shared_path / "none" / "a.h5"))
+    raised_everywhere(
+        comm, mpm.RunError, "No such file or directory", lambda: model.save(shared_path / "none" / "a.h5")
+    )
     folder = shared_path / "folder.h5"
     if comm.rank == 0:
         folder.mkdir()

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from implicit_cases import LEFT, floor, linear_elastic_solution
 from mpi4py import MPI
 from partitions import all_by_id, bands, one_does_all, scattered, sliding_slope, spread_box
 
 import mpm_core as mpm
-from implicit_cases import LEFT, floor, linear_elastic_solution
 
 SOIL = mpm.LinearElastic(young=1e6, poisson=0.3)
 DENSITY, G = 2000.0, 9.81

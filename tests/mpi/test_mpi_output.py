@@ -4,8 +4,9 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from mpm_core import InputError, RunError
 from mpm_core.output import MeshOutput, ParticleOutput
+
+from mpm_core import InputError, RunError
 
 
 def test_shares_are_stored_by_rising_rank(comm, shared_path):
@@ -37,8 +38,12 @@ def test_compressed_values_come_back(comm, shared_path, compression):
     with h5py.File(shared_path / "small.h5") as file:
         np.testing.assert_array_equal(file["frames/0/position"][()], whole)
         if len(whole):
-            assert file["frames/0/mass"].compression == "gzip" and file["frames/0/mass"].id.get_storage_size() < 4 * len(whole)
-    assert (shared_path / "plain.xdmf").read_text().replace("plain", "small") == (shared_path / "small.xdmf").read_text()
+            assert file["frames/0/mass"].compression == "gzip" and file[
+                "frames/0/mass"
+            ].id.get_storage_size() < 4 * len(whole)
+    assert (shared_path / "plain.xdmf").read_text().replace("plain", "small") == (
+        shared_path / "small.xdmf"
+    ).read_text()
 
 
 def test_a_wrong_level_of_compression_is_named(comm, shared_path):

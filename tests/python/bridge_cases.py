@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mpm_core as mpm
 import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 MESHES = Path(__file__).resolve().parents[2] / "meshes"
 YOUNG, POISSON, UNIT_WEIGHT = 200e3, 0.33, 20e3
@@ -50,8 +50,9 @@ def interior_points(n, dim, seed=0):
 def slope_model(cell_size=0.1, dilation_angle=25.0, comm=MPI.COMM_WORLD, **options):
     """QuasiStatic of the paper's slope."""
     domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=cell_size))
-    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0,
-                          dilation_angle=dilation_angle)
+    law = mpm.MohrCoulomb(
+        young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0, dilation_angle=dilation_angle
+    )
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
     return bridge.QuasiStatic(domain, law, facet_tags, supports, **options)
 

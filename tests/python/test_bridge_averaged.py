@@ -1,12 +1,12 @@
 """Nodal mixed discretisation in finite elements."""
 
-import mpm_core as mpm
 import numpy as np
 import pytest
 from bridge_cases import MESHES, POISSON, YOUNG, column, slope_model, slope_particles
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 
 def strain_of(dim, field):

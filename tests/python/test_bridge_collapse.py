@@ -1,12 +1,12 @@
 """Collapse loads and factors of safety against limit analysis (associated flow, quadratic elements)."""
 
-import mpm_core as mpm
 import numpy as np
 import pytest
 from bridge_cases import MESHES, POISSON, YOUNG, slope_model
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 
 def weight(unit_weight):
@@ -52,8 +52,9 @@ def test_vertical_cut():
 def test_strip_footing(friction_angle, factor, tolerance):
     """Bearing capacity c Nc of weightless ground under a smooth, flexible strip (Prandtl)."""
     domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", MPI.COMM_WORLD)
-    law = mpm.MohrCoulomb(young=1e5, poisson=0.3, cohesion=1e3, friction_angle=friction_angle,
-                          dilation_angle=friction_angle)
+    law = mpm.MohrCoulomb(
+        young=1e5, poisson=0.3, cohesion=1e3, friction_angle=friction_angle, dilation_angle=friction_angle
+    )
     supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (1, 0)), bridge.fixed(2)]
     model = bridge.QuasiStatic(domain, law, facet_tags, supports)
     result = bridge.collapse_load(model, lambda q: bridge.Load(pressure={5: q}), first_step=2e3)

@@ -1,11 +1,11 @@
 """Finite elements and particles side by side; limit analysis."""
 
-import mpm_core as mpm
 import numpy as np
 import pytest
 from bridge_cases import POISSON, YOUNG, slope_model, slope_particles
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 
 @pytest.mark.parametrize("cell_size", [0.1, 0.05])

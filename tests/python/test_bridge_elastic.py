@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, interior_points)
+from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, interior_points
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -49,9 +49,14 @@ def test_prescribed_displacement_compresses_the_column_evenly():
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"young": 0.0}, "young"), ({"poisson": 0.5}, "poisson.*0.5"), ({"unit_weight": np.nan}, "unit_weight"),
-     ({"degree": 3}, "degree.*3"), ({"supports": [bridge.fixed(99)]}, "supports.*tag 99"),
-     ({"supports": [bridge.prescribed(1, (0.0, 0.0, 0.0))]}, "3 components, expected 2")],
+    [
+        ({"young": 0.0}, "young"),
+        ({"poisson": 0.5}, "poisson.*0.5"),
+        ({"unit_weight": np.nan}, "unit_weight"),
+        ({"degree": 3}, "degree.*3"),
+        ({"supports": [bridge.fixed(99)]}, "supports.*tag 99"),
+        ({"supports": [bridge.prescribed(1, (0.0, 0.0, 0.0))]}, "3 components, expected 2"),
+    ],
 )
 def test_bad_arguments_are_named(change, words):
     domain, facet_tags, supports, _ = column(2)
@@ -127,13 +132,16 @@ def test_ground_at_rest_is_the_elastic_column():
 
 @pytest.mark.parametrize(
     ("call", "words"),
-    [(lambda: bridge.k0_elastic(0.5), "poisson"), (lambda: bridge.k0_jaky(90), "friction_angle"),
-     (lambda: bridge.k0_stress(np.zeros(3), 0.0, 1.0, 0.5), "points"),
-     (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, 1.0, -1), "k0"),
-     (lambda: bridge.k0_stress(np.zeros((1, 2)), [(1, 0), (0, 0)], 1.0, 0.5), "surface"),
-     (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, np.inf, 0.5), "unit_weight"),
-     (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, [(-2, 1, 1), (-1, 1, 1)]), "from the top down"),
-     (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, []), "layers")],
+    [
+        (lambda: bridge.k0_elastic(0.5), "poisson"),
+        (lambda: bridge.k0_jaky(90), "friction_angle"),
+        (lambda: bridge.k0_stress(np.zeros(3), 0.0, 1.0, 0.5), "points"),
+        (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, 1.0, -1), "k0"),
+        (lambda: bridge.k0_stress(np.zeros((1, 2)), [(1, 0), (0, 0)], 1.0, 0.5), "surface"),
+        (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, np.inf, 0.5), "unit_weight"),
+        (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, [(-2, 1, 1), (-1, 1, 1)]), "from the top down"),
+        (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, []), "layers"),
+    ],
 )
 def test_bad_ground_is_refused(call, words):
     with pytest.raises(bridge.InputError, match=words):

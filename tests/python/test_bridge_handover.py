@@ -2,13 +2,13 @@
 
 import gc
 
-import mpm_core as mpm
 import numpy as np
 import pytest
 from bridge_cases import POISSON, YOUNG, excess_of_strength, slope_model, slope_particles
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 UNIT_WEIGHT = 18e3
 
@@ -95,9 +95,13 @@ def test_background_mesh_outlives_the_mesh_that_it_came_from():
 
 @pytest.mark.parametrize(
     ("law", "words"),
-    [(mpm.LinearElastic(young=YOUNG, poisson=POISSON), "fem.*MohrCoulomb.*LinearElastic"),
-     (mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=2e3, friction_angle=25.0),
-      "cohesion=1000.*cohesion=2000")],
+    [
+        (mpm.LinearElastic(young=YOUNG, poisson=POISSON), "fem.*MohrCoulomb.*LinearElastic"),
+        (
+            mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=2e3, friction_angle=25.0),
+            "cohesion=1000.*cohesion=2000",
+        ),
+    ],
 )
 def test_laws_that_do_not_match_are_named(law, words):
     with pytest.raises(bridge.InputError, match=words):

@@ -28,8 +28,19 @@ def test_the_papers_slope_has_640_triangles():
     assert soil_cells(bridge.slope_mesh(COMM)) == 640
 
 
-@pytest.mark.parametrize(("kind", "angle"), [("crossed", 45), ("crossed", 90), ("fitted", 30), ("fitted", 63),
-                                              ("fitted", 90), ("gmsh", 45), ("gmsh", 63), ("gmsh", 90)])
+@pytest.mark.parametrize(
+    ("kind", "angle"),
+    [
+        ("crossed", 45),
+        ("crossed", 90),
+        ("fitted", 30),
+        ("fitted", 63),
+        ("fitted", 90),
+        ("gmsh", 45),
+        ("gmsh", 63),
+        ("gmsh", 90),
+    ],
+)
 @pytest.mark.parametrize("headroom", [0.0, None])
 def test_slope_has_the_area_and_the_tags_of_its_outline(kind, angle, headroom):
     domain, cell_tags, facet_tags = bridge.slope_mesh(COMM, angle=angle, kind=kind, headroom=headroom, runout=1.5)
@@ -161,8 +172,16 @@ def test_unknown_parameters_are_refused(tmp_path):
 def test_background_arrays_are_what_the_core_takes():
     domain, cell_tags, facet_tags = bridge.slope_mesh(COMM)
     arrays = bridge.background_arrays(domain, cell_tags, facet_tags)
-    types = {"points": "float64", "cells": "int32", "cell_tags": "int32", "facets": "int32", "facet_tags": "int32",
-             "global_nodes": "int64", "global_cells": "int64", "cell_owners": "int32"}
+    types = {
+        "points": "float64",
+        "cells": "int32",
+        "cell_tags": "int32",
+        "facets": "int32",
+        "facet_tags": "int32",
+        "global_nodes": "int64",
+        "global_cells": "int64",
+        "cell_owners": "int32",
+    }
     assert {name: str(array.dtype) for name, array in arrays.items()} == types
     assert all(array.flags.c_contiguous for array in arrays.values())
     assert sorted(arrays["global_cells"]) == list(range(len(arrays["cells"])))

@@ -1,14 +1,23 @@
 """Elasto-plastic equilibrium with the laws of the particles."""
 
-import mpm_core as mpm
 import numpy as np
 import pytest
-from bridge_cases import (POISSON, UNIT_WEIGHT, YOUNG, column, column_settlement, column_stress, excess_of_strength,
-                          interior_points, slope_model)
+from bridge_cases import (
+    POISSON,
+    UNIT_WEIGHT,
+    YOUNG,
+    column,
+    column_settlement,
+    column_stress,
+    excess_of_strength,
+    interior_points,
+    slope_model,
+)
 from dolfinx import mesh
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 
 def elastic_column(dim, degree=2):
@@ -68,8 +77,11 @@ def test_compression_between_plates_ends_at_the_strength(friction_angle):
     background, cell_tags, facet_tags = bridge.slope_mesh(MPI.COMM_WORLD, angle=90, crest=0.5, cell_size=0.25)
     domain, _, facet_tags = bridge.soil_mesh(background, cell_tags, facet_tags)
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=friction_angle)
-    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.roller(bridge.BASE, (0, 1)),
-                bridge.prescribed(bridge.CREST, (None, -0.05))]
+    supports = [
+        bridge.roller(bridge.LEFT, (1, 0)),
+        bridge.roller(bridge.BASE, (0, 1)),
+        bridge.prescribed(bridge.CREST, (None, -0.05)),
+    ]
     model = bridge.QuasiStatic(domain, law, facet_tags, supports)
     model.solve(bridge.Load(displacement=1.0))
     strength = 2e3 * np.tan(np.radians(45 + friction_angle / 2))
@@ -82,15 +94,23 @@ def test_compression_between_plates_ends_at_the_strength(friction_angle):
 @pytest.mark.parametrize(("degree", "nmd"), [(2, False), (1, True)])
 def test_compression_of_a_cube_ends_at_the_strength(degree, nmd):
     domain = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2)
-    places = [lambda x: np.isclose(x[0], 0), lambda x: np.isclose(x[1], 0), lambda x: np.isclose(x[2], 0),
-              lambda x: np.isclose(x[2], 1)]
+    places = [
+        lambda x: np.isclose(x[0], 0),
+        lambda x: np.isclose(x[1], 0),
+        lambda x: np.isclose(x[2], 0),
+        lambda x: np.isclose(x[2], 1),
+    ]
     facets = [mesh.locate_entities_boundary(domain, 2, place) for place in places]
     values = np.repeat(np.arange(1, 5, dtype=np.int32), [len(f) for f in facets])
     order = np.argsort(np.concatenate(facets))
     facet_tags = mesh.meshtags(domain, 2, np.concatenate(facets)[order], values[order])
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0, dilation_angle=10.0)
-    supports = [bridge.roller(1, (1, 0, 0)), bridge.roller(2, (0, 1, 0)), bridge.roller(3, (0, 0, 1)),
-                bridge.prescribed(4, (None, None, -0.05))]
+    supports = [
+        bridge.roller(1, (1, 0, 0)),
+        bridge.roller(2, (0, 1, 0)),
+        bridge.roller(3, (0, 0, 1)),
+        bridge.prescribed(4, (None, None, -0.05)),
+    ]
     model = bridge.QuasiStatic(domain, law, facet_tags, supports, degree=degree, nmd=nmd)
     model.solve(bridge.Load(displacement=1.0))
     strength = 2e3 * np.tan(np.radians(60))
@@ -163,10 +183,12 @@ def test_progress_names_every_step(capsys):
 
 @pytest.mark.parametrize(
     ("call", "words"),
-    [(lambda m: m.set_initial_stress(np.zeros((3, 4)), bridge.Load()), r"stress.*\(3, 4\)"),
-     (lambda m: m.solve(bridge.Load(pressure={77: 1.0})), "pressure.*tag 77"),
-     (lambda m: slope_model(degree=3), "degree.*3"),
-     (lambda m: m.evaluate_at(np.array([[5.0, 5.0]])), r"\(5, 5\)")],
+    [
+        (lambda m: m.set_initial_stress(np.zeros((3, 4)), bridge.Load()), r"stress.*\(3, 4\)"),
+        (lambda m: m.solve(bridge.Load(pressure={77: 1.0})), "pressure.*tag 77"),
+        (lambda m: slope_model(degree=3), "degree.*3"),
+        (lambda m: m.evaluate_at(np.array([[5.0, 5.0]])), r"\(5, 5\)"),
+    ],
 )
 def test_bad_arguments_are_named(call, words):
     with pytest.raises(bridge.InputError, match=words):

@@ -110,9 +110,10 @@ def small_disk(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = shutil.which("mount")
-    if mount is None or subprocess.run(
-        [mount, "-t", "tmpfs", "-o", "size=600k", "tmpfs", disk], capture_output=True
-    ).returncode:
+    if (
+        mount is None
+        or subprocess.run([mount, "-t", "tmpfs", "-o", "size=600k", "tmpfs", disk], capture_output=True).returncode
+    ):
         pytest.skip("needs the right to mount a file system")
     yield disk
     subprocess.run(["umount", disk], check=True)

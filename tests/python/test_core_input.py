@@ -23,23 +23,27 @@ def points_with(node, coordinates):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"points": points_with(3, (np.nan, 1))}, "points is nan at index"),
-     ({"points": points_with(3, (0.2, 0.2))}, "cells.*overlap.*inverted"),
-     ({"points": points_with(3, (0.5, 0.5))}, "cells: cell 1 .*area 0"),
-     ({"points": np.zeros((4, 4))}, r"points has shape \(4, 4\)"),
-     ({"points": np.zeros(4)}, r"points has shape \(4,\)"),
-     ({"points": np.full((4, 2), "a")}, "points has dtype"),
-     ({"cells": np.array([[0, 1, 3, 2]])}, "cells has 4 nodes per cell, expected triangles"),
-     ({"cells": np.array([[0.0, 1.0, 2.0]])}, "cells has dtype float64"),
-     ({"cells": np.array([0, 1, 2])}, r"cells has shape \(3,\)"), ({"cells": np.array([[0, 1, 4]])}, "cells: node 4"),
-     ({"cells": np.array([[0, 1, -1]])}, "cells: node -1"),
-     ({"cells": np.array([[0, 1, 2], [1, 2, 0]])}, "cells.*overlap"),
-     ({"facets": np.array([[0, 3]])}, "facets.*not a facet"),
-     ({"facets": np.array([[0, 9]])}, "facets: node 9"),
-     ({"facets": np.array([[0, 1, 2]])}, r"facets has shape \(1, 3\)"),
-     ({"facet_tags": np.array([5, 6])}, "facet_tags has"), ({"facet_tags": np.array([0.5])}, "facet_tags has dtype"),
-     ({"cell_tags": np.array([1])}, "cell_tags has 1 entries, expected 2"),
-     ({"cell_owners": np.array([1, 0])}, "cell_owners: owned cell 1 comes after a ghost")],
+    [
+        ({"points": points_with(3, (np.nan, 1))}, "points is nan at index"),
+        ({"points": points_with(3, (0.2, 0.2))}, "cells.*overlap.*inverted"),
+        ({"points": points_with(3, (0.5, 0.5))}, "cells: cell 1 .*area 0"),
+        ({"points": np.zeros((4, 4))}, r"points has shape \(4, 4\)"),
+        ({"points": np.zeros(4)}, r"points has shape \(4,\)"),
+        ({"points": np.full((4, 2), "a")}, "points has dtype"),
+        ({"cells": np.array([[0, 1, 3, 2]])}, "cells has 4 nodes per cell, expected triangles"),
+        ({"cells": np.array([[0.0, 1.0, 2.0]])}, "cells has dtype float64"),
+        ({"cells": np.array([0, 1, 2])}, r"cells has shape \(3,\)"),
+        ({"cells": np.array([[0, 1, 4]])}, "cells: node 4"),
+        ({"cells": np.array([[0, 1, -1]])}, "cells: node -1"),
+        ({"cells": np.array([[0, 1, 2], [1, 2, 0]])}, "cells.*overlap"),
+        ({"facets": np.array([[0, 3]])}, "facets.*not a facet"),
+        ({"facets": np.array([[0, 9]])}, "facets: node 9"),
+        ({"facets": np.array([[0, 1, 2]])}, r"facets has shape \(1, 3\)"),
+        ({"facet_tags": np.array([5, 6])}, "facet_tags has"),
+        ({"facet_tags": np.array([0.5])}, "facet_tags has dtype"),
+        ({"cell_tags": np.array([1])}, "cell_tags has 1 entries, expected 2"),
+        ({"cell_owners": np.array([1, 0])}, "cell_owners: owned cell 1 comes after a ghost"),
+    ],
 )
 def test_bad_meshes(change, words):
     mpm.Mesh(**GOOD_MESH)
@@ -49,9 +53,11 @@ def test_bad_meshes(change, words):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"points": TETRAHEDRON["points"] * [1, 1, 0]}, "cells: cell 0 .*volume 0"),
-     ({"cells": np.array([[0, 1, 2]])}, "cells has 3 nodes per cell, expected tetrahedra"),
-     ({"points": np.where(TETRAHEDRON["points"] > 0, np.inf, 0.0)}, "points is inf")],
+    [
+        ({"points": TETRAHEDRON["points"] * [1, 1, 0]}, "cells: cell 0 .*volume 0"),
+        ({"cells": np.array([[0, 1, 2]])}, "cells has 3 nodes per cell, expected tetrahedra"),
+        ({"points": np.where(TETRAHEDRON["points"] > 0, np.inf, 0.0)}, "points is inf"),
+    ],
 )
 def test_bad_meshes_in_three_dimensions(change, words):
     mpm.Mesh(**TETRAHEDRON)
@@ -67,11 +73,19 @@ def test_quadrilaterals_among_triangles_cannot_hide_as_tetrahedra():
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"young": 0.0}, "young = 0"), ({"young": -1e6}, "young = -1"), ({"young": np.nan}, "young = nan"),
-     ({"poisson": 0.5}, "poisson = 0.5"), ({"poisson": -1.0}, "poisson = -1"), ({"cohesion": -1.0}, "cohesion = -1"),
-     ({"friction_angle": 90.0}, "friction_angle = 90"), ({"friction_angle": -1.0}, "friction_angle = -1"),
-     ({"dilation_angle": 26.0}, "dilation_angle = 26"), ({"dilation_angle": -1.0}, "dilation_angle = -1"),
-     ({"tension_cutoff": -1.0}, "tension_cutoff = -1")],
+    [
+        ({"young": 0.0}, "young = 0"),
+        ({"young": -1e6}, "young = -1"),
+        ({"young": np.nan}, "young = nan"),
+        ({"poisson": 0.5}, "poisson = 0.5"),
+        ({"poisson": -1.0}, "poisson = -1"),
+        ({"cohesion": -1.0}, "cohesion = -1"),
+        ({"friction_angle": 90.0}, "friction_angle = 90"),
+        ({"friction_angle": -1.0}, "friction_angle = -1"),
+        ({"dilation_angle": 26.0}, "dilation_angle = 26"),
+        ({"dilation_angle": -1.0}, "dilation_angle = -1"),
+        ({"tension_cutoff": -1.0}, "tension_cutoff = -1"),
+    ],
 )
 def test_bad_parameters_of_laws(change, words):
     good = {"young": 1e6, "poisson": 0.3, "cohesion": 1e3, "friction_angle": 25.0, "dilation_angle": 5.0}
@@ -98,16 +112,19 @@ def model():
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"density": 0.0}, "density is 0.0"),
-     ({"density": -1.0}, "density is -1.0"),
-     ({"density": np.nan}, "density is nan"),
-     ({"per_cell": 0}, "per_cell is 0"),
-     ({"per_cell": 2.5}, "per_cell is 2.5"),
-     ({"per_cell": True}, "per_cell is True"),
-     ({"per_cell": np.nan}, "per_cell is nan"), ({"per_cell": "ten"}, "per_cell is ten"),
-     ({"cell_tag": 7}, r"cell_tag is 7.*it has \[1\]"),
-     ({"material": 1}, "material is 1"),
-     ({"material": -1}, "material is -1")],
+    [
+        ({"density": 0.0}, "density is 0.0"),
+        ({"density": -1.0}, "density is -1.0"),
+        ({"density": np.nan}, "density is nan"),
+        ({"per_cell": 0}, "per_cell is 0"),
+        ({"per_cell": 2.5}, "per_cell is 2.5"),
+        ({"per_cell": True}, "per_cell is True"),
+        ({"per_cell": np.nan}, "per_cell is nan"),
+        ({"per_cell": "ten"}, "per_cell is ten"),
+        ({"cell_tag": 7}, r"cell_tag is 7.*it has \[1\]"),
+        ({"material": 1}, "material is 1"),
+        ({"material": -1}, "material is -1"),
+    ],
 )
 def test_bad_seeding(model, change, words):
     with pytest.raises(mpm.InputError, match=words):
@@ -117,15 +134,20 @@ def test_bad_seeding(model, change, words):
 
 @pytest.mark.parametrize(
     ("call", "words"),
-    [(lambda m: m.fix(9), r"facet_tag is 9.*it has \[1, 2, 3, 4\]"), (lambda m: m.roller(9, (1, 0)), "facet_tag is 9"),
-     (lambda m: m.prescribe(9, (1, 0)), "facet_tag is 9"), (lambda m: m.outflow(9), "facet_tag is 9"),
-     (lambda m: m.roller(1, (0, 0)), "normal .*no length"),
-     (lambda m: m.roller(1, (1, 0, 0)), r"normal has shape \(3,\)"),
-     (lambda m: m.roller(1, (np.nan, 0)), "normal is nan"), (lambda m: m.prescribe(1, 2.0), r"velocity has shape \(\)"),
-     (lambda m: m.prescribe(1, (0, np.inf)), "velocity is inf"),
-     (lambda m: m.set_gravity((0, 0, -9.81)), "gravity has shape"),
-     (lambda m: m.set_gravity((0, np.nan)), "gravity is nan"),
-     (lambda m: m.set_gravity((0, -1), ramp=-1.0), "ramp is -1.0")],
+    [
+        (lambda m: m.fix(9), r"facet_tag is 9.*it has \[1, 2, 3, 4\]"),
+        (lambda m: m.roller(9, (1, 0)), "facet_tag is 9"),
+        (lambda m: m.prescribe(9, (1, 0)), "facet_tag is 9"),
+        (lambda m: m.outflow(9), "facet_tag is 9"),
+        (lambda m: m.roller(1, (0, 0)), "normal .*no length"),
+        (lambda m: m.roller(1, (1, 0, 0)), r"normal has shape \(3,\)"),
+        (lambda m: m.roller(1, (np.nan, 0)), "normal is nan"),
+        (lambda m: m.prescribe(1, 2.0), r"velocity has shape \(\)"),
+        (lambda m: m.prescribe(1, (0, np.inf)), "velocity is inf"),
+        (lambda m: m.set_gravity((0, 0, -9.81)), "gravity has shape"),
+        (lambda m: m.set_gravity((0, np.nan)), "gravity is nan"),
+        (lambda m: m.set_gravity((0, -1), ramp=-1.0), "ramp is -1.0"),
+    ],
 )
 def test_bad_supports_and_loads(model, call, words):
     with pytest.raises(mpm.InputError, match=words):
@@ -136,14 +158,25 @@ def test_bad_supports_and_loads(model, call, words):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"dt": 0.0}, "dt is 0.0"), ({"dt": -1.0}, "dt is -1.0"), ({"dt": np.nan}, "dt is nan"),
-     ({"dt": 1.0}, "dt is 1 s, above the critical time step"), ({"courant": 0.0}, "courant is 0"),
-     ({"courant": 1.5}, "courant is 1.5"),
-     ({"courant": np.nan}, "courant is nan"),
-     ({"damping": -0.1}, "damping is -0.1"),
-     ({"damping": 1.0}, "damping is 1.0"), ({"damping": np.nan}, "damping is nan"), ({"pic": -0.1}, "pic is -0.1"),
-     ({"pic": 1.1}, "pic is 1.1"), ({"every": 0.0}, "every is 0.0"), ({"every": -1.0}, "every is -1.0"),
-     ({"until": -1.0}, "until is -1.0"), ({"until": np.inf}, "until is inf"), ({"until": np.nan}, "until is nan")],
+    [
+        ({"dt": 0.0}, "dt is 0.0"),
+        ({"dt": -1.0}, "dt is -1.0"),
+        ({"dt": np.nan}, "dt is nan"),
+        ({"dt": 1.0}, "dt is 1 s, above the critical time step"),
+        ({"courant": 0.0}, "courant is 0"),
+        ({"courant": 1.5}, "courant is 1.5"),
+        ({"courant": np.nan}, "courant is nan"),
+        ({"damping": -0.1}, "damping is -0.1"),
+        ({"damping": 1.0}, "damping is 1.0"),
+        ({"damping": np.nan}, "damping is nan"),
+        ({"pic": -0.1}, "pic is -0.1"),
+        ({"pic": 1.1}, "pic is 1.1"),
+        ({"every": 0.0}, "every is 0.0"),
+        ({"every": -1.0}, "every is -1.0"),
+        ({"until": -1.0}, "until is -1.0"),
+        ({"until": np.inf}, "until is inf"),
+        ({"until": np.nan}, "until is nan"),
+    ],
 )
 def test_bad_run_options(model, change, words):
     with pytest.raises(mpm.InputError, match=words):
@@ -158,12 +191,16 @@ def test_a_model_without_particles_does_not_run():
 
 @pytest.mark.parametrize(
     ("name", "values", "words"),
-    [("position", np.zeros((24, 2)), "'position', which cannot be set"), ("colour", np.zeros(24), "'colour'"),
-     ("stress", np.zeros((24, 3)), r"stress has shape \(24, 3\), expected \(24, 4\)"),
-     ("stress", np.zeros((23, 4)), r"stress has shape \(23, 4\)"),
-     ("velocity", np.zeros(24), r"velocity has shape \(24,\)"),
-     ("velocity", np.zeros((24, 2), dtype=complex), "velocity has dtype complex128"),
-     ("volume", np.full(24, "1"), "volume has dtype"), ("mass", [np.inf] * 24, "mass is inf at index")],
+    [
+        ("position", np.zeros((24, 2)), "'position', which cannot be set"),
+        ("colour", np.zeros(24), "'colour'"),
+        ("stress", np.zeros((24, 3)), r"stress has shape \(24, 3\), expected \(24, 4\)"),
+        ("stress", np.zeros((23, 4)), r"stress has shape \(23, 4\)"),
+        ("velocity", np.zeros(24), r"velocity has shape \(24,\)"),
+        ("velocity", np.zeros((24, 2), dtype=complex), "velocity has dtype complex128"),
+        ("volume", np.full(24, "1"), "volume has dtype"),
+        ("mass", [np.inf] * 24, "mass is inf at index"),
+    ],
 )
 def test_bad_particle_fields(model, name, values, words):
     with pytest.raises(mpm.InputError, match=words):

@@ -81,10 +81,16 @@ def test_mass_and_volume_stay_positive(name, value):
 
 
 @pytest.mark.parametrize("dim", DIMS)
-@pytest.mark.parametrize("scheme", [{}, {"nmd": True}, {"stress_update": mpm.StressUpdate.LAST},
-                                    {"stress_update": mpm.StressUpdate.FIRST}], ids=["MUSL", "NMD", "USL", "USF"])
-@pytest.mark.parametrize("law", [HARD, mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0)],
-                         ids=["elastic", "Mohr-Coulomb"])
+@pytest.mark.parametrize(
+    "scheme",
+    [{}, {"nmd": True}, {"stress_update": mpm.StressUpdate.LAST}, {"stress_update": mpm.StressUpdate.FIRST}],
+    ids=["MUSL", "NMD", "USL", "USF"],
+)
+@pytest.mark.parametrize(
+    "law",
+    [HARD, mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0)],
+    ids=["elastic", "Mohr-Coulomb"],
+)
 def test_a_run_that_blows_up_says_so(dim, scheme, law):
     model = mpm.Model(box([4] * dim), law)
     model.seed(density=2000.0, per_cell=4)

@@ -19,7 +19,8 @@ def falling_body(dim):
 
 @pytest.mark.parametrize("dim", DIMS)
 @pytest.mark.parametrize(
-    "scheme", [{}, {"nmd": True}, {"pic": 0.2}, {"stress_update": mpm.StressUpdate.FIRST}],
+    "scheme",
+    [{}, {"nmd": True}, {"pic": 0.2}, {"stress_update": mpm.StressUpdate.FIRST}],
     ids=["MUSL", "NMD", "PIC share", "USF"],
 )
 def test_free_fall_is_exact(dim, scheme):

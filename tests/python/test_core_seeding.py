@@ -40,8 +40,18 @@ def test_particles_fill_each_cell_evenly(dim, count):
     assert particles.traction.shape == (0, dim)
 
 
-@pytest.mark.parametrize(("dim", "count", "near"), [(2, 2, "1, 3"), (2, 11, "10, 12"), (2, 0, "1, 3"), (2, -3, "1, 3"),
-                                                     (3, 3, "1, 4"), (3, 9, "8, 10"), (3, 0, "1, 4")])
+@pytest.mark.parametrize(
+    ("dim", "count", "near"),
+    [
+        (2, 2, "1, 3"),
+        (2, 11, "10, 12"),
+        (2, 0, "1, 3"),
+        (2, -3, "1, 3"),
+        (3, 3, "1, 4"),
+        (3, 9, "8, 10"),
+        (3, 0, "1, 4"),
+    ],
+)
 def test_other_counts_are_refused_and_near_ones_named(dim, count, near):
     model = mpm.Model(box([1] * dim), LAW)
     with pytest.raises(mpm.InputError, match=f"per_cell is {count}, .*{near}"):
@@ -79,12 +89,17 @@ def test_particles_at_points(dim):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"points": [[0.5, 0.5], [1.5, 0.5]]}, r"points has \[1.5 0.5\] at row 1.*outside"),
-     ({"points": [[0.5, 0.5, 0.5]] * 2}, r"points has shape \(2, 3\)"),
-     ({"points": [[0.5, np.nan], [0.5, 0.5]]}, "points is nan"), ({"points": [["a", "b"]] * 2}, "points has dtype"),
-     ({"volumes": [1.0]}, r"volumes has shape \(1,\)"), ({"volumes": [1.0, 0.0]}, "volumes is 0.0"),
-     ({"volumes": [1.0, np.inf]}, "volumes is inf"), ({"density": -1.0}, "density is -1.0"),
-     ({"material": 1}, "material is 1, expected 0 to 0")],
+    [
+        ({"points": [[0.5, 0.5], [1.5, 0.5]]}, r"points has \[1.5 0.5\] at row 1.*outside"),
+        ({"points": [[0.5, 0.5, 0.5]] * 2}, r"points has shape \(2, 3\)"),
+        ({"points": [[0.5, np.nan], [0.5, 0.5]]}, "points is nan"),
+        ({"points": [["a", "b"]] * 2}, "points has dtype"),
+        ({"volumes": [1.0]}, r"volumes has shape \(1,\)"),
+        ({"volumes": [1.0, 0.0]}, "volumes is 0.0"),
+        ({"volumes": [1.0, np.inf]}, "volumes is inf"),
+        ({"density": -1.0}, "density is -1.0"),
+        ({"material": 1}, "material is 1, expected 0 to 0"),
+    ],
 )
 def test_bad_points_are_refused(change, words):
     model = mpm.Model(box([1, 1]), LAW)

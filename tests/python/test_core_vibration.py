@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import DIMS, box, moduli, one_cell, rollers, run
+from core_cases import DIMS, box, moduli, one_cell, rollers
 
 import mpm_core as mpm
 

@@ -47,7 +47,9 @@ def help_of():
 
     def text(study):
         if study not in known:
-            script = next(p for p in (ROOT / f"studies/{study}.py", ROOT / f"studies/{study}/__main__.py") if p.exists())
+            script = next(
+                p for p in (ROOT / f"studies/{study}.py", ROOT / f"studies/{study}/__main__.py") if p.exists()
+            )
             command = [sys.executable, script, "--help"]
             known[study] = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
         return known[study]

@@ -61,8 +61,9 @@ def test_only_io_includes_hdf5():
 def test_the_compiled_module_is_imported():
     # The folder mpm_core/ of the repository has no __init__.py: without an installed package it would be imported,
     # in silence, as an empty one.
-    import mpm_core
     import mpm_core._core as core
+
+    import mpm_core
 
     assert mpm_core.__file__ is not None
     assert Path(core.__file__).suffix == ".so"

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from core_cases import box
 from implicit_cases import SLOPE_SOIL, slope, tangent
+from mpm_core.implicit import Stepper
 
 import mpm_core as mpm
 from mpm_core import _core, linear
-from mpm_core.implicit import Stepper
 
 
 def krylov_iterations(h, law, nmd):
@@ -41,7 +41,9 @@ def condition(shift, ghost):
     soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1.0, friction_angle=30.0)
     model = mpm.Model(box([n, n]), soil)
     axis = (np.arange(3 * per_side) + 0.5) / per_side * h
-    points = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2) + (2 + np.array([shift, 0.37 * shift])) * h
+    points = (
+        np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2) + (2 + np.array([shift, 0.37 * shift])) * h
+    )
     model.seed_points(points, np.full(len(points), (h / per_side) ** 2), density=2000.0)
     cell = model.particles.cell
     filled = np.bincount(cell, model.particles.volume, minlength=len(model.mesh.cells)) / model.mesh.cell_volumes

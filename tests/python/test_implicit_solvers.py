@@ -3,12 +3,17 @@
 import numpy as np
 import pytest
 from implicit_cases import slope
+from mpm_core.implicit import Stepper
 
 import mpm_core as mpm
 from mpm_core import _core
-from mpm_core.implicit import Stepper
 
-KINDS = [mpm.RelaxationKind.RICHARDSON, mpm.RelaxationKind.LOCAL, mpm.RelaxationKind.KINETIC, mpm.RelaxationKind.VISCOUS]
+KINDS = [
+    mpm.RelaxationKind.RICHARDSON,
+    mpm.RelaxationKind.LOCAL,
+    mpm.RelaxationKind.KINETIC,
+    mpm.RelaxationKind.VISCOUS,
+]
 
 
 DT = 0.1
@@ -44,4 +49,3 @@ def test_newtons_method_converges_quadratically(nmd, quasi_static):
     r = np.array([x for x in solution.residuals if x > 1e-12])
     # In the last iterations above round-off the number of right digits doubles, but for a factor.
     assert r[-1] < 20 * r[-2] ** 2 or r[-2] < 20 * r[-3] ** 2, solution.residuals
-

@@ -8,7 +8,6 @@ from implicit_cases import crest_displacement, slope
 import mpm_core as mpm
 from mpm_core import RunError
 
-
 H, WAVE_SPEED = 1.0, np.sqrt(1e6 / 1000.0)
 
 
@@ -75,7 +74,9 @@ def test_damped_slope_comes_to_rest_where_the_explicit_one_does(solver):
 def test_a_step_that_fails_is_cut_and_leaves_the_particles_as_they_were():
     """No quasi-static slope carries 3.5 times its collapse load."""
     model = slope(0.2)
-    before = {name: getattr(model.particles, name) for name in ("id", "position", "velocity", "stress", "volume", "state")}
+    before = {
+        name: getattr(model.particles, name) for name in ("id", "position", "velocity", "stress", "volume", "state")
+    }
     with pytest.raises(RunError, match="failed with all lengths from 1 s down to 0.000977 s"):
         list(model.implicit(1.0, dt=1.0, quasi_static=True, solver=mpm.Newton(max_iterations=8)))
     assert model.time == 0

@@ -78,7 +78,9 @@ def test_dilation_is_the_slope_of_the_plastic_volume():
     triaxial(test, -0.02, 20)
     before, plastic = test.strain[:3].sum(), test.state[0]
     test.step([-1e-3, None, None, 0.0, 0.0, 0.0])
-    assert test.strain[:3].sum() - before == pytest.approx(law.dilation * np.sqrt(3) * (test.state[0] - plastic), rel=1e-9)
+    assert test.strain[:3].sum() - before == pytest.approx(
+        law.dilation * np.sqrt(3) * (test.state[0] - plastic), rel=1e-9
+    )
 
 
 def test_simple_shear_of_von_mises_ends_at_its_shear_strength():

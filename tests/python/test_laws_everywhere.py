@@ -99,7 +99,9 @@ def test_layers_and_random_fields():
     model.set_gravity((0.0, -10.0))
     run(model, 0.01)
     order, before = np.argsort(model.particles.id), np.argsort(ids)
-    assert (model.state("cohesion_deviation")[order] == np.where(y < 0.5, field, np.nan)[before])[(y < 0.5)[before]].all()
+    assert (model.state("cohesion_deviation")[order] == np.where(y < 0.5, field, np.nan)[before])[
+        (y < 0.5)[before]
+    ].all()
 
 
 def test_bad_layers_and_fields_are_named():

@@ -10,8 +10,9 @@ import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
-from mpm_core import InputError, RunError
 from mpm_core.output import MeshOutput, ParticleOutput
+
+from mpm_core import InputError, RunError
 
 COMM = MPI.COMM_WORLD
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)

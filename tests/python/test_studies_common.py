@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+
 from studies.common import animation, plots
 from studies.common.history import History
 from studies.common.interrupt import Interrupt
@@ -49,7 +50,10 @@ BAD_OPTIONS = [
     (["--height", "0"], "argument --height: is '0', expected a number above 0 m"),
     (["--height", "tall"], "argument --height: is 'tall', expected a number above 0 m"),
     (["--height", "nan"], "argument --height: is 'nan', expected a number above 0 m"),
-    (["--friction-angle", "90"], "argument --friction-angle: is '90', expected a number at least 0 and below 90 degrees"),
+    (
+        ["--friction-angle", "90"],
+        "argument --friction-angle: is '90', expected a number at least 0 and below 90 degrees",
+    ),
     (["--ppc", "2"], "argument --ppc: is '2', expected one of 1, 3, 10"),
     (["--steps", "0"], "argument --steps: is '0', expected a whole number from 1 on"),
     (["--steps", "1.5"], "argument --steps: is '1.5', expected a whole number from 1 on"),
@@ -159,9 +163,10 @@ def test_boundary_edges_belong_to_one_triangle():
 def test_colour_limits_hold_over_time_and_are_round():
     frames = [np.linspace(-13e3, 0.0, 1000), np.linspace(-79.3e3, 1.0, 1000), np.zeros(0)]
     assert plots.colour_limits(plots.VERTICAL_STRESS, frames) == (-80.0, 0.0)
-    assert plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[0] < plots.colour_limits(
-        plots.DISPLACEMENT, [np.zeros(5)]
-    )[1]
+    assert (
+        plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[0]
+        < plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[1]
+    )
 
 
 def has_colour(path):

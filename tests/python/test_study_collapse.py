@@ -57,7 +57,9 @@ def test_factor_of_safety(tmp_path):
 @pytest.mark.parametrize(("friction_angle", "tolerance"), [(0, 0.02), (20, 0.05)])
 def test_bearing_capacity(tmp_path, friction_angle, tolerance):
     """Prandtl: 2 + pi; 14.83 for 20 degrees."""
-    summary = summary_of("footing", tmp_path, "--friction-angle", str(friction_angle), "--cell-size", "0.1", "--meshes", "2")
+    summary = summary_of(
+        "footing", tmp_path, "--friction-angle", str(friction_angle), "--cell-size", "0.1", "--meshes", "2"
+    )
     expected = {0: 2 + np.pi, 20: 14.83}[friction_angle]
     assert summary["prandtl_bearing_capacity_factor_Nc"] == pytest.approx(expected, rel=1e-3)
     assert expected < summary["bearing_capacity_factor_Nc"] < (1 + tolerance) * expected
@@ -71,7 +73,11 @@ def test_bearing_capacity(tmp_path, friction_angle, tolerance):
         ("collapse", ["--angle", "91"], ["--angle", "91", "at most 90"]),
         ("collapse", ["--cohesion", "0"], ["--cohesion", "0"]),
         ("collapse", ["--cell-size", "3"], ["--cell-size", "3", "--height"]),
-        ("safety", ["--unit-weight", "200e3", "--start", "1", "--cell-size", "0.2", "--meshes", "1"], ["start", "not carried"]),
+        (
+            "safety",
+            ["--unit-weight", "200e3", "--start", "1", "--cell-size", "0.2", "--meshes", "1"],
+            ["start", "not carried"],
+        ),
         ("footing", ["--dilation-angle", "10"], ["--dilation-angle", "10", "--friction-angle"]),
     ],
 )

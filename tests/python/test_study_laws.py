@@ -49,7 +49,9 @@ def test_a_law_of_ones_own(tmp_path):
         "            for k in range(stress.shape[1]):\n"
         "                tangent[:, k, k] = 1e6\n"
     )
-    result = study("element_test", tmp_path / "out", "--python-law", f"{tmp_path / 'mine.py'}:Spring", "--pressure", "0")
+    result = study(
+        "element_test", tmp_path / "out", "--python-law", f"{tmp_path / 'mine.py'}:Spring", "--pressure", "0"
+    )
     assert result.returncode == 0, result.stderr
     assert summary(tmp_path / "out")["q_Pa"] == pytest.approx(1e6 * 0.2)
 
@@ -68,8 +70,15 @@ def test_bad_options_are_named(tmp_path, options, named):
 
 # Without friction, or undrained from no stress at all, the slope would not carry 20 kN/m3: elastic stresses are its start
 @pytest.mark.parametrize(
-    "options", [["softening"], ["cam-clay"], ["drucker-prager"], ["tresca", "--nmd", "--initial", "elastic"],
-                ["mohr-coulomb", "--undrained", "--nmd", "--initial", "elastic"]], ids=str
+    "options",
+    [
+        ["softening"],
+        ["cam-clay"],
+        ["drucker-prager"],
+        ["tresca", "--nmd", "--initial", "elastic"],
+        ["mohr-coulomb", "--undrained", "--nmd", "--initial", "elastic"],
+    ],
+    ids=str,
 )
 def test_slope_of_any_soil(tmp_path, options):
     small = ["--cell-size", "0.25", "--crest", "1", "--frames", "2", "--time", "0.1"]
@@ -81,7 +90,20 @@ def test_slope_of_any_soil(tmp_path, options):
 
 
 def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
-    small = ["--cell-size", "1", "--crest", "8", "--runout-length", "6", "--height", "4", "--angle", "45", "--mesh", "crossed"]
+    small = [
+        "--cell-size",
+        "1",
+        "--crest",
+        "8",
+        "--runout-length",
+        "6",
+        "--height",
+        "4",
+        "--angle",
+        "45",
+        "--mesh",
+        "crossed",
+    ]
     soil = ["--unit-weight", "24e3", "--cohesion", "24e3", "--reference-length", "1", "--disturbed", "2"]
     result = study("retrogression", tmp_path, *small, *soil, "--time", "3", "--frames", "3", "--meshes", "two")
     assert result.returncode == 0, result.stderr

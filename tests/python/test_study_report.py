@@ -59,7 +59,13 @@ def page(tmp_path_factory):
 @pytest.fixture(scope="module")
 def browser(page):
     options = webdriver.ChromeOptions()
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=1300,1000"):
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--window-size=1300,1000",
+    ):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=webdriver.chrome.service.Service(shutil.which("chromedriver")))
@@ -117,7 +123,9 @@ def test_the_slider_moves_the_particles(browser):
     for frame in (0, 10):
         move_slider(browser, frame)
         seen.append(browser.execute_script("return page.player.views[0].screenOf(1500)"))
-        assert browser.execute_script("return document.getElementById('clock').textContent") == f"t = {TIMES[frame]:.1f} s"
+        assert (
+            browser.execute_script("return document.getElementById('clock').textContent") == f"t = {TIMES[frame]:.1f} s"
+        )
     scale = browser.execute_script("return page.player.views[0].s")
     y = 1500 // SIDE + 0.5
     assert seen[1][0] - seen[0][0] == pytest.approx(scale * y / SIDE, rel=1e-3)

@@ -13,7 +13,20 @@ import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[2] / "studies"
-SMALL = ["--initial", "zero", "--cell-size", "0.2", "--crest", "1.2", "--particles-per-cell", "3", "--frames", "6", "--time", "0.6"]
+SMALL = [
+    "--initial",
+    "zero",
+    "--cell-size",
+    "0.2",
+    "--crest",
+    "1.2",
+    "--particles-per-cell",
+    "3",
+    "--frames",
+    "6",
+    "--time",
+    "0.6",
+]
 
 
 def slope(folder, *options, ranks=1):

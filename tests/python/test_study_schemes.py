@@ -45,7 +45,8 @@ def test_both_schemes_side_by_side(tmp_path):
         "displacement.png", "shear_strain.png", "vertical_stress.png", "crest.png"
     }  # fmt: skip
     newton, relaxation = (
-        next(row for name, row in summary["runs"].items() if f"{solver}, 20 " in name + " ") for solver in ("Newton", "relaxation")
+        next(row for name, row in summary["runs"].items() if f"{solver}, 20 " in name + " ")
+        for solver in ("Newton", "relaxation")
     )
     # One residual and, as neither solver had to cut a step, the same steps: the solver does not change where the slope goes.
     assert relaxation["steps"] == newton["steps"]

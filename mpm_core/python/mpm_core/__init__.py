@@ -23,8 +23,8 @@ from ._core import (
 )
 from ._core import compiler as compiler
 from ._core import version as __version__
-from .ghost import GhostPenalty
 from .element import ElementTest
+from .ghost import GhostPenalty
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model

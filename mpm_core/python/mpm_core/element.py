@@ -82,5 +82,7 @@ class ElementTest:
         stress, state, tangent = self.stress[None].copy(), self.state[None].copy(), np.zeros((1, size, size))
         report = self.law.update(np.ascontiguousarray(increment[None]), stress, state, tangent)
         if report.failed:
-            raise RunError(f"{type(self.law).__name__} failed at the stress {self.stress} Pa, strain increment {increment}")
+            raise RunError(
+                f"{type(self.law).__name__} failed at the stress {self.stress} Pa, strain increment {increment}"
+            )
         return stress[0], state[0], tangent[0]

@@ -22,7 +22,9 @@ from .report import ImplicitReport, Report
 
 def _positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
     if not (np.isfinite(value) and (value >= 0 if zero else value > 0)):
-        raise InputError(f"{name} is {value} {unit}, expected a {'number not below zero' if zero else 'positive number'}")
+        raise InputError(
+            f"{name} is {value} {unit}, expected a {'number not below zero' if zero else 'positive number'}"
+        )
     return float(value)
 
 
@@ -196,7 +198,9 @@ class Model:
         """
         numbers = np.asarray(material)
         if numbers.shape != (len(self.particles),) or not np.issubdtype(numbers.dtype, np.integer):
-            raise InputError(f"material has shape {numbers.shape} and dtype {numbers.dtype}, expected one whole number each")
+            raise InputError(
+                f"material has shape {numbers.shape} and dtype {numbers.dtype}, expected one whole number each"
+            )
         for number in np.unique(numbers):
             self._material(int(number))
         self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))

@@ -110,7 +110,9 @@ class MeshOutput:
     ) -> None:
         self._comm = comm
         points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
-        self._series = _core.MeshSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells)
+        self._series = _core.MeshSeries(
+            MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells
+        )
 
     def write(
         self,
@@ -129,7 +131,9 @@ class MeshOutput:
             InputError: a field is of another length or not numeric.
             RunError: the frame cannot be written.
         """
-        nodes, cells = collectively(self._comm, lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {})))
+        nodes, cells = collectively(
+            self._comm, lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {}))
+        )
         self._series.write(float(time), nodes, cells)
 
     def close(self) -> None:
@@ -196,5 +200,7 @@ def _checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np
             f"cells has shape {cells.shape} and dtype {cells.dtype}, expected (m, {points.shape[1] + 1}) whole numbers"
         )
     if cells.size and not 0 <= cells.min() <= cells.max() < len(points):
-        raise InputError(f"cells has node {max(cells.max(), -cells.min())}, expected numbers from 0 to {len(points) - 1}")
+        raise InputError(
+            f"cells has node {max(cells.max(), -cells.min())}, expected numbers from 0 to {len(points) - 1}"
+        )
     return np.ascontiguousarray(points, np.float64), np.ascontiguousarray(cells, np.int64)
