@@ -14,7 +14,6 @@ import numpy as np
 from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from common.options import add_switch, check, study_parser
 from common.ranks import run_study
-
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -23,7 +22,7 @@ from common.slope_fem import (
     slope_fem,
     step_line,
     weight,
-)  # fmt: skip
+)
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
 

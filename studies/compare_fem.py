@@ -17,7 +17,6 @@ from common.field_plots import save_log_log, save_side_by_side
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
 from common.plots import Quantity
 from common.ranks import run_study
-
 from common.slope_case import (
     GRAVITY,
     SUPPORTS,
@@ -28,7 +27,7 @@ from common.slope_case import (
     build_slope,
     check_slope_options,
     soil_of,
-)  # fmt: skip
+)
 from common.slope_fem import mesh_sizes, step_line, weight
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI

@@ -15,7 +15,6 @@ from time import process_time
 import matplotlib.pyplot as plt
 import numpy as np
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
-
 from common.plots import (
     CURVES,
     DISPLACEMENT,
@@ -29,7 +28,7 @@ from common.plots import (
     draw_bar,
     draw_scene,
     paper_style,
-)  # fmt: skip
+)
 from common.progress import Progress
 from common.ranks import run_study
 from common.schemes import run_scheme

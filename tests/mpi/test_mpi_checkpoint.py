@@ -117,7 +117,9 @@ def test_a_checkpoint_of_something_else_is_refused(comm, checkpoint):
     for mesh in (spread_box((24, 6), (2.4, 0.6), comm, body=((0.1, 0), (0.6, 0.4))),
                  spread_box((24, 6), (2.4, 0.6), comm, diagonals="alternating", body=((0.1, 0), (0.6, 0.3)))):  # fmt: skip
         other = mpm.Model(mesh, sliding_slope(comm).laws)
-        raised_everywhere(comm, mpm.InputError, "is of another background mesh", lambda: other.restore(checkpoint))
+        raised_everywhere(
+            comm, mpm.InputError, "is of another background mesh", lambda other=other: other.restore(checkpoint)
+        )
     deep = mpm.Model(spread_box((4, 1, 1), (4, 1, 1), comm), sliding_slope(comm).laws)
     raised_everywhere(comm, mpm.InputError, "is of another dimension: it has 2, the model has 3",
                       lambda: deep.restore(checkpoint))  # fmt: skip

@@ -85,7 +85,7 @@ def test_spinning_block_keeps_its_shape_without_stress(dim, cells, turns, lag):
     omega = 0.05 * np.sqrt(confined / DENSITY)
     model = spinning_block(dim, cells, omega)
     start = by_id(model, "position")
-    report = run(model, turns * 2 * np.pi / omega)
+    run(model, turns * 2 * np.pi / omega)
     angle, stretches = turned_and_stretched(start, by_id(model, "position"))
     assert angle == pytest.approx(turns * 2 * np.pi, rel=lag)  # the lumped mass of few cells costs spin
     assert stretches == pytest.approx(1, abs=0.01)

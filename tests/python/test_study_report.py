@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-webdriver = pytest.importorskip("selenium.webdriver")
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("chromedriver") and shutil.which("chromium")), reason="needs chromium and chromium-driver"
-)
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from studies.common.history import History
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene
 from studies.common.report import Movie, Report, save_report
+
+webdriver = pytest.importorskip("selenium.webdriver")
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("chromedriver") and shutil.which("chromium")), reason="needs chromium and chromium-driver"
+)
 
 SIDE, TIMES = 40, np.linspace(0.0, 2.0, 11)
 
