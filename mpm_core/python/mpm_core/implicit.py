@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from ._core import RunError
+from ._core import InputError, RunError
+from .checks import within
+from .ghost import GhostPenalty
 from .report import ImplicitReport
 from .solution import Solution
 
@@ -17,6 +19,21 @@ if TYPE_CHECKING:
 
 MAX_CUTS = 10
 """A step is not made shorter than dt / 2^MAX_CUTS."""
+
+
+def implicit_options(
+    model: Model, damping: float, pic: float, nmd: bool, quasi_static: bool, ghost: GhostPenalty | None
+) -> Any:
+    """The core's options of the scheme; see `Model.implicit`."""
+    options = _core.ImplicitOptions()
+    options.damping = within("damping", damping, 0, 1, open_above=True)
+    options.pic_share = within("pic", pic, 0, 1)
+    options.mixed_discretisation = bool(nmd)
+    options.quasi_static = bool(quasi_static)
+    options.ghost = (ghost or GhostPenalty()).options()
+    if model.comm.allreduce(len(model.particles)) == 0:
+        raise InputError("the model has no particles, seed some first")
+    return options
 
 
 class Stepper:

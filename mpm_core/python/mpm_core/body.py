@@ -1,0 +1,238 @@
+"""A soil body: particles with their laws, loads and supports on a background mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._core import InputError
+from .checks import positive
+from .collective import collectively
+from .mesh import Mesh, cell_sizes, floats
+from .particles import Particles
+
+
+class Body:
+    """The part of a model that does not know how it is run; see `Model`."""
+
+    def __init__(self, mesh: Mesh, laws: Any | Sequence[Any]) -> None:
+        self.mesh = mesh
+        self.comm: MPI.Comm = mesh.comm
+        self.laws = list(laws) if isinstance(laws, (list, tuple)) else [laws]
+        for law in self.laws:
+            if not isinstance(law, tuple(_core.law_types)):
+                raise InputError(f"laws has {law!r}, expected constitutive laws such as MohrCoulomb(...)")
+        if not self.laws:
+            raise InputError("laws is empty, expected at least one constitutive law")
+        core_type = _core.Model2 if mesh.dim == 2 else _core.Model3
+        self._core = core_type(mesh._core, self.laws, MPI._addressof(self.comm))
+        self._wishes: list[tuple[int, bool, list[float]]] = []
+        self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}
+        self._next_id = 0
+        self.particles = Particles(self._core, mesh.dim)
+        """The particles on this rank."""
+
+    # --- particles -----------------------------------------------------------------------------------------------
+
+    def _seeded(self, added: int, ids: int) -> int:
+        self._next_id += ids
+        if any("cell_size" in law.state_names for law in self.laws):
+            sizes, seen = cell_sizes(self.mesh)[self.particles.cell], self.state("cell_size")
+            self.set_state("cell_size", np.where(seen == 0, sizes, seen))
+        return self.comm.allreduce(added)
+
+    def _material(self, material: int) -> int:
+        if not 0 <= material < len(self.laws):
+            raise InputError(f"material is {material}, expected 0 to {len(self.laws) - 1}, the number of a law")
+        return material
+
+    def seed(self, *, density: float, per_cell: int = 10, cell_tag: int | None = None, material: int = 0) -> int:
+        """Place particles evenly in cells, each with the same share of its cell's volume.
+
+        Args:
+            density: [kg/m3].
+            per_cell: particles per cell: 1, 3, 4, 6, 10, 12, ... in a triangle; 1, 4, 8, 10, ... in a tetrahedron.
+            cell_tag: cells with this tag; all cells by default.
+            material: number of their law.
+
+        Returns:
+            Number of particles placed, over all ranks.
+
+        Raises:
+            InputError: a density that is not positive, a number that does not fill a cell evenly, an unknown tag or law.
+        """
+
+        def place() -> int:
+            if cell_tag is not None:
+                self.mesh.require_tag("cell", cell_tag)
+            rho = positive("density", density, "kg/m3")
+            if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
+                raise InputError(f"per_cell is {per_cell}, expected a whole number")
+            return self._core.seed_cells(cell_tag, int(per_cell), self._material(material), rho, self._next_id)
+
+        return self._seeded(collectively(self.comm, place), self.mesh.cell_numbers * int(per_cell))
+
+    def seed_points(self, points: ArrayLike, volumes: ArrayLike, *, density: float, material: int = 0) -> int:
+        """Place one particle at each given point. Every rank gives the same points.
+
+        Args:
+            points: [m], shape (n, D).
+            volumes: [m^D], shape (n,), positive.
+            density: [kg/m3].
+            material: number of their law.
+
+        Returns:
+            Number of particles placed, over all ranks.
+
+        Raises:
+            InputError: wrong shape, a point outside of the mesh, a volume or density that is not positive.
+        """
+
+        def place() -> int:
+            x = floats("points", points, (None, self.mesh.dim))
+            v = floats("volumes", volumes, (len(x),))
+            if (v <= 0).any():
+                raise InputError(f"volumes is {v.min()} m^{self.mesh.dim} at least, expected positive numbers")
+            rho = positive("density", density, "kg/m3")
+            return self._core.seed_points(x, v, self._material(material), rho, self._next_id)
+
+        inside = collectively(self.comm, lambda: self._owned(points))
+        total = self.comm.allreduce(inside, MPI.MAX)
+        if not total.all():
+            first = int(np.argmin(total))
+            raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")
+        return self._seeded(collectively(self.comm, place), len(np.asarray(points)))
+
+    def _owned(self, points: ArrayLike) -> Any:
+        cells = self.mesh.cells_of(points)
+        return (cells >= 0) & (cells < self.mesh.owned_cells)
+
+    def traction(self, facet_tag: int, traction: ArrayLike) -> float:
+        """Load the particles next to the facets with a tag (15). The force moves with them and keeps its direction.
+
+        Args:
+            facet_tag: tag of the loaded facets.
+            traction: force per area [Pa], shape (D,).
+
+        Returns:
+            Area of the loaded facets [m^(D-1)] over all ranks.
+        """
+
+        def load() -> float:
+            self.mesh.require_tag("facet", facet_tag)
+            return self._core.load_facets(facet_tag, floats("traction", traction, (self.mesh.dim,)).tolist())
+
+        area = self.comm.allreduce(collectively(self.comm, load))
+        if area == 0:
+            raise InputError(f"facet_tag {facet_tag} has no filled cell behind it to carry the traction")
+        return area
+
+    def state(self, name: str) -> NDArray[np.float64]:
+        """A state variable by its name in ``state_names`` of the laws, such as "excess_pore_pressure".
+
+        Returns:
+            Shape (n,), in the order of ``particles``; NaN where a particle's law has no such variable. Not collective.
+        """
+        state, material = self.particles.state, self.particles.material
+        values = np.full(len(material), np.nan)
+        for number, column in self._state_columns(name):
+            values[material == number] = state[material == number, column]
+        return values
+
+    def set_state(self, name: str, values: ArrayLike) -> None:
+        """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
+        state, material = self.particles.state, self.particles.material
+        new = np.asarray(values, dtype=np.float64)
+        if new.shape != material.shape:
+            raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")
+        for number, column in self._state_columns(name):
+            state[material == number, column] = new[material == number]
+        self.particles.set("state", state)
+
+    def _state_columns(self, name: str) -> list[tuple[int, int]]:
+        """(number of a law, column of the state variable) for each law that has it."""
+        columns = [(k, law.state_names.index(name)) for k, law in enumerate(self.laws) if name in law.state_names]
+        if not columns:
+            known = sorted({known for law in self.laws for known in law.state_names})
+            raise InputError(f"name is '{name}', expected a state variable of the laws: {', '.join(known)}")
+        return columns
+
+    def assign(self, material: ArrayLike) -> None:
+        """Give each particle its law: numbers of laws, shape (n,), in the order of ``particles``. Not collective.
+
+        Example:
+            >>> model.assign(np.where(model.particles.position[:, 1] < 2.0, 1, 0))  # layers
+        """
+        numbers = np.asarray(material)
+        if numbers.shape != (len(self.particles),) or not np.issubdtype(numbers.dtype, np.integer):
+            raise InputError(
+                f"material has shape {numbers.shape} and dtype {numbers.dtype}, expected one whole number each"
+            )
+        for number in np.unique(numbers):
+            self._material(int(number))
+        self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
+
+    def place(self, position: ArrayLike) -> None:
+        """Put the particles elsewhere: their cells are found anew, on whatever rank, and their displacement changes with it.
+
+        The particles may have another order, and other ranks, afterwards.
+
+        Args:
+            position: [m], shape (n, D), in the order of ``particles``.
+
+        Raises:
+            InputError: on all ranks, naming a particle that would be outside of the mesh; then none is moved.
+        """
+
+        def checked() -> NDArray[np.float64]:
+            return floats("position", position, (len(self.particles), self.mesh.dim))
+
+        self._core.place_particles(collectively(self.comm, checked))
+
+    # --- supports and loads --------------------------------------------------------------------------------------
+
+    def _support(
+        self, facet_tag: int, whole: bool, vector: ArrayLike, name: str, *, replaced: Any = None
+    ) -> tuple[int, bool, list[float]]:
+        def checked() -> tuple[int, bool, list[float]]:
+            self.mesh.require_tag("facet", facet_tag)
+            return facet_tag, whole, floats(name, vector, (self.mesh.dim,)).tolist()
+
+        wish = collectively(self.comm, checked)
+        wishes = [*(other for other in self._wishes if other is not replaced), wish]
+        collectively(self.comm, lambda: self._core.set_supports(wishes))
+        self._wishes = wishes
+        return wish
+
+    def fix(self, facet_tag: int) -> None:
+        """Hold the nodes on facets with this tag."""
+        self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
+
+    def roller(self, facet_tag: int, normal: ArrayLike) -> None:
+        """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
+        self._support(facet_tag, False, normal, "normal")
+
+    def prescribe(self, facet_tag: int, velocity: ArrayLike) -> None:
+        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
+        before = self._prescribed.get(facet_tag)
+        self._prescribed[facet_tag] = self._support(facet_tag, True, velocity, "velocity", replaced=before)
+
+    def outflow(self, facet_tag: int) -> None:
+        """Let particles leave the mesh through facets with this tag; they are counted in the report."""
+        self._core.outflow_tags = [*self._core.outflow_tags, self.mesh.require_tag("facet", facet_tag)]
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Gravity [m/s2], shape (D,), as it is after any ramp. Not collective."""
+        return np.array(self._core.gravity)
+
+    def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
+        """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
+        components = floats("gravity", gravity, (self.mesh.dim,)).tolist()
+        self._core.gravity_ramp = positive("ramp", ramp, "s", zero=True)
+        self._core.gravity = components

@@ -1,0 +1,74 @@
+"""The explicit scheme over time: its options, and the times at which it reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from mpi4py import MPI
+
+from . import _core
+from ._core import InputError
+from .checks import positive, within
+from .report import Report
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def explicit_options(damping: float, pic: float, nmd: bool, stress_update: Any) -> Any:
+    """The core's options of the scheme; see `Model.explicit`."""
+    options = _core.ExplicitOptions()
+    options.damping = within("damping", damping, 0, 1, open_above=True)
+    options.pic_share = within("pic", pic, 0, 1)
+    options.mixed_discretisation = bool(nmd)
+    options.stress_update = stress_update
+    return options
+
+
+def run_options(dt: float | None, courant: float, allow_unstable: bool) -> Any:
+    """The core's options of the time step; see `Model.explicit`."""
+    run = _core.RunOptions()
+    run.dt = None if dt is None else positive("dt", dt, "s")
+    if not 0 < courant <= 1:
+        raise InputError(f"courant is {courant}, expected 0 < courant <= 1")
+    run.courant = courant
+    run.allow_unstable = bool(allow_unstable)
+    return run
+
+
+def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:
+    """Times still to come at which a run reports [s]; see `Model.explicit`."""
+    if not (np.isfinite(until) and until >= model.time):
+        raise InputError(f"until is {until} s, expected a time not before the present, {model.time} s")
+    start = model.time if since is None else float(since)
+    if not start <= model.time:
+        raise InputError(f"since is {since} s, expected a time not after the present, {model.time} s")
+    interval = until - start if every is None else positive("every", every, "s")
+    if model.comm.allreduce(len(model.particles)) == 0:
+        raise InputError("the model has no particles, seed some first")
+    if until == start:
+        return []
+    count = max(1, int(np.ceil((until - start) / interval - 1e-9)))
+    done = int(np.floor((model.time - start) / interval + 1e-9))
+    return [until if k == count else start + k * interval for k in range(done + 1, count + 1)]
+
+
+def run_explicit(
+    model: Model, options: Any, run: Any, times: Sequence[float], watch: Callable[[], bool] | None
+) -> Iterator[Report]:
+    """Step to each of the times, with a report there."""
+    # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
+    # after each control interval anyway.
+    most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
+    pauses = 1 if watch is not None else max(1, 2_000_000 // most // _core.control_interval)
+    run.max_steps = pauses * _core.control_interval
+    for until in times:
+        run.until = until
+        while model.time < until:
+            model._core.run_explicit(options, run)
+            if watch is not None and watch():
+                yield model.report()
+                return
+        yield model.report()
