@@ -4,6 +4,7 @@ What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 """
 
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
+from fenics_bridge.box_mesh import BODY, box_mesh
 from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
 from fenics_bridge.comparison import Difference, compare
 from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
@@ -24,9 +25,9 @@ from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 # fmt: off
 __all__ = [
-    "BASE", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
+    "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
     "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "NewtonReport", "PointSearch", "QuasiStatic",
-    "Support", "background_arrays", "background_mesh", "collapse_load", "compare", "evaluate_at",
+    "Support", "background_arrays", "background_mesh", "box_mesh", "collapse_load", "compare", "evaluate_at",
     "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
     "log_spiral", "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",

@@ -21,6 +21,7 @@ import numpy as np
 from .history import History
 from .parameters import Parameter
 from .plots import Quantity, Scene, colour_limits, disc_diameter
+from .report_sections import Section, figures_html, sections_html
 
 PAGE = Path(__file__).parent / "report_page"
 SCRIPTS = ("data.js", "view.js", "player.js", "curves.js", "main.js")
@@ -62,6 +63,7 @@ class Report:
         figures: PNG files with captions.
         parameters: as ``Options.parameters`` gives them.
         results: further results, name to text or number.
+        sections: text, tables and pictures that belong together.
     """
 
     title: str
@@ -72,6 +74,7 @@ class Report:
     figures: Mapping[Path, str] = field(default_factory=dict)
     parameters: Sequence[Parameter] = ()
     results: Mapping[str, object] = field(default_factory=dict)
+    sections: Sequence[Section] = ()
     footer: str = ""
 
 
@@ -89,6 +92,7 @@ def save_report(path: Path, report: Report) -> None:
         "facts": "".join(
             f"<li><b>{html.escape(v)}</b><span>{html.escape(k)}</span></li>" for k, v in report.facts.items()
         ),
+        "sections": sections_html(report.sections),
         "figures": _figures(report.figures),
         "tables": _tables(report.parameters, report.results),
         "footer": html.escape(report.footer),
@@ -236,12 +240,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
 
 
 def _figures(figures: Mapping[Path, str]) -> str:
-    shown = "".join(
-        f'<figure><img alt="{html.escape(caption)}" src="data:image/png;base64,{_base64(path.read_bytes())}">'
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-        for path, caption in figures.items()
-    )
-    return f'<section><h2>Figures</h2><div class="grid">{shown}</div></section>' if shown else ""
+    return f"<section><h2>Figures</h2>{figures_html(figures)}</section>" if figures else ""
 
 
 def _tables(parameters: Sequence[Parameter], results: Mapping[str, object]) -> str:

@@ -1,0 +1,87 @@
+"""Verification and validation: every case computed anew, one report of what came out against what should.
+
+Writes report.html, verification.json and pictures. Exits with 1 when a check fails; known limits of the method are
+shown and count as none.
+"""
+
+from __future__ import annotations
+
+import importlib
+from argparse import Namespace
+from pathlib import Path
+from time import perf_counter
+
+from _case import Result, line
+from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
+from common.options import add_flag, check, study_parser
+from common.ranks import run_study
+from common.summary import ROOT, OutputError, results_folder
+from mpi4py import MPI
+
+comm = MPI.COMM_WORLD
+GROUPS = {
+    "Closed forms": ("column",),
+}
+CASES = tuple(name for names in GROUPS.values() for name in names)
+
+
+# --- 1. Options ----------------------------------------------------------------------------------------------------
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = study_parser(__doc__)
+    p.prog = "studies/run verification"
+    p.add_argument("--cases", default=",".join(CASES), metavar="NAME,...", help=f"cases to run, of {', '.join(CASES)} "
+                   "(default: all)")  # fmt: skip
+    add_flag(p, "--quick", "small sizes, as the tests run them; tolerances are wider where sizes matter")
+    add_flag(p, "--docs", "also write docs/verification.md with its table and pictures")
+    options = p.parse_args(arguments)
+    options.cases = [name.strip() for name in options.cases.split(",")]
+    for name in options.cases:
+        check(p, name in CASES, f"--cases names '{name}', expected some of {', '.join(CASES)}")
+    check(p, not (options.docs and options.quick), "--docs needs the full sizes, without --quick")
+    return options
+
+
+# --- 2. One case ---------------------------------------------------------------------------------------------------
+
+
+def run_case(name: str, group: str, quick: bool, folder: Path) -> CaseRow:
+    """Run one case; an error in it becomes part of its result."""
+    module = importlib.import_module(name)
+    folder = results_folder(name, folder / name, comm)
+    start, result, error = perf_counter(), Result([]), ""
+    try:
+        result = module.run(quick, folder)
+    except Exception as exception:  # whatever a case fails with, the others go on
+        error = f"{type(exception).__name__}: {exception}"
+    row = case_row(name, group, module.__doc__ or name, result, error, perf_counter() - start)
+    if comm.rank == 0:
+        print(*map(line, result.checks), *([f"  ERROR {error}"] if error else []), sep="\n", flush=True)
+    return row
+
+
+# --- 3. All together -----------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    folder = results_folder("verification", a.output, comm)
+    table = Table.begun(a.quick, comm.size)
+    for k, name in enumerate(a.cases, 1):
+        if comm.rank == 0:
+            print(f"[{k}/{len(a.cases)}] {name}", flush=True)
+        group = next(group for group, names in GROUPS.items() if name in names)
+        table.cases.append(run_case(name, group, a.quick, folder))
+        if comm.rank == 0:
+            save_table(folder / "verification.json", table)
+            save_page(folder, table)
+    if comm.rank == 0:
+        if a.docs:
+            save_docs(ROOT / "docs", folder, table)
+        print(f"{table.summary()}; report in {folder / 'report.html'}")
+    return 0 if table.passed else 1
+
+
+if __name__ == "__main__":
+    run_study(main, OutputError)

@@ -1,0 +1,102 @@
+"""What the cases share: checks, what a case hands back, and how a case runs alone."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+
+STUDIES = Path(__file__).parents[1]
+if str(STUDIES) not in sys.path:
+    sys.path.insert(0, str(STUDIES))  # a case imports what studies share, and other studies
+
+from common.ranks import run_study  # noqa: E402
+from common.summary import OutputError, results_folder  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import mpm_core as mpm  # noqa: E402
+
+
+class Kind(Enum):
+    """How a computed number is compared with the expected one."""
+
+    EQUAL = "="
+    AT_LEAST = "≥"
+    AT_MOST = "≤"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number against what it should be.
+
+    Args:
+        quantity: what it is, for instance "settlement of the top, 3D".
+        expected: the number it should be, in ``unit``.
+        source: where that comes from: a formula, a paper and equation, an identity.
+        computed: the number that came out.
+        tolerance: largest error that passes, as a share of ``scale``.
+        unit: as shown; "-" for none.
+        kind: AT_LEAST and AT_MOST count only what is missing to the expected number as error.
+        scale: what errors are divided by, in ``unit``; by default the expected number's size.
+        limit: the reason, where the method is known not to reach the expected number. Such a check is shown with its
+            error and counts as no failure.
+    """
+
+    quantity: str
+    expected: float
+    source: str
+    computed: float
+    tolerance: float
+    unit: str = "-"
+    kind: Kind = Kind.EQUAL
+    scale: float | None = None
+    limit: str = ""
+
+    @property
+    def error(self) -> float:
+        """Difference to the expected number as a share of the scale [-]; not a number when nothing was computed."""
+        difference = self.computed - self.expected
+        if self.kind is not Kind.EQUAL and self.computed == self.computed:
+            difference = max(0.0, -difference if self.kind is Kind.AT_LEAST else difference)
+        return abs(difference) / (abs(self.expected) if self.scale is None else self.scale)
+
+    @property
+    def passed(self) -> bool:
+        return self.error <= self.tolerance
+
+
+@dataclass
+class Result:
+    """What a case found: its checks, and pictures in its folder with their captions."""
+
+    checks: list[Check]
+    figures: dict[str, str] = field(default_factory=dict)
+
+
+def line(check: Check) -> str:
+    """A check as it is printed."""
+    verdict = "pass" if check.passed else "known limit" if check.limit else "FAIL"
+    unit = "" if check.unit == "-" else f" {check.unit}"
+    return (
+        f"  {verdict:5} {check.quantity}: {check.computed:.5g}{unit}, "
+        f"expected {check.kind.value} {check.expected:.5g}{unit}, error {check.error:.2%}, tolerance {check.tolerance:.2%}"
+    )
+
+
+def run_alone(case: Callable[[bool, Path], Result]) -> None:
+    """Run one case as a script: ``--quick`` for its small size. Exits with 1 when a check fails."""
+
+    def main() -> int:
+        name = Path(sys.argv[0]).stem
+        parser = ArgumentParser(description=sys.modules["__main__"].__doc__)
+        parser.add_argument("--quick", action="store_true", help="a small size, as the tests run it")
+        quick = parser.parse_args().quick
+        result = case(quick, results_folder(f"verification/{name}"))
+        if MPI.COMM_WORLD.rank == 0:
+            print(*map(line, result.checks), sep="\n")
+        return 0 if all(check.passed or check.limit for check in result.checks) else 1
+
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

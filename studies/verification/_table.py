@@ -1,0 +1,211 @@
+"""The table of all checks: as JSON, as a page, and as a page of the documentation that is made from the JSON alone."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+
+from _case import Result
+from common.report import Report, save_report
+from common.report_sections import Section
+from common.summary import versions
+
+COLUMNS = ("Quantity", "Expected", "Computed", "Error", "Tolerance", "Result", "Source of the expected value")
+
+
+@dataclass
+class CheckRow:
+    """A check as it stands in the table; ``error`` is None when nothing was computed."""
+
+    quantity: str
+    expected: float
+    source: str
+    computed: float | None
+    error: float | None
+    tolerance: float
+    unit: str
+    kind: str
+    limit: str
+    passed: bool
+
+    @property
+    def verdict(self) -> str:
+        return "pass" if self.passed else "known limit" if self.limit else "FAIL"
+
+    def texts(self) -> list[str]:
+        """The row under `COLUMNS`."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        sign = "" if self.kind == "=" else f"{self.kind} "
+        error = "none" if self.error is None else percent(self.error)
+        computed = "none" if self.computed is None else f"{self.computed:.5g}{unit}"
+        expected = f"{sign}{self.expected:.5g}{unit}"
+        return [self.quantity, expected, computed, error, percent(self.tolerance), self.verdict, self.source]
+
+
+@dataclass
+class CaseRow:
+    """A case with its checks; ``figures`` are captions by file name."""
+
+    name: str
+    group: str
+    title: str
+    text: str
+    checks: list[CheckRow]
+    figures: dict[str, str]
+    error: str
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        return not self.error and all(check.passed or check.limit for check in self.checks)
+
+    def notes(self) -> list[str]:
+        """What is to be said about known limits, each once."""
+        return list(dict.fromkeys(f"Known limit: {c.limit}" for c in self.checks if c.limit and not c.passed))
+
+
+@dataclass
+class Table:
+    """All cases of a run, when and with which versions."""
+
+    date: str
+    versions: dict[str, str]
+    ranks: int
+    quick: bool
+    cases: list[CaseRow] = field(default_factory=list)
+
+    @staticmethod
+    def begun(quick: bool, ranks: int) -> Table:
+        return Table(datetime.now(timezone.utc).isoformat(timespec="seconds"), versions(), ranks, quick)
+
+    @property
+    def passed(self) -> bool:
+        return all(case.passed for case in self.cases)
+
+    def summary(self) -> str:
+        checks = [check for case in self.cases for check in case.checks]
+        verdicts = [check.verdict for check in checks]
+        errors = [case.name for case in self.cases if case.error]
+        return (
+            f"{len(self.cases)} cases, {len(checks)} checks: {verdicts.count('pass')} pass, "
+            f"{verdicts.count('FAIL')} fail, {verdicts.count('known limit')} known limits"
+            + (f"; errors in {', '.join(errors)}" if errors else "")
+        )
+
+
+def percent(share: float) -> str:
+    """A share as a percentage with two digits that count."""
+    return f"{100 * share:.2g} %" if share < 10 else "> 1000 %"
+
+
+def case_row(name: str, group: str, docstring: str, result: Result, error: str, seconds: float) -> CaseRow:
+    """The row of a case; its docstring gives title and text."""
+    title, _, text = docstring.strip().partition("\n")
+    paragraphs = [" ".join(part.split()) for part in text.strip().split("\n\n")]
+    checks = [
+        CheckRow(c.quantity, float(c.expected), c.source, _finite(c.computed), _finite(c.error), float(c.tolerance),
+                 c.unit, c.kind.value, c.limit, bool(c.passed))
+        for c in result.checks
+    ]  # fmt: skip
+    return CaseRow(
+        name, group, title.rstrip("."), "\n\n".join(paragraphs), checks, result.figures, error, round(seconds, 1)
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if abs(value) < float("inf") else None
+
+
+def save_table(path: Path, table: Table) -> None:
+    """Write the table as JSON; the file appears as a whole or not at all."""
+    aside = path.with_name(path.name + ".part")
+    aside.write_text(
+        json.dumps({**asdict(table), "passed": table.passed}, indent=1, ensure_ascii=False) + "\n", "utf-8"
+    )
+    os.replace(aside, path)
+
+
+def read_table(path: Path) -> Table:
+    """The table that `save_table` wrote."""
+    data = json.loads(path.read_text("utf-8"))
+    cases = [CaseRow(**{**case, "checks": [CheckRow(**check) for check in case["checks"]]}) for case in data["cases"]]
+    return Table(data["date"], data["versions"], data["ranks"], data["quick"], cases)
+
+
+# --- pages ---------------------------------------------------------------------------------------------------------
+
+
+def save_page(folder: Path, table: Table) -> None:
+    """Write report.html; the pictures are in a folder for each case."""
+    sections = []
+    for case in table.cases:
+        text = "\n\n".join(
+            [case.text, *([f"The case ended with an error: {case.error}"] if case.error else []), *case.notes()]
+        )
+        wrong = [k for k, check in enumerate(case.checks) if check.verdict == "FAIL"]
+        figures = {folder / case.name / name: f"{caption}" for name, caption in case.figures.items()}
+        sections.append(
+            Section(f"{case.group}: {case.title}", text, COLUMNS, [c.texts() for c in case.checks], wrong, figures)
+        )
+    rows = [
+        [case.group, case.title, f"{len(case.checks)}", f"{sum(c.passed for c in case.checks)}",
+         f"{sum(c.verdict == 'known limit' for c in case.checks)}",
+         "error" if case.error else f"{sum(c.verdict == 'FAIL' for c in case.checks)}", f"{case.seconds:.0f} s"]
+        for case in table.cases
+    ]  # fmt: skip
+    wrong = [k for k, case in enumerate(table.cases) if not case.passed]
+    head = Section("All cases", "", ("Group", "Case", "Checks", "Pass", "Known limits", "Fail", "Took"), rows, wrong)
+    save_report(folder / "report.html", Report(
+        "Verification and validation", table.summary(), {"of all checks" if table.passed else "at least one": "pass" if
+        table.passed else "FAIL"}, sections=[head, *sections], footer=_made(table),
+    ))  # fmt: skip
+
+
+def _made(table: Table) -> str:
+    shown = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in table.versions.items())
+    size = "small sizes" if table.quick else "full sizes"
+    return (
+        f"Computed on {table.date[:10]} with {size} on {table.ranks} rank{'s' * (table.ranks > 1)}. Versions: {shown}."
+    )
+
+
+def save_docs(docs: Path, folder: Path, table: Table) -> None:
+    """Write verification.md, and beside it what it is made from: verification.json and the pictures."""
+    images = docs / "images" / "verification"
+    shutil.rmtree(images, ignore_errors=True)
+    images.mkdir(parents=True)
+    for case in table.cases:
+        for name in case.figures:
+            shutil.copyfile(folder / case.name / name, images / f"{case.name}_{name}")
+    save_table(docs / "verification.json", table)
+    (docs / "verification.md").write_text(docs_page(table), "utf-8")
+
+
+def docs_page(table: Table) -> str:
+    """The page of the documentation, from the table alone."""
+    parts = [
+        "# Verification and validation",
+        "`studies/run verification` computes all of this anew and writes it as one page; `--cases` chooses cases, "
+        f"`--quick` takes small sizes. This page was made by `studies/run verification --docs`.\n\n{_made(table)}\n\n"
+        f"**{table.summary()}.** The error is a share of the expected value, or of the scale that the source names. "
+        "A known limit is a number that the method is known not to reach; it is shown with its reason.",
+    ]
+    for group in dict.fromkeys(case.group for case in table.cases):
+        parts.append(f"## {group}")
+        parts += [_docs_case(case) for case in table.cases if case.group == group]
+    return "\n\n".join(parts) + "\n"
+
+
+def _docs_case(case: CaseRow) -> str:
+    rows = [COLUMNS, ["---"] * len(COLUMNS), *(check.texts() for check in case.checks)]
+    table = "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in row) + " |" for row in rows)
+    figures = [
+        f"![{caption}](images/verification/{case.name}_{name})\n\n*{caption}*" for name, caption in case.figures.items()
+    ]
+    error = [f"The case ended with an error: {case.error}"] if case.error else []
+    source = f"`studies/verification/{case.name}.py`, {case.seconds:.0f} s"
+    return "\n\n".join([f"### {case.title}", case.text, source, *error, table, *case.notes(), *figures])
