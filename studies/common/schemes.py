@@ -39,10 +39,11 @@ def solver_named(name: str) -> mpm.Newton | mpm.Relaxation:
 
 
 def time_step(options: argparse.Namespace, model: mpm.Model) -> float | None:
-    """The step asked for or the scheme's default [s]; None leaves it to the explicit scheme. Collective."""
+    """The step asked for or the scheme's default [s]; None leaves it to the explicit scheme. A run that goes on keeps the one
+    it began with. Collective."""
     if options.dt is not None or options.scheme == "explicit":
         return options.dt
-    return IMPLICIT_STEP * model.critical_time_step()
+    return model.resumed_dt or IMPLICIT_STEP * model.critical_time_step()
 
 
 def run_scheme(
@@ -53,20 +54,15 @@ def run_scheme(
     Args:
         options: with those of `add_scheme_options` and time, damping, pic and nmd.
         every: time between reports, counted from zero [s].
-        watch: called between steps of the explicit scheme, before reports of the others; true ends the run after a report.
+        watch: called between steps; true ends the run after a report.
 
     Raises:
         RunError: see ``Model.explicit`` and ``Model.implicit``; quasi-static, beyond the collapse load.
     """
     a, dt = options, time_step(options, model)
-    common = {"damping": a.damping, "pic": a.pic, "nmd": a.nmd}
+    common = {"every": every, "since": 0.0, "watch": watch, "damping": a.damping, "pic": a.pic, "nmd": a.nmd}
     if a.scheme == "explicit":
-        yield from model.explicit(a.time, every=every, since=0.0, watch=watch, dt=dt, **common)
-        return
-    run = model.implicit(a.time, dt=dt, solver=solver_named(a.solver), every=every,
-                         quasi_static=a.scheme == "quasi-static", **common)  # fmt: skip
-    for report in run:
-        ends = watch()
-        yield report
-        if ends:
-            return
+        return model.explicit(a.time, dt=dt, **common)
+    return model.implicit(
+        a.time, dt=dt, solver=solver_named(a.solver), quasi_static=a.scheme == "quasi-static", **common
+    )

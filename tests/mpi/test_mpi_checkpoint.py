@@ -187,3 +187,27 @@ def test_a_checkpoint_that_cannot_be_written_or_read(comm, shared_path, checkpoi
     comm.barrier()
     assert sorted(path.name for path in shared_path.iterdir()) == ["folder.h5", "state.h5"]
     model.restore(checkpoint)
+
+
+IMPLICIT = dict(until=0.2, dt=0.04, every=0.1, since=0.0, damping=0.3, nmd=True)
+FEW = mpm.Newton(max_iterations=4)  # so few that steps are cut, and their length is part of the state
+
+
+@pytest.mark.parametrize("owners_of", [bands, one_does_all])
+def test_an_implicit_run_goes_on_to_the_last_bit(comm, shared_path, owners_of):
+    never_stopped = sliding_slope(comm, owners_of)
+    reports = list(never_stopped.implicit(**IMPLICIT, solver=FEW))
+    assert reports[-1].cuts > 0
+
+    model = sliding_slope(comm, owners_of)
+    *_, first = model.implicit(**IMPLICIT, solver=FEW, watch=lambda: model.time > 0.13)
+    assert 0.13 < first.time < 0.2
+    model.save(shared_path / "state.h5")
+    again = sliding_slope(comm, owners_of)
+    again.restore(shared_path / "state.h5")
+    assert again.resumed_dt == 0.04
+    *_, last = again.implicit(**IMPLICIT, solver=FEW)
+    one, other = all_by_id(never_stopped), all_by_id(again)
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+    assert last.steps == reports[-1].steps and last.kinetic_energy == reports[-1].kinetic_energy

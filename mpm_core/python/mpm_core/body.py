@@ -34,6 +34,8 @@ class Body:
         self._wishes: list[tuple[int, bool, list[float]]] = []
         self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}
         self._next_id = 0
+        self._control: Any = None  # of the implicit run, a StepControl
+        self._resumed: Any = None  # of a checkpoint, for the next implicit run
         self.particles = Particles(self._core, mesh.dim)
         """The particles on this rank."""
 

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError, RunError
 from .collective import collectively
+from .implicit import StepControl
 
 if TYPE_CHECKING:
     from .model import Model
@@ -68,6 +69,7 @@ def _description(model: Model) -> dict[str, Any]:
         "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
         "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
         "next_id": model._next_id,
+        "implicit": None if model._control is None else vars(model._control),
     }
 
 
@@ -87,4 +89,6 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._wishes = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
     model._prescribed = {int(tag): model._wishes[k] for tag, k in there["prescribed"].items()}
     model._next_id = there["next_id"]
+    model._control = None
+    model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
     collectively(model.comm, lambda: core.set_supports(model._wishes))

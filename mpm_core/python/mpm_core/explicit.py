@@ -38,6 +38,12 @@ def run_options(dt: float | None, courant: float, allow_unstable: bool) -> Any:
     return run
 
 
+def require_particles(model: Model) -> None:
+    """Raises InputError where no rank has any. Collective."""
+    if model.comm.allreduce(len(model.particles)) == 0:
+        raise InputError("the model has no particles, seed some first")
+
+
 def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:
     """Times still to come at which a run reports [s]; see `Model.explicit`."""
     if not (np.isfinite(until) and until >= model.time):
@@ -46,8 +52,7 @@ def report_times(model: Model, until: float, every: float | None, since: float |
     if not start <= model.time:
         raise InputError(f"since is {since} s, expected a time not after the present, {model.time} s")
     interval = until - start if every is None else positive("every", every, "s")
-    if model.comm.allreduce(len(model.particles)) == 0:
-        raise InputError("the model has no particles, seed some first")
+    require_particles(model)
     if until == start:
         return []
     count = max(1, int(np.ceil((until - start) / interval - 1e-9)))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _core
-from ._core import InputError, RunError
+from ._core import RunError
 from .checks import within
+from .explicit import require_particles
 from .ghost import GhostPenalty
 from .report import ImplicitReport
 from .solution import Solution
@@ -31,9 +33,22 @@ def implicit_options(
     options.mixed_discretisation = bool(nmd)
     options.quasi_static = bool(quasi_static)
     options.ghost = (ghost or GhostPenalty()).options()
-    if model.comm.allreduce(len(model.particles)) == 0:
-        raise InputError("the model has no particles, seed some first")
+    require_particles(model)
     return options
+
+
+@dataclass
+class StepControl:
+    """What a run carries from one implicit step to the next beside the particles; checkpoints hold it too."""
+
+    longest: float
+    """[s] that a step may be long"""
+    length: float
+    """[s] of the next step, unless a report comes before"""
+    iterations: int = 0
+    """since the last report"""
+    cuts: int = 0
+    """since the last report"""
 
 
 class Stepper:
@@ -51,9 +66,8 @@ class Stepper:
         self._step = (_core.ImplicitStep2 if model.mesh.dim == 2 else _core.ImplicitStep3)(model._core)
         self._solver = solver.solver(model.comm, model.mesh.dim)
         self._options = options
-        self._longest = self._dt = dt
         self._changed = True
-        self._iterations = self._cuts = 0
+        self.control = StepControl(dt, dt)
         self.last = Solution()
         """How the last step tried was solved"""
 
@@ -65,57 +79,68 @@ class Stepper:
         """
         while True:
             left = until - self._core.time
-            dt = left / max(1, int(np.ceil(left / self._dt - 1e-6)))
+            dt = left / max(1, int(np.ceil(left / self.control.length - 1e-6)))
             reason = self.attempt(dt)
             if not reason:
                 break
-            self._cuts += 1
-            self._dt = dt / 2
-            if self._dt < self._longest / 2**MAX_CUTS:
+            self.control.cuts += 1
+            self.control.length = dt / 2
+            if self.control.length < self.control.longest / 2**MAX_CUTS:
                 raise RunError(
-                    f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from {self._longest:.3g} s "
-                    f"down to {dt:.3g} s: {reason}"
+                    f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from "
+                    f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}"
                 )
         if self.last.easy:
-            self._dt = min(self._longest, 2 * self._dt)
+            self.control.length = min(self.control.longest, 2 * self.control.length)
 
     def attempt(self, dt: float) -> str:
         """Try one step; the particles change only when it succeeds. Returns why it did not, or nothing."""
         self._changed |= self._step.start(self._options, dt)
         self.last = self._solver.solve(self._step, dt, self._changed)
         self._changed = False
-        self._iterations += self.last.iterations
+        self.control.iterations += self.last.iterations
         return self._step.finish() if self.last.converged else self.last.reason
 
     def report(self) -> ImplicitReport:
         """Where the run stands; counts begin anew."""
         report = ImplicitReport(
             **vars(self._model.report()),
-            iterations=self._iterations,
-            cuts=self._cuts,
+            iterations=self.control.iterations,
+            cuts=self.control.cuts,
             residual=self.last.residuals[-1],
         )
-        self._iterations = self._cuts = 0
+        self.control.iterations = self.control.cuts = 0
         return report
 
 
 def run_implicit(
-    model: Model, solver: Any, options: Any, *, until: float, dt: float, interval: float | None
+    model: Model,
+    solver: Any,
+    options: Any,
+    *,
+    times: Sequence[float],
+    dt: float,
+    every_step: bool,
+    watch: Callable[[], bool] | None,
 ) -> Iterator[ImplicitReport]:
-    """Step until a time; reports at intervals, or after each step."""
+    """Step until each of the times; reports then, or after each step."""
     stepper = Stepper(model, solver, options, dt)
-    start, close = model.time, 1e-9 * abs(until)
-    length = until - start if interval is None else interval
-    count = 1 if interval is None else max(1, int(np.ceil((until - start) / length - 1e-9)))
-    for k in range(1, count + 1):
-        target = until if k == count else start + k * length
-        while target - model.time > close:
-            stepper.advance(target)
-            if target - model.time <= close:
-                model._core.time = target
-            if interval is None:
+    resumed, model._resumed = model._resumed, None
+    if resumed is not None:
+        stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
+    model._control = stepper.control
+    for until in times:
+        close = 1e-9 * abs(until)
+        while until - model.time > close:
+            stepper.advance(until)
+            if until - model.time <= close:
+                model._core.time = until
+            ends = watch is not None and watch()
+            if every_step or ends:
                 yield stepper.report()
-        if interval is not None:
+            if ends:
+                return
+        if not every_step:
             yield stepper.report()
 
 

@@ -15,9 +15,18 @@ from petsc4py import PETSc
 _DIRECT_LIMIT = {2: 150_000, 3: 20_000}
 """Nodes up to which the default is a direct solver, by dimension."""
 
-_DIRECT: dict[str, Any] = {"ksp_type": "preonly", "pc_type": "lu"}
-if PETSc.Sys.hasExternalPackage("mumps"):
-    _DIRECT["pc_factor_mat_solver_type"] = "mumps"
+
+def _direct(ranks: int) -> dict[str, Any]:
+    """PETSc options for LU. On several ranks the system is gathered and factorised on one of them: MUMPS spread over ranks
+    adds up in the order in which messages arrive, so that no two runs would be the same to the last bit."""
+    lu = {"ksp_type": "preonly", "pc_type": "lu"}
+    if PETSc.Sys.hasExternalPackage("mumps"):
+        lu["pc_factor_mat_solver_type"] = "mumps"
+    if ranks == 1:
+        return lu
+    gathered = {"ksp_type": "preonly", "pc_type": "telescope", "pc_telescope_reduction_factor": ranks}
+    return {**gathered, **{f"telescope_{name}": value for name, value in lu.items()}}
+
 
 _MULTIGRID: dict[str, Any] = {
     "ksp_type": "fgmres",
@@ -103,7 +112,7 @@ class Tangent:
             self._force = _coo_matrix(comm, (dofs, nodes), (dim, 1), step.volumetric_force_places())
             self._strain = _coo_matrix(comm, (nodes, dofs), (1, dim), step.volumetric_strain_places())
         self._prefix = prefix
-        self._options = _DIRECT if step.total_nodes <= _DIRECT_LIMIT[dim] else _MULTIGRID
+        self._options = _direct(comm.size) if step.total_nodes <= _DIRECT_LIMIT[dim] else _MULTIGRID
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(prefix)
         self._near_null_space = _rigid_body_motions(step, comm, dim)

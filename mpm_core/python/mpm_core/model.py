@@ -4,11 +4,10 @@ import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import InputError, StressUpdate
+from ._core import StressUpdate
 from .body import Body
 from .checks import positive
 from .explicit import explicit_options, report_times, run_explicit, run_options
@@ -65,6 +64,11 @@ class Model(Body):
                 unknown format. The model is as it was.
         """
         checkpoint.restore(self, path)
+
+    @property
+    def resumed_dt(self) -> float | None:
+        """Longest step [s] of the implicit run that a restored checkpoint was taken from; None when it was of no such run."""
+        return None if self._resumed is None else self._resumed.longest
 
     # --- runs ----------------------------------------------------------------------------------------------------
 
@@ -149,6 +153,8 @@ class Model(Body):
         dt: float,
         solver: Newton | Relaxation | None = None,
         every: float | None = None,
+        since: float | None = None,
+        watch: Callable[[], bool] | None = None,
         quasi_static: bool = False,
         damping: float = 0.0,
         pic: float = 0.0,
@@ -164,6 +170,9 @@ class Model(Body):
             dt: longest time step [s].
             solver: what solves each step; Newton's method by default.
             every: time between reports [s]; by default after each step.
+            since: time from which ``every`` counts [s]; by default the present, see ``explicit``.
+            watch: called after each step, on all ranks alike; the model may be saved then. When it returns true (on all
+                ranks), the run ends with a report.
             quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
             damping: local damping alpha, in [0, 1). Acts on the out-of-balance force of the step's end; not in
                 quasi-static runs.
@@ -178,10 +187,10 @@ class Model(Body):
         """
         options = implicit_options(self, damping, pic, nmd, quasi_static, ghost)
         longest = positive("dt", dt, "s")
-        interval = None if every is None else positive("every", every, "s")
-        if not (np.isfinite(until) and until >= self.time):
-            raise InputError(f"until is {until} s, expected a time not before the present, {self.time} s")
-        return run_implicit(self, solver or Newton(), options, until=until, dt=longest, interval=interval)
+        times = report_times(self, until, every, since)
+        return run_implicit(
+            self, solver or Newton(), options, times=times, dt=longest, every_step=every is None, watch=watch
+        )
 
     def equilibrate(
         self,
