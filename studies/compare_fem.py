@@ -14,7 +14,9 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
+from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
+from common.page import Page
 from common.plots import Quantity
 from common.ranks import run_study
 from common.slope_case import (
@@ -166,6 +168,11 @@ def draw_fields(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float, fo
                       f"{unit_weight / 1e3:g} kN/m$^3$, cells of {case.args.cell_size:g} m")  # fmt: skip
 
 
+def frames_of(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float) -> tuple[dict | None, dict | None]:
+    """Finite elements and particles for the page, under one unit weight. Collective."""
+    return fem_frame(case.model, fem, unit_weight / 1e3), particle_frame(case.model, unit_weight / 1e3)
+
+
 def draw_convergence(rows: list[dict], sizes: list[float], folder: Path) -> None:
     """Differences over the mesh size, in logarithmic axes."""
     for key, label, name in (
@@ -187,7 +194,7 @@ def main(arguments: list[str] | None = None) -> int:
     folder = results_folder("compare_fem", a.output, comm)
     sizes = mesh_sizes(a)
     fems = finite_elements(a)
-    rows = []
+    rows, frames = [], []
     for unit_weight, fem in fems.items():
         for size in sizes:
             row, case = compared(a, fem, size, unit_weight)
@@ -195,6 +202,7 @@ def main(arguments: list[str] | None = None) -> int:
             if comm.rank == 0:
                 print(line(row), flush=True)
         draw_fields(case, fem, unit_weight, folder)
+        frames.append(frames_of(case, fem, unit_weight))
     if comm.rank == 0:
         draw_convergence(rows, sizes, folder)
     finest = {f"{row['unit_weight']:g}": row for row in rows if row["cell_size_m"] == sizes[-1]}
@@ -210,7 +218,9 @@ def main(arguments: list[str] | None = None) -> int:
         "comparisons": rows,
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm)
+    scene = case.scene() if frames else None
+    movies = [Movie(name, scene, shown) for name, shown in zip(("FEM", "MPM"), zip(*frames))] if scene else []
+    write_summary(folder, a, summary, comm, Page(movies=movies, slider=("unit weight", "kN/m\u00b3")))
     if comm.rank == 0:
         print(f"results in {folder}")
     return 0

@@ -14,7 +14,9 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_curves
+from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_number, add_switch, study_parser
+from common.page import Page
 from common.plots import save_history
 from common.ranks import run_study
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
@@ -59,7 +61,7 @@ def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
     """Give the particles the equilibrium under a unit weight; None for zero, which needs none."""
     if unit_weight == 0:
         return None
-    fem = soil_fem(case)
+    case.fem = fem = soil_fem(case)
     fem.solve(weight(unit_weight))
     case.model.set_gravity((0.0, -GRAVITY * unit_weight / case.args.unit_weight))
     report = bridge.initialise(case.model, fem, move=case.args.move)
@@ -67,8 +69,8 @@ def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
     return report
 
 
-def slide(case: SlopeCase, toe: float, crest_id: int) -> np.ndarray:
-    """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]."""
+def slide(case: SlopeCase, toe: float, crest_id: int) -> tuple[np.ndarray, list[dict]]:
+    """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]; and frames."""
     a, particles = case.args, case.model.particles
 
     def farthest() -> float:
@@ -78,10 +80,11 @@ def slide(case: SlopeCase, toe: float, crest_id: int) -> np.ndarray:
         mine = particles.displacement[particles.id == crest_id]
         return comm.allreduce(float(np.linalg.norm(mine)))
 
-    rows = [(0.0, farthest(), crest())]
+    rows, frames = [(0.0, farthest(), crest())], [particle_frame(case.model, 0.0)]
     for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping):
         rows.append((report.time, farthest(), crest()))
-    return np.array(rows)
+        frames.append(particle_frame(case.model, report.time))
+    return np.array(rows), frames
 
 
 def run(a: Namespace, share: float, unit_weight: float) -> dict:
@@ -90,11 +93,17 @@ def run(a: Namespace, share: float, unit_weight: float) -> dict:
     toe = comm.allreduce(case.model.particles.position[:, 0].max(initial=-np.inf), MPI.MAX)
     crest_id = case.crest_particle()
     report = hand_over(case, unit_weight)
-    history = slide(case, toe, crest_id)
+    particles = case.model.particles
+    undeformed = (
+        particles.initial_position if a.move else particles.position
+    )  # where the particles are in the FEM's body
+    before = fem_frame(case.model, case.fem, 0.0, undeformed) if case.fem else None
+    history, frames = slide(case, toe, crest_id)
     if comm.rank == 0:
         print(f"handed over at {share:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
               file=sys.stderr, flush=True)  # fmt: skip
-    return {"share": share, "unit_weight": unit_weight, "report": report, "history": history}
+    return {"share": share, "unit_weight": unit_weight, "report": report, "history": history, "frames": frames,
+            "before": before, "scene": case.scene()}  # fmt: skip
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
@@ -110,6 +119,18 @@ def draw(runs: list[dict], folder: Path) -> None:
     crest = {f"{run['share']:.0%}": run["history"][:, 2] for run in runs}
     save_history(folder / "crest_over_time.png", runs[0]["history"][:, 0], crest, "Displacement of the particle at the crest [m]",
                  limits=(0, 1.08 * max(curve.max() for curve in crest.values())))  # fmt: skip
+
+
+def movies(runs: list[dict]) -> list[Movie]:
+    """The slides from nothing and from the latest hand-over, and the finite elements at that hand-over."""
+    first, last = runs[0], runs[-1]
+    return [
+        *(
+            Movie(f"MPM, handed over at {run['share']:.0%} of collapse", run["scene"], run["frames"])
+            for run in (first, last)
+        ),
+        Movie(f"FEM at {last['share']:.0%} of collapse", last["scene"], [last["before"]]),
+    ]
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -132,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
         "handovers": [told(run) for run in runs],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm)
+    write_summary(folder, a, summary, comm, Page(movies=movies(runs) if comm.rank == 0 else ()))
     if comm.rank == 0:
         tell(summary, folder)
     return 0

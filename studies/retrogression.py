@@ -16,7 +16,9 @@ import numpy as np
 from common.animation import Frame, save_animation
 from common.history import History
 from common.interrupt import Interrupt
+from common.movie import Movie, particle_frame
 from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
+from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, save_history, save_particles
 from common.progress import Progress
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
@@ -92,8 +94,7 @@ class Slide:
     cell_size: float
     history: History
     ratio: float
-    frames: list[Frame] = field(default_factory=list)
-    displacement: list[np.ndarray] = field(default_factory=list)
+    frames: list[dict] = field(default_factory=list)
     stopped: str | None = None
     at_rest: bool = False
 
@@ -108,11 +109,9 @@ class Slide:
             time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=front - self.case.toe,
             kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share, dt_s=report.dt,
         )  # fmt: skip
-        parts = comm.gather((p.position, p.volume, p.plastic_strain, moved))
-        if parts is not None:
-            position, volume, strain, moved = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-            self.frames.append(Frame(report.time, position, volume, strain))
-            self.displacement.append(moved.astype(np.float32))
+        frame = particle_frame(self.case.model, report.time)
+        if frame is not None:
+            self.frames.append(frame)
 
 
 def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> Slide:
@@ -145,22 +144,24 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(result: Slide, folder: Path) -> None:
-    """Shear strain at four times, displacement in the end, and a film; on the first rank."""
+def draw(result: Slide, folder: Path) -> Movie | None:
+    """Shear strain at four times, displacement in the end, and a film; on the first rank. Returns the film for the page."""
     scene = result.case.scene()
     if scene is None:
-        return
+        return None
     shown = np.unique(np.linspace(0, len(result.frames) - 1, 5).astype(int)[1:])
     for k in shown:
         f = result.frames[k]
-        title = f"$t$ = {f.time:.1f} s, cells of {result.cell_size:g} m"
-        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f.position, f.volume, f.values,
-                       SHEAR_STRAIN, limits=(0, 2), title=title)  # fmt: skip
+        title = f"$t$ = {f['time']:.1f} s, cells of {result.cell_size:g} m"
+        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f["position"], f["volume"],
+                       f["shear_strain"], SHEAR_STRAIN, limits=(0, 2), title=title)  # fmt: skip
     last = result.frames[-1]
-    save_particles(folder / f"displacement_{result.cell_size:g}.png", scene, last.position, last.volume,
-                   result.displacement[-1], DISPLACEMENT, title=f"$t$ = {last.time:.1f} s")  # fmt: skip
+    save_particles(folder / f"displacement_{result.cell_size:g}.png", scene, last["position"], last["volume"],
+                   last["displacement"], DISPLACEMENT, title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
     name = f"retrogression_{result.cell_size:g}".replace(".", "_")  # what follows a point would be taken for the suffix
-    save_animation(folder / name, scene, result.frames, SHEAR_STRAIN, limits=(0, 2))
+    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
+    save_animation(folder / name, scene, film, SHEAR_STRAIN, limits=(0, 2))
+    return Movie(f"cells of {result.cell_size:g} m", scene, result.frames)
 
 
 def compare(results: list[Slide], folder: Path) -> None:
@@ -186,12 +187,12 @@ def main(arguments: list[str] | None = None) -> int:
     a = p.parse_args(arguments)
     check_slope_options(p, a)
     folder = results_folder("retrogression", a.output, comm)
-    results = []
+    results, movies = [], []
     with Interrupt(comm) as interrupt:
         for size in [a.cell_size, a.cell_size / 2][: 1 if a.meshes == "one" else 2]:
             if not interrupt.requested():
                 results.append(slide(a, size, folder, interrupt))
-                draw(results[-1], folder)
+                movies.append(draw(results[-1], folder))
         compare(results, folder)
     found = {
         f"{r.cell_size:g}_m": {
@@ -202,7 +203,7 @@ def main(arguments: list[str] | None = None) -> int:
         for r in results
     }  # fmt: skip
     stopped = any(r.stopped for r in results)
-    write_summary(folder, a, {"finished_run": not stopped, "cells": found}, comm)
+    write_summary(folder, a, {"finished_run": not stopped, "cells": found}, comm, Page(movies=movies))
     if comm.rank == 0:
         for result in results:
             if result.stopped:

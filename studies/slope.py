@@ -17,8 +17,10 @@ from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
+from common.movie import Movie, fem_frame
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
+from common.page import Page
 from common.plots import (
     DISPLACEMENT,
     SHEAR_STRAIN,
@@ -30,7 +32,6 @@ from common.plots import (
 )
 from common.progress import Progress
 from common.ranks import run_study
-from common.report import Movie, Report, save_report
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import OutputError, results_folder, write_summary
@@ -132,7 +133,7 @@ def slide(
             dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
         files.write(report.time, fields)
-        watch.keep(report.time, fields)
+        watch.keep(report.time)
         progress.show(report.time, report.steps, crest=f"{crest:.4f} m")
 
     def between_steps() -> bool:
@@ -194,12 +195,14 @@ def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
     save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
 
 
-def write_page(case: SlopeCase, watch: Watch, history: History, folder: Path, summary: dict) -> None:
-    """The page ``report.html``, on the first rank."""
-    scene = case.scene()
-    if scene is None:
-        return
-    quantities = {"shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS}
+def page(case: SlopeCase, watch: Watch, summary: dict) -> Page:
+    """What the page ``report.html`` shows beside figures and tables. Collective."""
+    a, scene = case.args, case.scene()
+    movies = [Movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, watch.frames)]
+    if case.fem is not None:
+        before = fem_frame(case.model, case.fem, 0.0, case.model.particles.initial_position)
+        title = f"FEM, equilibrium under {a.initial_unit_weight / 1e3:g} kN/m\u00b3 before the slide"
+        movies.append(Movie(title, scene, [before]))
     captions = {
         "figure_2_mesh": "Background mesh and particles at the start", "figure_3_displacement": "Total displacement at the end",
         "figure_4_shear_strain": "Accumulated plastic shear strain at the end",
@@ -210,18 +213,9 @@ def write_page(case: SlopeCase, watch: Watch, history: History, folder: Path, su
         "simulated": f"{summary['time_s']:.4g} s", "particles": f"{summary['particles']:,}",
         "computing time": f"{summary['wall_seconds']['slide']:.3g} s",
     }  # fmt: skip
-    save_report(folder / "report.html", Report(
-        title="A slope slides",
-        subtitle=f"{case.args.height:g} m high, inclined by {case.args.angle:g} degrees, unit weight "
-                 f"{case.args.unit_weight / 1e3:g} kN/m\u00b3. Initial stresses: {case.args.initial}; slide by the "
-                 f"{case.args.scheme} material point method.",
-        facts=facts,
-        movies=[Movie("", scene, watch.frames, quantities)],
-        history=history,
-        figures={folder / f"{name}.png": caption for name, caption in captions.items()},
-        parameters=case.args.parameters(),
-        results={name: value for name, value in summary.items() if isinstance(value, (int, float))},
-    ))  # fmt: skip
+    subtitle = (f"{a.height:g} m high, inclined by {a.angle:g} degrees, unit weight {a.unit_weight / 1e3:g} kN/m\u00b3. Initial "
+                f"stresses: {a.initial}; slide by the {a.scheme} material point method.")  # fmt: skip
+    return Page(movies=movies if scene else (), facts=facts, subtitle=subtitle, captions=captions)
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -276,8 +270,7 @@ def main(arguments: list[str] | None = None) -> int:
         "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }
-    write_summary(folder, a, summary, comm)
-    write_page(case, watch, history, folder, summary)
+    write_summary(folder, a, summary, comm, page(case, watch, summary))
     if comm.rank == 0:
         tell(summary, folder)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)

@@ -14,7 +14,9 @@ from time import process_time
 
 import matplotlib.pyplot as plt
 import numpy as np
+from common.movie import Movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
+from common.page import Page
 from common.plots import (
     CURVES,
     DISPLACEMENT,
@@ -43,6 +45,8 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 AT_REST = 0.01
 """Share of the last displacement of the crest that it may still move by."""
+FRAMES = 40
+"""Of each run on the page."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -89,7 +93,7 @@ class Run:
 
     name: str
     curve: list[tuple[float, float]] = field(default_factory=list)
-    frame: dict | None = None
+    frames: list[dict] = field(default_factory=list)
     steps: int = 0
     iterations: int = 0
     cpu_seconds: float = 0.0
@@ -116,6 +120,8 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
     dt = None if multiple is None else multiple * case.model.critical_time_step()
     options = Namespace(**{**vars(a), "scheme": scheme, "solver": solver, "dt": dt, "time": until})
     run.curve.append((0.0, 0.0))
+    watch.keep(0.0)
+    kept = 1 / FRAMES
     with Progress(name, until, comm) as progress:
         started = process_time()
         try:
@@ -126,12 +132,15 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
                 run.unbalanced_ratio = report.unbalanced_ratio
                 run.iterations += getattr(report, "iterations", 0)
                 progress.show(report.time, report.steps, crest=f"{run.curve[-1][1]:.4f} m")
+                if run.curve[-1][0] >= kept * until:
+                    watch.keep(report.time)
+                    kept += 1 / FRAMES
                 started = process_time()
         except mpm.RunError as error:
             run.stopped = str(error)
     run.cpu_seconds, run.steps = comm.allreduce(run.cpu_seconds), case.model.steps
-    watch.keep(case.model.time, watch.fields())
-    run.frame = watch.frames[0] if watch.frames else None
+    watch.keep(case.model.time)
+    run.frames = watch.frames
     return run, case.scene()
 
 
@@ -140,18 +149,19 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
 
 def save_pair(path: Path, scene: Scene, runs: list[Run], key: str, quantity: Quantity) -> None:
     """The soil at rest by two schemes, side by side, in one colour scale."""
-    limits = colour_limits(quantity, [run.frame[key] for run in runs])
-    lower, upper = scene.limits([run.frame["position"] for run in runs])
+    last = {run.name: run.frames[-1] for run in runs}
+    limits = colour_limits(quantity, [frame[key] for frame in last.values()])
+    lower, upper = scene.limits([frame["position"] for frame in last.values()])
     with paper_style():
         figure, panels = plt.subplots(1, len(runs), figsize=(1.3 * WIDTH, 3.1), sharey=True)
         figure.subplots_adjust(left=0.06, right=0.99, bottom=0.27, top=0.95, wspace=0.04)
-        for axes, run in zip(panels, runs):
+        for axes, (name, frame) in zip(panels, last.items()):
             axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal", xlabel="$x$ [m]")
             draw_scene(axes, scene)
-            drawn = discs(axes, run.frame["position"], run.frame["volume"], cmap=quantity.colours, norm=Normalize(*limits),
+            drawn = discs(axes, frame["position"], frame["volume"], cmap=quantity.colours, norm=Normalize(*limits),
                           linewidths=0)  # fmt: skip
-            drawn.set_array(quantity.scale * run.frame[key])
-            axes.set_title(f"{run.name}, $t$ = {run.frame['time']:.1f} s", loc="left")
+            drawn.set_array(quantity.scale * frame[key])
+            axes.set_title(f"{name}, $t$ = {frame['time']:.1f} s", loc="left")
         panels[0].set_ylabel("$y$ [m]")
         draw_bar(figure, figure.add_axes((0.3, 0.12, 0.4, 0.03)), quantity, limits, has_less=limits[0] != 0.0)
         figure.savefig(path)
@@ -212,7 +222,9 @@ def main(arguments: list[str] | None = None) -> int:
     for row in table.values():
         row["over_explicit"] = row["crest_displacement_m"] / reference
     draw(runs, scene, folder)
-    write_summary(folder, a, {"runs": table}, comm)
+    names = dict(zip(table, runs))
+    movies = [Movie(name, scene, run.frames) for name, run in names.items()] if scene else []
+    write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]))
     if comm.rank == 0:
         tell(table, folder)
     return 1 if any(run.stopped for run in runs) else 0

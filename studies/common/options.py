@@ -28,8 +28,9 @@ from .parameters import Parameter, ParameterError, described, read_parameters
 class Options(argparse.Namespace):
     """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings."""
 
-    __slots__ = ("actions", "study")
+    __slots__ = ("actions", "description", "study")
     actions: list[argparse.Action]
+    description: str
     study: str
 
     def parameters(self) -> list[Parameter]:
@@ -51,6 +52,7 @@ class _Parser(argparse.ArgumentParser):
                 self.error(str(error))
         options = Options()
         options.actions, options.study = self._actions, self.prog.split()[-1]
+        options.description = self.description or options.study
         return super().parse_args(args, options)
 
     def _print_message(self, message: str, file=None) -> None:
@@ -73,7 +75,7 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
         "--output", type=Path, default=None, metavar="DIR", help="folder for the results (default: results/NAME)"
     )
     parser.add_argument(
-        "--parameters", type=Path, default=None, metavar="FILE",
+        "--parameters", type=Path, default=None, metavar="FILE", dest="parameters_file",
         help="TOML file with options, such as parameters.toml of an earlier run; the command line wins over it",
     )  # fmt: skip
     return parser

@@ -11,7 +11,7 @@ from typing import Any
 
 import tomllib
 
-NOT_PARAMETERS = ("help", "output", "parameters", "restart")
+NOT_PARAMETERS = ("help", "output", "parameters_file", "restart")
 """Options that say where things are, not what is computed; they do not belong into a file of parameters."""
 
 

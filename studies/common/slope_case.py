@@ -74,6 +74,8 @@ class SlopeCase:
     facet_tags: object
     soil: object
     model: mpm.Model
+    fem: bridge.QuasiStatic | None = None
+    """Finite elements that the particles had their stresses from."""
 
     @property
     def toe(self) -> float:
@@ -163,7 +165,7 @@ def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float])
     Displacements count from the state that is handed over. Collective.
     """
     model = case.model
-    fem = solved_fem(case, unit_weight)
+    case.fem = fem = solved_fem(case, unit_weight)
     model.set_gravity(gravity)
     report = bridge.initialise(model, fem, count_displacement=False)
     model.set_gravity((0.0, -GRAVITY))

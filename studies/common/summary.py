@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .options import Options
+from .page import Page, write_page
 from .parameters import write_parameters
 
 ROOT = Path(__file__).parents[2]
@@ -90,17 +91,23 @@ def git_revision() -> str:
 
 
 def write_summary(
-    folder: Path, options: Namespace, results: Mapping[str, object], comm: MPI.Comm = MPI.COMM_WORLD
+    folder: Path,
+    options: Namespace,
+    results: Mapping[str, object],
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    page: Page | None = None,
 ) -> None:
     """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names.
 
-    The options also go to ``parameters.toml``, by which the run can be repeated. ``summary.json`` appears as a whole or not
-    at all. Call it on every rank; the first one writes.
+    The options also go to ``parameters.toml``, by which the run can be repeated, and everything to the page ``report.html``.
+    ``summary.json`` and the page appear as a whole or not at all. Call it on every rank, when all figures and tables are
+    written; the first rank writes.
 
     Args:
         folder: as ``results_folder`` gave it.
         options: of the study, as parsed.
         results: numbers, texts, lists or mappings of these, NumPy's too, by name (names end in their unit: ``_m``).
+        page: what the study adds to its page, such as moving particles.
     """
     if comm.rank != 0:
         return
@@ -117,6 +124,8 @@ def write_summary(
     os.replace(aside, folder / "summary.json")
     if isinstance(options, Options):
         write_parameters(folder / "parameters.toml", options.parameters(), options.study)
+        told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in summary["versions"].items())
+        write_page(folder, options, results, page, f"{told}; {comm.size} rank(s); {summary['finished']}")
 
 
 def _plain(value: object) -> object:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from .movie import particle_frame
 from .slope_case import SlopeCase
 
 
@@ -35,16 +36,8 @@ class Watch:
         """Advance of the farthest particle past where the farthest one started [m]. Collective."""
         return self.model.comm.allreduce(fields["position"][:, 0].max(initial=-np.inf), MPI.MAX) - self.first_toe
 
-    def keep(self, time: float, fields: dict[str, np.ndarray]) -> None:
+    def keep(self, time: float) -> None:
         """Store a frame for the pictures, on the first rank. Collective."""
-        shown = {
-            "position": fields["position"], "volume": fields["volume"], "id": fields["id"],
-            "displacement": np.linalg.norm(fields["displacement"], axis=1),
-            # Plastic, because elastic oscillations during the long creep add up in the total.
-            "shear_strain": fields["plastic_strain"], "vertical_stress": fields["stress"][:, 1],
-        }  # fmt: skip
-        single = {name: values if name == "id" else values.astype(np.float32) for name, values in shown.items()}
-        parts = self.model.comm.gather(single)
-        if parts is not None:
-            frame = {name: np.concatenate([part[name] for part in parts]) for name in shown}
-            self.frames.append({"time": np.float64(time), **frame})
+        frame = particle_frame(self.model, time)
+        if frame is not None:
+            self.frames.append(frame)

@@ -14,6 +14,7 @@ from time import perf_counter
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
 from common.options import add_flag, check, study_parser
+from common.parameters import write_parameters
 from common.ranks import run_study
 from common.summary import ROOT, OutputError, results_folder
 from mpi4py import MPI
@@ -36,8 +37,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     add_flag(p, "--quick", "small sizes, as the tests run them; tolerances are wider where sizes matter")
     add_flag(p, "--docs", "also write docs/verification.md with its table and pictures")
     options = p.parse_args(arguments)
-    options.cases = [name.strip() for name in options.cases.split(",")]
-    for name in options.cases:
+    for name in options.cases.split(","):
         check(p, name in CASES, f"--cases names '{name}', expected some of {', '.join(CASES)}")
     check(p, not (options.docs and options.quick), "--docs needs the full sizes, without --quick")
     return options
@@ -67,15 +67,17 @@ def run_case(name: str, group: str, quick: bool, folder: Path) -> CaseRow:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     folder = results_folder("verification", a.output, comm)
-    table = Table.begun(a.quick, comm.size)
-    for k, name in enumerate(a.cases, 1):
+    if comm.rank == 0:
+        write_parameters(folder / "parameters.toml", a.parameters(), a.study)
+    table, names = Table.begun(a.quick, comm.size), a.cases.split(",")
+    for k, name in enumerate(names, 1):
         if comm.rank == 0:
-            print(f"[{k}/{len(a.cases)}] {name}", flush=True)
+            print(f"[{k}/{len(names)}] {name}", flush=True)
         group = next(group for group, names in GROUPS.items() if name in names)
         table.cases.append(run_case(name, group, a.quick, folder))
         if comm.rank == 0:
             save_table(folder / "verification.json", table)
-            save_page(folder, table)
+            save_page(folder, table, a.parameters())
     if comm.rank == 0:
         if a.docs:
             save_docs(ROOT / "docs", folder, table)

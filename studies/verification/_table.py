@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
 from _case import Result
+from common.parameters import Parameter
 from common.report import Report, save_report
 from common.report_sections import Section
 from common.summary import versions
@@ -139,7 +141,7 @@ def read_table(path: Path) -> Table:
 # --- pages ---------------------------------------------------------------------------------------------------------
 
 
-def save_page(folder: Path, table: Table) -> None:
+def save_page(folder: Path, table: Table, parameters: Sequence[Parameter] = ()) -> None:
     """Write report.html; the pictures are in a folder for each case."""
     sections = []
     for case in table.cases:
@@ -161,7 +163,7 @@ def save_page(folder: Path, table: Table) -> None:
     head = Section("All cases", "", ("Group", "Case", "Checks", "Pass", "Known limits", "Fail", "Took"), rows, wrong)
     save_report(folder / "report.html", Report(
         "Verification and validation", table.summary(), {"of all checks" if table.passed else "at least one": "pass" if
-        table.passed else "FAIL"}, sections=[head, *sections], footer=_made(table),
+        table.passed else "FAIL"}, sections=[head, *sections], parameters=parameters, footer=_made(table),
     ))  # fmt: skip
 
 

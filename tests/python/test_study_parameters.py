@@ -45,7 +45,7 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
     write_parameters(tmp_path / "parameters.toml", first.parameters(), first.study)
     second = parser().parse_args(["--parameters", str(tmp_path / "parameters.toml")])
     different = {name for name, value in vars(second).items() if value != getattr(first, name)}
-    assert different == {"output", "parameters"}
+    assert different == {"output", "parameters_file"}
     text = (tmp_path / "parameters.toml").read_text()
     assert "studies/run slope --parameters" in text
     assert "cell-size = 0.30000000000000004  # side of the squares [m]" in text

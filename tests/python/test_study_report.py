@@ -12,10 +12,10 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studies.common.history import History
+from studies.common.movie import Movie
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene
-from studies.common.report import Movie, Report, save_report
+from studies.common.report import Report, save_report
 
 webdriver = pytest.importorskip("selenium.webdriver")
 pytestmark = pytest.mark.skipif(
@@ -46,13 +46,11 @@ def page(tmp_path_factory):
     quantities = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN}
     movies = [Movie("MPM", scene, list(frames()), quantities), Movie("FEM", scene, list(frames())[:1], quantities)]
     Image.new("RGB", (8, 8), "red").save(folder / "figure.png")
-    with History(folder / "history.csv", ["time_s", "crest_displacement_m"]) as history:
-        for t in TIMES:
-            history.add(time_s=t, crest_displacement_m=0.5 * t)
-        save_report(folder / "report.html", Report(
-            "Shear </script> & <b>", "A block", {"moved": "1 m"}, movies, history, {folder / "figure.png": "A figure"},
-            [Parameter("height", 1.0, "m", "height of the block")], {"steps": 10},
-        ))  # fmt: skip
+    save_report(folder / "report.html", Report(
+        "Shear </script> & <b>", "A block", {"moved": "1 m"}, movies, figures={folder / "figure.png": "A figure"},
+        curves={"History": {"time_s": TIMES, "crest_displacement_m": 0.5 * TIMES}},
+        parameters=[Parameter("height", 1.0, "m", "height of the block")], results={"steps": 10},
+    ))  # fmt: skip
     (folder / "figure.png").unlink()  # the page must not need it
     return folder / "report.html"
 
@@ -70,12 +68,16 @@ def browser(page):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=webdriver.chrome.service.Service(shutil.which("chromedriver")))
-    driver.get(page.as_uri())
-    end = time.monotonic() + 20
-    while not driver.execute_script("return Boolean(window.page)") and time.monotonic() < end:
-        time.sleep(0.05)
+    open_page(driver, page)
     yield driver
     driver.quit()
+
+
+def open_page(browser, page):
+    browser.get(page.as_uri())
+    end = time.monotonic() + 20
+    while not browser.execute_script("return Boolean(window.page)") and time.monotonic() < end:
+        time.sleep(0.05)
 
 
 def move_slider(browser, frame):
@@ -179,3 +181,43 @@ def test_both_panels_show_the_same_part_and_the_curves_follow(browser):
     assert [k for _, _, k in views] == [5, 0]
     assert browser.execute_script("return document.querySelector('.curve output').textContent") == "0.5 m"
     assert browser.get_log("browser") == []
+
+
+# --- 100,000 particles -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory):
+    """A page with 100,000 particles that move to the right, each by its height, within ten frames."""
+    x, y = (c.ravel() for c in np.meshgrid((np.arange(500) + 0.5) / 100, (np.arange(200) + 0.5) / 100))
+    still = {"volume": np.full(x.size, 1e-4), "id": np.arange(x.size)}
+    moving = [
+        {"time": t, **still, "position": np.c_[x + t * y, y], "displacement": t * y, "shear_strain": t * y**2}
+        for t in np.linspace(0, 1, 10)
+    ]
+    scene = Scene(np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 2.0), (0.0, 2.0)]), np.array([(0, 1, 2), (0, 2, 3)]))
+    path = tmp_path_factory.mktemp("large") / "report.html"
+    quantities = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN}
+    save_report(path, Report("A large block", movies=[Movie("MPM", scene, moving, quantities)]))
+    return path
+
+
+def test_a_hundred_thousand_particles(browser, page, large):
+    open_page(browser, large)
+    assert browser.get_log("browser") == []
+    before, after = [], []
+    for frame, found in ((0, before), (9, after)):
+        move_slider(browser, frame)
+        found.append(picture(browser))
+        found.append(browser.execute_script("return page.player.views[0].screenOf(99999)"))
+    assert browser.execute_script("return page.player.views[0].movie.count") == 100_000
+    assert len(np.unique(after[0].reshape(-1, 3), axis=0)) > 100  # not blank
+    assert np.mean((before[0] != after[0]).any(axis=2)) > 0.05
+    scale = browser.execute_script("return page.player.views[0].s")
+    assert after[1][0] - before[1][0] == pytest.approx(1.995 * scale, rel=1e-3)
+    frame_ms = browser.execute_script(
+        "const p = page.player, start = performance.now(); for (let k = 0; k < 5; k++) p.show(0.1 * k);"
+        "return (performance.now() - start) / 5"
+    )
+    print(f"\n100,000 particles: {frame_ms:.0f} ms per frame, page of {large.stat().st_size / 1e6:.1f} MB")
+    open_page(browser, page)

@@ -6,15 +6,7 @@ async function start() {
   const movies = [];
   for (const movie of data.movies) movies.push(await readMovie(movie));
   const player = movies.length ? new Player(data, movies) : null;
-  if (data.history) {
-    const section = document.getElementById("curves");
-    section.hidden = false;
-    const choose = (time) => { if (player) { player.pause(); player.show(player.times[player.nearest(time)]); } };
-    const curves = data.history.curves.map((curve) => new Curve(curve, data.history.times, section.querySelector(".grid"), choose));
-    const follow = (time) => curves.forEach((curve) => curve.show(time));
-    if (player) player.listeners.push(follow);
-    follow(player ? player.time : data.history.times.at(-1));
-  }
+  for (const table of data.curves) drawCurves(table, document.getElementById("curves"), player);
   const large = document.getElementById("large");
   for (const image of document.querySelectorAll("figure img")) {
     image.onclick = () => { large.querySelector("img").src = image.src; large.showModal(); };

@@ -76,7 +76,8 @@ class Player {
   show(time) {
     this.time = Math.min(Math.max(time, this.times[0]), this.times.at(-1));
     this.find("time").value = this.nearest(this.time);
-    this.find("clock").textContent = `t = ${this.time.toFixed(this.decimals())} s`;
+    const [name, unit] = this.data.slider;
+    this.find("clock").textContent = `${name} = ${this.time.toFixed(this.decimals())} ${unit}`;
     this.listeners.forEach((listener) => listener(this.time));
     this.draw();
   }

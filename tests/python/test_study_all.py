@@ -1,0 +1,114 @@
+"""What holds for every study: its help, the file that repeats a run, and the page of a run."""
+
+import importlib
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).parents[2] / "studies"
+sys.path.insert(0, str(STUDIES))
+
+SMALL = {
+    "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
+    "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
+    "element_test": "--steps 5",
+    "footing": "--cell-size 0.25 --meshes 1 --elements P1",
+    "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
+    "locking": "--divisions 2 --meshes 1 --reference-divisions 4",
+    "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
+    "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
+    "scaling": "--side-2d 4 --side-3d 2 --steps 2",
+    "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
+    "slope_schemes": "--time 0.1 --implicit-time 0.05 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 "
+    "--longer-steps 1",
+    "verification": "--quick --cases column",
+}
+"""Each study at a size that takes a second or less; a new study needs its line here."""
+WITH_PARTICLES = ("compare_fem", "handover", "retrogression", "slope", "slope_schemes")
+NAMES = sorted(
+    [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
+)
+TIMED = re.compile("seconds|date$|per_second|finished$|versions|^output$|^parameters_file$")
+
+
+def main(name, arguments):
+    """Run a study in this process."""
+    if (STUDIES / f"{name}.py").exists():
+        module = importlib.import_module(name)
+    else:
+        sys.path.insert(0, str(STUDIES / name))
+        spec = importlib.util.spec_from_file_location(f"{name}_main", STUDIES / name / "__main__.py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    program, sys.argv[0] = sys.argv[0], f"{name}.py"
+    try:
+        return module.main([str(word) for word in arguments])
+    finally:
+        sys.argv[0] = program
+
+
+def untimed(value):
+    """Results without what depends on the computer's clock, and on where the results are."""
+    if isinstance(value, dict):
+        return {key: untimed(one) for key, one in value.items() if not TIMED.search(key)}
+    return [untimed(one) for one in value] if isinstance(value, list) else value
+
+
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory):
+    """Folder and exit code of a small run of a study; run once."""
+    known = {}
+
+    def run(name):
+        if name not in known:
+            folder = tmp_path_factory.mktemp(name)
+            known[name] = folder, main(name, [*SMALL[name].split(), "--output", folder])
+        return known[name]
+
+    return run
+
+
+def test_every_study_is_run_here():
+    assert sorted(SMALL) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_gives_units_and_defaults(name, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(name, ["--help"])
+    assert ended.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"usage: studies/run {name}" in text
+    numbers = re.findall(r"--[a-z0-9-]+ X (.*?)(?= --[a-z]|$)", text)
+    without_unit = [line for line in numbers if "[" not in line]
+    assert without_unit == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_is_repeated_by_its_file_of_parameters(name, first_run, tmp_path):
+    folder, code = first_run(name)
+    assert code == 0
+    text = (folder / "parameters.toml").read_text()
+    assert f"studies/run {name} --parameters" in text
+    assert main(name, ["--parameters", folder / "parameters.toml", "--output", tmp_path]) == 0
+    assert (tmp_path / "parameters.toml").read_text() == text
+    summary = "verification.json" if name == "verification" else "summary.json"
+    one, other = (untimed(json.loads((place / summary).read_text())) for place in (folder, tmp_path))
+    assert one == other
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_has_everything_in_it(name, first_run):
+    folder, _ = first_run(name)
+    page = (folder / "report.html").read_text()
+    assert "http://" not in page.replace("http://www.w3.org/2000/svg", "") and "https://" not in page
+    assert page.count("data:image/png") >= len(list(folder.glob("*.png")))
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))
+    assert bool(data["movies"]) == (name in WITH_PARTICLES)
+    for movie in data["movies"]:
+        assert movie["count"] > 0 and {"x", "y", "displacement", "vertical_stress"} <= set(movie["fields"])
+    options = re.findall(r"^([a-z0-9-]+) = ", (folder / "parameters.toml").read_text(), re.MULTILINE)
+    assert options and all(f'<td class="name">{option}</td>' in page for option in options)
