@@ -106,7 +106,7 @@ Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index 
     return {0, 0};
   const Workspace<D>& work = model.work;
   return damped_inertia(work.nodes[node].mass, work.start_velocity[node][component], work.velocity[node][component],
-                        step.dt, step.options.damping);
+                        step.dt, step.options.damping, step.frequency[node]);
 }
 
 template <int D>
@@ -127,6 +127,10 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   map_to_nodes(model); // (11), (15)
   find_start_velocity(model);
   find_active(model, step);
+  if (options.damping > 0)
+    step.frequency = shear_frequencies(model);
+  else
+    step.frequency.assign(work.nodes.size(), 0.0);
   if (options.quasi_static)
     std::fill(work.start_velocity.begin(), work.start_velocity.end(), Vector<D>{});
   if (model.exchange.size > 1 && !step.halos_ready)

@@ -15,7 +15,7 @@ namespace mpm
 {
 struct ImplicitOptions
 {
-  double damping = 0;   ///< local damping alpha, in [0, 1); not used in quasi-static steps
+  double damping = 0;   ///< local damping alpha, in [0, 1), see implicit_inertia.h; not used in quasi-static steps
   double pic_share = 0; ///< in [0, 1]
   bool mixed_discretisation = false;
   GhostOptions ghost;          ///< of the remedy for nodes with hardly any mass
@@ -66,6 +66,7 @@ struct ImplicitStep
   std::vector<GhostFacet<D>> ghosts; ///< stabilised facets
   Halos halos;                       ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
+  std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
   std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
 

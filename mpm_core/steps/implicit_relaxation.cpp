@@ -75,7 +75,10 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
   }
   sum_shared(model.exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] += model.work.nodes[i].mass * inertia / (1 - step.options.damping);
+    rows[i] += step.options.quasi_static
+                   ? 0
+                   : damped_inertia(model.work.nodes[i].mass, 0, 0, step.dt, step.options.damping, step.frequency[i])
+                         .derivative;
   return rows;
 }
 

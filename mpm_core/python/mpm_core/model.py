@@ -174,8 +174,8 @@ class Model(Body):
             watch: called after each step, on all ranks alike; the model may be saved then. When it returns true (on all
                 ranks), the run ends with a report.
             quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
-            damping: local damping alpha, in [0, 1). Acts on the out-of-balance force of the step's end; not in
-                quasi-static runs.
+            damping: local damping alpha, in [0, 1). What it does to elastic oscillations that the step does not resolve
+                acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
             pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
