@@ -17,6 +17,7 @@ from fenics_bridge.limit_analysis import LogSpiral, log_spiral, log_spiral_safet
 from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
+from fenics_bridge.mixed import MixedQuasiStatic
 from fenics_bridge.newton import NewtonReport
 from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
@@ -26,8 +27,8 @@ from fenics_bridge.supports import Support, fixed, prescribed, roller
 # fmt: off
 __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
-    "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "NewtonReport", "PointSearch", "QuasiStatic",
-    "Support", "background_arrays", "background_mesh", "box_mesh", "collapse_load", "compare", "evaluate_at",
+    "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "MixedQuasiStatic", "NewtonReport", "PointSearch",
+    "QuasiStatic", "Support", "background_arrays", "background_mesh", "box_mesh", "collapse_load", "compare", "evaluate_at",
     "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
     "log_spiral", "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",

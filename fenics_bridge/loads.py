@@ -41,10 +41,11 @@ class Load:
 class LoadVectors:
     """Nodal forces of loads on a displacement space; each kind of load is assembled once."""
 
-    def __init__(self, space, facet_tags):
+    def __init__(self, space, facet_tags, test=None):
+        """test: test function of the displacement, where it is only a part of the space."""
         self._space, self._facet_tags = space, facet_tags
         domain, dim = space.mesh, space.mesh.geometry.dim
-        self._test = ufl.TestFunction(space)
+        self._test = ufl.TestFunction(space) if test is None else test
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
         self._weight = assembled(fem.form(ufl.inner(down, self._test) * ufl.dx), space).array.copy()
         self._pressure = {}

@@ -7,6 +7,7 @@ from dolfinx import fem
 
 from fenics_bridge import compat
 from fenics_bridge.averaged import AveragedKinematics
+from fenics_bridge.equilibrium import Body, EquilibriumStep
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import nodal_average
@@ -40,13 +41,14 @@ class QuasiStatic:
         self.domain, self.law, self.facet_tags, self.degree = domain, law, facet_tags, degree
         self.displacement = fem.Function(space, name="displacement")
         self.increment = fem.Function(space, name="increment")
-        self._constraints = Constraints(space, facet_tags, supports)
+        constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags)
         self.points = QuadraturePoints(domain, law.n_state, max(1, 2 * (degree - 1)))
         self.points.reset_state(law)
         self.load, self.converged = Load(), False
-        self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, self._constraints)
-        self._solver = LinearSolver(space, options_prefix)
+        self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, constraints)
+        solver = LinearSolver(space, options_prefix)
+        self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, solver)
 
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
@@ -72,11 +74,11 @@ class QuasiStatic:
         When it does not converge everything is left as it was. newton_options: as for `newton`. Collective.
         """
         law = law or self.law
-        report = newton(_Step(self, load, law), **newton_options)
+        forces = self._loads.forces(load), self._loads.forces(self.load)
+        report = newton(EquilibriumStep(self._body, law, *forces, load.displacement), **newton_options)
         self.converged = report.converged
         if report.converged:
-            self.points.accept()
-            self.displacement.x.array[:] += self.increment.x.array
+            self._body.accept()
             self.load, self.law = load, law
         return report
 
@@ -128,76 +130,3 @@ class QuasiStatic:
         return evaluate_at(
             points, displacement=self.displacement, stress=self.stress_function(smooth), state=self.state_function()
         )
-
-
-class _Step:
-    """One step to equilibrium, as `newton` wants it."""
-
-    def __init__(self, fem_model, load, law):
-        self._model, self._law = fem_model, law
-        self._space = fem_model.displacement.function_space
-        self._comm = fem_model.domain.comm
-        self._n_owned = self._space.dofmap.index_map.size_local * self._space.dofmap.index_map_bs
-        constraints = fem_model._constraints
-        self._fixed = constraints.dofs
-        self._external = fem_model._loads.forces(load)
-        self._scale = None
-        self._moved = load.displacement * constraints.values - fem_model.displacement.x.array[self._fixed]
-        self._base = np.zeros_like(fem_model.increment.x.array)
-        self._correction = fem.Function(self._space)
-
-    def start(self):
-        """The residual at no increment but that of the supports, whose effect is taken by the present tangent."""
-        points, increment = self._model.points, self._model.increment
-        increment.x.array[:] = 0.0
-        increment.x.array[self._fixed] = self._moved
-        self._base[:] = increment.x.array
-        spread = self._model._kinematics.strain_increment()
-        points.update(self._law, np.zeros_like(spread))
-        return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
-
-    def correction(self):
-        matrix = self._model._kinematics.stiffness()
-        return self._model._solver.solve(matrix, self._residual_vector, self._correction)
-
-    def move(self, step):
-        model, points = self._model, self._model.points
-        model.increment.x.array[:] = self._base + step * self._correction.x.array
-        report = points.update(self._law, model._kinematics.strain_increment())
-        if self._comm.allreduce(report.failed):
-            return np.inf
-        return self._residual(points.trial_stress)
-
-    def work(self):
-        n = self._n_owned
-        return self._comm.allreduce(float(np.dot(self._residual_vector.array[:n], self._correction.x.array[:n])))
-
-    def keep(self):
-        self._base[:] = self._model.increment.x.array
-
-    def _residual(self, stress):
-        """Norm of the out-of-balance forces over that of the forces at work."""
-        forces = self._out_of_balance(stress)
-        if self._scale is None:
-            self._scale = self._forces_at_work(forces.array)
-        forces.array[self._fixed] = 0.0
-        self._residual_vector = forces
-        return self._norm(forces.array) / self._scale if self._scale > 0 else 0.0
-
-    def _out_of_balance(self, stress):
-        forces = self._model._kinematics.internal_forces(stress)
-        forces.array[:] = self._external - forces.array
-        return forces
-
-    def _forces_at_work(self, out_of_balance):
-        """Largest norm of the loads before and after the step and of the reactions at its start.
-
-        It is set once: in an iteration that runs away the reactions grow without limit and would hide the residual.
-        """
-        reactions = np.zeros_like(out_of_balance)
-        reactions[self._fixed] = out_of_balance[self._fixed]
-        before = self._model._loads.forces(self._model.load)
-        return max(self._norm(forces) for forces in (self._external, before, reactions))
-
-    def _norm(self, array):
-        return np.sqrt(self._comm.allreduce(float(np.sum(array[: self._n_owned] ** 2))))

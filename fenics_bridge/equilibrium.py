@@ -1,0 +1,106 @@
+"""One step to equilibrium, for any elements, as Newton's method wants it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+
+@dataclass
+class Body:
+    """What a step changes, and by what.
+
+    solution, increment: functions of the unknowns, total and of the step; points: QuadraturePoints
+    kinematics: gives the points' strain, internal forces and stiffness, as `Kinematics`
+    constraints: Constraints on the unknowns; solver: LinearSolver
+    """
+
+    solution: fem.Function
+    increment: fem.Function
+    points: Any
+    kinematics: Any
+    constraints: Any
+    solver: Any
+
+    def accept(self):
+        """The step becomes the last equilibrium."""
+        self.points.accept()
+        self.solution.x.array[:] += self.increment.x.array
+
+
+class EquilibriumStep:
+    """One step of a Body to equilibrium, as `newton` wants it."""
+
+    def __init__(self, body, law, external, before, displacement):
+        """
+        external, before: nodal forces of the loads at the step's end and at its start
+        displacement: share of the displacements that the supports prescribe, at the step's end
+        """
+        self._body, self._law = body, law
+        self._space = body.solution.function_space
+        self._comm = self._space.mesh.comm
+        self._n_owned = self._space.dofmap.index_map.size_local * self._space.dofmap.index_map_bs
+        self._fixed = body.constraints.dofs
+        self._external, self._before = external, before
+        self._scale = None
+        self._moved = displacement * body.constraints.values - body.solution.x.array[self._fixed]
+        self._base = np.zeros_like(body.increment.x.array)
+        self._correction = fem.Function(self._space)
+
+    def start(self):
+        """The residual at no increment but that of the supports, whose effect is taken by the present tangent."""
+        points, increment = self._body.points, self._body.increment
+        increment.x.array[:] = 0.0
+        increment.x.array[self._fixed] = self._moved
+        self._base[:] = increment.x.array
+        spread = self._body.kinematics.strain_increment()
+        points.update(self._law, np.zeros_like(spread))
+        return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
+
+    def correction(self):
+        """Solve the tangent system for the residual; tells whether that worked."""
+        matrix = self._body.kinematics.stiffness()
+        return self._body.solver.solve(matrix, self._residual_vector, self._correction)
+
+    def move(self, step):
+        """Add a share of the correction to the last point of the iteration; returns the residual there."""
+        body, points = self._body, self._body.points
+        body.increment.x.array[:] = self._base + step * self._correction.x.array
+        report = points.update(self._law, body.kinematics.strain_increment())
+        if self._comm.allreduce(report.failed):
+            return np.inf
+        return self._residual(points.trial_stress)
+
+    def work(self):
+        """The residual times the correction."""
+        n = self._n_owned
+        return self._comm.allreduce(float(np.dot(self._residual_vector.array[:n], self._correction.x.array[:n])))
+
+    def keep(self):
+        """Make this the last point of the iteration."""
+        self._base[:] = self._body.increment.x.array
+
+    def _residual(self, stress):
+        """Norm of the out-of-balance forces over that of the forces at work."""
+        forces = self._body.kinematics.internal_forces(stress)
+        forces.array[:] = self._external - forces.array
+        if self._scale is None:
+            self._scale = self._forces_at_work(forces.array)
+        forces.array[self._fixed] = 0.0
+        self._residual_vector = forces
+        return self._norm(forces.array) / self._scale if self._scale > 0 else 0.0
+
+    def _forces_at_work(self, out_of_balance):
+        """Largest norm of the loads before and after the step and of the reactions at its start.
+
+        It is set once: in an iteration that runs away the reactions grow without limit and would hide the residual.
+        """
+        reactions = np.zeros_like(out_of_balance)
+        reactions[self._fixed] = out_of_balance[self._fixed]
+        return max(self._norm(forces) for forces in (self._external, self._before, reactions))
+
+    def _norm(self, array):
+        return np.sqrt(self._comm.allreduce(float(np.sum(array[: self._n_owned] ** 2))))
