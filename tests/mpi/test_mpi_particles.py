@@ -119,3 +119,15 @@ def test_an_error_on_one_rank_is_raised_on_all(comm, phase):
             for _ in model.explicit(1e-4, dt=1e-4, allow_unstable=True):
                 pass
     assert len(set(comm.allgather(str(raised.value)))) == 1
+
+
+def test_points_are_seeded_whoever_owns_their_cells(comm):
+    x = np.linspace(0.1, 3.9, 20)
+    points = np.column_stack([x, np.full(20, 0.21)])
+    model = mpm.Model(
+        spread_box(FLIGHT["counts"], FLIGHT["lengths"], comm, bands), mpm.LinearElastic(young=1e6, poisson=0.2)
+    )
+    assert model.seed_points(points, np.full(20, 1e-3), density=1000.0) == 20
+    np.testing.assert_array_equal(all_by_id(model, ("position",))["position"], points)
+    with pytest.raises(mpm.InputError, match=r"points has \[5\.  0\.1\] at row 1"):
+        model.seed_points([[0.5, 0.1], [5.0, 0.1]], [1e-3, 1e-3], density=1000.0)

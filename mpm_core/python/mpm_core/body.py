@@ -104,7 +104,7 @@ class Body:
             return self._core.seed_points(x, v, self._material(material), rho, self._next_id)
 
         inside = collectively(self.comm, lambda: self._owned(points))
-        total = self.comm.allreduce(inside, MPI.MAX)
+        total = np.any(self.comm.allgather(inside), axis=0)
         if not total.all():
             first = int(np.argmin(total))
             raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")
