@@ -40,13 +40,23 @@ class ElasticSolution:
 
 
 def solve_elastic(
-    domain, facet_tags, supports, young, poisson, unit_weight, degree=1, traction=None, options_prefix="elastic_"
+    domain,
+    facet_tags,
+    supports,
+    young,
+    poisson,
+    unit_weight,
+    degree=1,
+    traction=None,
+    body_force=None,
+    options_prefix="elastic_",
 ):
     """Small-strain equilibrium of a linear elastic body (plane strain or 3D) under its weight and its supports.
 
     supports: from `fixed`, `roller`, `prescribed`; at least enough of them to hold the body
     young: [Pa], poisson: [-], unit_weight: [N/m3], acting against the last axis; degree: 1 or 2 of the displacement
     traction: force per area (D,) [Pa] by facet tag, or None
+    body_force: function of positions (D, n) [m] that returns forces per volume (D, n) [N/m3], or None
     options_prefix: of the PETSc options of the linear solver
     Returns an ElasticSolution. Raises InputError for bad arguments, RuntimeError when the linear solver fails.
     Collective.
@@ -60,7 +70,7 @@ def solve_elastic(
     def internal(u):
         return ufl.inner(elastic_stress(strain(u), *stiffness), strain(v)) * ufl.dx
 
-    load = elastic_load(v, domain, facet_tags, unit_weight, traction or {})
+    load = elastic_load(v, domain, facet_tags, unit_weight, traction or {}, body_force)
     u = _solved(space, constraints, internal(du), lambda u: load - internal(u), options_prefix)
     u.name = "displacement"
     return ElasticSolution(u, cell_function(domain, elastic_stress(strain(u), *stiffness), degree - 1, "stress"))

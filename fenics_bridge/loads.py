@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from fenics_bridge import compat
 from fenics_bridge.fields import assembled
 from fenics_bridge.supports import require_facet_tag
 
@@ -70,14 +71,19 @@ class LoadVectors:
         return self._pressure[tag]
 
 
-def elastic_load(test, domain, facet_tags, unit_weight, traction):
-    """Work of weight and tractions on a test displacement, as a UFL form.
+def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=None):
+    """Work of weight, tractions and a body force on a test displacement, as a UFL form.
 
-    unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag
+    unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag; body_force: as for `solve_elastic`
     Collective; raises InputError, on all ranks, for a facet tag that does not exist.
     """
     down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
     work = ufl.inner(fem.Constant(domain, np.array(down)), test) * ufl.dx
+    if body_force is not None:
+        # Cubic: its error is far below that of linear and quadratic displacements
+        force = fem.Function(compat.function_space(domain, "Lagrange", 3, domain.geometry.dim))
+        force.interpolate(lambda x: body_force(x[: domain.geometry.dim]))
+        work += ufl.inner(force, test) * ufl.dx
     for tag, value in traction.items():
         require_facet_tag(domain.comm, facet_tags, tag, "traction")
         ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)

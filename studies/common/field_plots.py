@@ -126,9 +126,14 @@ def save_convergence(
 
 
 def save_log_log(
-    path: Path, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], label: str, slope: float = 2.0
+    path: Path,
+    sizes: Sequence[float],
+    curves: Mapping[str, Sequence[float]],
+    label: str,
+    slope: float = 2.0,
+    axis: str = "Cell size [m]",
 ) -> None:
-    """Draw differences over the mesh size in logarithmic axes, with a line of the given slope to compare with."""
+    """Draw differences over the mesh size, or what `axis` says, in logarithmic axes, with a line of a slope beside them."""
     sizes = np.asarray(sizes)
     with paper_style():
         figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
@@ -137,11 +142,11 @@ def save_log_log(
         lowest = np.nanmin([value for values in curves.values() for value in values])
         axes.loglog(sizes, 0.8 * lowest * (sizes / sizes.min()) ** slope, "--", color="black", linewidth=0.9,
                     label=f"slope {slope:g}")  # fmt: skip
-        axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+        axes.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
         axes.minorticks_off()
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        axes.set_xlabel("Cell size [m]")
+        axes.set_xlabel(axis)
         axes.set_ylabel(label)
         axes.tick_params(top=True, right=True, which="both")
         axes.grid(linewidth=0.3, color="#d0d0d0")

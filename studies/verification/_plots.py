@@ -1,0 +1,55 @@
+"""Pictures that several cases share: what was computed as points, what is expected as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common.plots import CURVES, paper_style
+
+Curve = tuple[np.ndarray, np.ndarray]
+LINES = ("-", "--", ":", "-.")
+
+
+def save_comparison(
+    path: Path,
+    computed: Mapping[str, Curve],
+    expected: Mapping[str, Curve],
+    labels: tuple[str, str],
+    *,
+    limits: tuple[tuple[float | None, float | None], tuple[float | None, float | None]] = ((None, None), (None, None)),
+    joined: bool = False,
+    equal: bool = False,
+) -> None:
+    """Draw computed points over expected lines.
+
+    Args:
+        computed: (horizontal, vertical) values by name, as shown; in colours.
+        expected: likewise; black lines.
+        labels: of the axes, with units.
+        limits: of the axes; None to fit.
+        joined: lines through the computed points.
+        equal: one scale for both axes.
+    """
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.4), layout="constrained")
+        for k, (name, (x, y)) in enumerate(computed.items()):
+            look = {
+                "marker": "os^vDP"[k % 6],
+                "markersize": 3,
+                "linestyle": "-" if joined else "none",
+                "linewidth": 1.0,
+            }
+            axes.plot(x, y, color=CURVES[k % len(CURVES)], label=name, **look)
+        for k, (name, (x, y)) in enumerate(expected.items()):
+            axes.plot(x, y, LINES[k % 4], color="black", linewidth=0.9, label=name)
+        axes.set(xlabel=labels[0], ylabel=labels[1], xlim=limits[0], ylim=limits[1])
+        if equal:
+            axes.set_aspect("equal")
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(fontsize=8)
+        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
+        plt.close(figure)
