@@ -4,6 +4,8 @@
 
 #include "base/types.h"
 
+#include <string_view>
+
 namespace mpm
 {
 /// Most state variables that a law may have
@@ -26,14 +28,38 @@ struct PointBatch
   double* tangent = nullptr;
 };
 
-/// What happened in a batch. Reports of several batches are merged with `+=`.
+/// One point of a batch as a batch of its own, in the same columns. It points into itself, so it is not copied.
+template <int D>
+struct OnePoint
+{
+  OnePoint(const PointBatch<D>& points, Index i, int n_state)
+  {
+    constexpr auto entries = static_cast<std::size_t>(n_stress<D> * n_stress<D>);
+    batch.size = 1;
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+    {
+      batch.strain_increment[k] = points.strain_increment[k] + i;
+      batch.stress[k] = points.stress[k] + i;
+    }
+    for (int k = 0; k < n_state; ++k)
+      state[static_cast<std::size_t>(k)] = points.state[k] + i;
+    batch.state = state.data();
+    batch.tangent = points.tangent ? points.tangent + static_cast<std::size_t>(i) * entries : nullptr;
+  }
+  OnePoint(const OnePoint&) = delete;
+  OnePoint& operator=(const OnePoint&) = delete;
+
+  std::array<double*, max_states> state;
+  PointBatch<D> batch;
+};
+
+/// What happened in a batch.
 struct BatchReport
 {
-  /// Points that yielded in this increment
+  /// Number of points that yielded in this increment
   Index plastic = 0;
-  /// Points whose update failed (not finite, or an iteration that did not converge); their stress is left as it was
-  Index failed = 0;
-  /// The first of them, or -1
-  Index first_failed = -1;
+  /// Points whose update failed (not finite, or an iteration that did not converge), in rising order; their stress and
+  /// state are left as they were
+  std::vector<Index> failed;
 };
 } // namespace mpm

@@ -222,7 +222,7 @@ BatchReport update(const CamClay& law, const PointBatch<D>& points)
     const Result<D> trial = result_of(a, 0, 0);
     if (!is_sound(a, trial))
     {
-      report.first_failed = report.failed++ == 0 ? i : report.first_failed;
+      report.failed.push_back(i);
       if (tangent)
         std::fill_n(tangent, entries, 0.0);
       continue;

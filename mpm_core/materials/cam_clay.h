@@ -32,6 +32,7 @@ struct CamClay
   /// compression: one at zero pressure has no stiffness, and its update fails.
   double attraction = 0;
 
+  static constexpr std::string_view name = "CamClay";
   /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with
   /// another one; `log_volume` is ln of the specific volume over that of the start.
   static constexpr std::array state_names{"plastic_strain", "log_preconsolidation", "log_volume"};

@@ -131,7 +131,7 @@ BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)
     const SymTensor<D> trial = elastic_trial<D>(cone.moduli, points, i);
     if (!is_usable<D>(trial))
     {
-      report.first_failed = report.failed++ == 0 ? i : report.first_failed;
+      report.failed.push_back(i);
       continue;
     }
     const SymTensor<D> s = deviator<D>(trial);

@@ -29,6 +29,7 @@ struct DruckerPrager
   /// Largest mean stress allowed [Pa], >= 0
   double tension_cutoff = std::numeric_limits<double>::infinity();
 
+  static constexpr std::string_view name = "DruckerPrager";
   static constexpr std::array state_names{"plastic_strain"};
 
   bool operator==(const DruckerPrager&) const = default;

@@ -77,14 +77,15 @@ inline bool is_usable(const SymTensor<D>& stress)
   return squares - squares == 0;
 }
 
-/// The first point of a batch whose trial stress is not usable, or -1. An update leaves the stress of such a point as
-/// it was, so this may be asked afterwards.
+/// The points of a batch whose trial stress is not usable. An update leaves the stress of such a point as it was, so
+/// this may be asked afterwards.
 template <int D>
-Index first_unusable(const ElasticModuli& moduli, const PointBatch<D>& points)
+std::vector<Index> unusable_points(const ElasticModuli& moduli, const PointBatch<D>& points)
 {
+  std::vector<Index> unusable;
   for (Index i = 0; i < points.size; ++i)
     if (!is_usable<D>(elastic_trial<D>(moduli, points, i)))
-      return i;
-  return -1;
+      unusable.push_back(i);
+  return unusable;
 }
 } // namespace mpm

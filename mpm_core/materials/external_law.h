@@ -9,6 +9,8 @@ namespace mpm
 /// A law that is not of this library: functions that update a batch, such as ones that call Python.
 struct ExternalLaw
 {
+  /// What it is called in messages
+  std::string name;
   /// Names of the state variables; the first is `plastic_strain`
   std::vector<std::string> names;
   /// Modulus of the compression wave [Pa], for the critical time step
@@ -21,6 +23,7 @@ struct ExternalLaw
   bool operator==(const ExternalLaw& other) const { return identity == other.identity && names == other.names; }
 };
 
+inline std::string law_name(const ExternalLaw& law) { return law.name; }
 inline int n_state(const ExternalLaw& law) { return static_cast<int>(law.names.size()); }
 inline std::vector<std::string> state_names(const ExternalLaw& law) { return law.names; }
 inline double p_wave_modulus(const ExternalLaw& law) { return law.wave_modulus; }

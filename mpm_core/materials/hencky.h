@@ -20,6 +20,8 @@ struct Hencky
   bool operator==(const Hencky&) const = default;
 };
 
+inline std::string law_name(const Hencky& law) { return "Hencky of " + law_name(law.law); }
+
 /// One more than those of the law: the last is `log_volume`, ln J
 inline int n_state(const Hencky& law) { return n_state(law.law) + 1; }
 std::vector<std::string> state_names(const Hencky& law);

@@ -21,6 +21,11 @@ template <class... Wrapper>
 using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw,
                              Umat, Wrapper...>;
 
+/// What a law is called in messages
+template <class L>
+requires requires { L::name; }
+std::string law_name(const L&) { return std::string(L::name); }
+
 /// Number of state variables of a law
 template <class L>
 requires requires { L::state_names; }
@@ -35,6 +40,12 @@ std::vector<std::string> state_names(const L&) { return {L::state_names.begin(),
 template <class L>
 requires requires(L law) { law.young + law.poisson; }
 double shear_modulus(const L& law) { return law.young / (2 * (1 + law.poisson)); }
+
+template <class... L>
+std::string law_name(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return law_name(l); }, law);
+}
 
 template <class... L>
 int n_state(const std::variant<L...>& law)

@@ -37,9 +37,8 @@ BatchReport update(const LinearElastic& law, const PointBatch<D>& points)
       columns.stress[k][i] = usable ? trial[k] : columns.stress[k][i];
     failed += usable ? 0 : 1;
   }
-  report.failed = failed;
   if (failed > 0)
-    report.first_failed = first_unusable<D>(moduli, points);
+    report.failed = unusable_points<D>(moduli, points);
   if (points.tangent)
     fill_elastic_tangent<D>(moduli, points.size, points.tangent);
   return report;

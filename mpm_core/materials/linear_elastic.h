@@ -12,6 +12,7 @@ struct LinearElastic
   /// Poisson's ratio [-], in (-1, 0.5)
   double poisson;
 
+  static constexpr std::string_view name = "LinearElastic";
   static constexpr std::array state_names{"plastic_strain"};
 
   bool operator==(const LinearElastic&) const = default;

@@ -158,12 +158,13 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
   if (points.tangent)
     fill_elastic_tangent<D>(m.moduli, points.size, points.tangent);
   BatchReport report;
+  Index failed = 0;
   Candidates<D> candidates;
   constexpr auto block = static_cast<Index>(block_size);
   for (Index first = 0; first < points.size; first += block)
   {
     const Index last = std::min(points.size, first + block);
-    report.failed += elastic_step(m, points, first, last, candidates);
+    failed += elastic_step(m, points, first, last, candidates);
     if (candidates.size == 0)
       continue;
     gather(points, candidates);
@@ -172,8 +173,8 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
       write_tangents(m, maps, candidates, points.tangent);
     report.plastic += scatter(candidates, points);
   }
-  if (report.failed > 0)
-    report.first_failed = first_unusable<D>(m.moduli, points);
+  if (failed > 0)
+    report.failed = unusable_points<D>(m.moduli, points);
   return report;
 }
 

@@ -29,6 +29,7 @@ struct MohrCoulomb
   /// Largest principal stress allowed [Pa], >= 0; without effect from c cot(phi) upwards
   double tension_cutoff = std::numeric_limits<double>::infinity();
 
+  static constexpr std::string_view name = "MohrCoulomb";
   static constexpr std::array state_names{"plastic_strain"};
 
   bool operator==(const MohrCoulomb&) const = default;

@@ -189,7 +189,7 @@ BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
     const SymTensor<D> trial = elastic_trial<D>(moduli, points, i);
     if (!is_usable<D>(trial))
     {
-      report.first_failed = report.failed++ == 0 ? i : report.first_failed;
+      report.failed.push_back(i);
       continue;
     }
     if (update_point<D>(law, points, i, trial))

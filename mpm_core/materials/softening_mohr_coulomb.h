@@ -36,6 +36,7 @@ struct SofteningMohrCoulomb
   double reference_length;
   Softening shape = Softening::exponential;
 
+  static constexpr std::string_view name = "SofteningMohrCoulomb";
   /// `cell_size` [m] is that of the point's cell, 0 stands for the reference length. `cohesion_deviation` is the
   /// relative deviation of the point's cohesion, peak and residual, from the law's, for random fields; at least -1.
   static constexpr std::array state_names{"plastic_strain", "cell_size", "cohesion_deviation"};

@@ -125,7 +125,7 @@ BatchReport update(const Umat& law, const PointBatch<D>& points)
     call(law, i, a);
     if (!is_good(law, a))
     {
-      report.first_failed = report.failed++ == 0 ? i : report.first_failed;
+      report.failed.push_back(i);
       a.ddsdde.fill(0);
     }
     else

@@ -35,6 +35,8 @@ struct Umat
   /// Modulus of the compression wave [Pa], for the critical time step
   double wave_modulus;
 
+  static constexpr std::string_view name = "Umat";
+
   bool operator==(const Umat&) const = default;
 };
 

@@ -32,10 +32,12 @@ BatchReport update(const Undrained& law, const PointBatch<D>& points)
       points.stress[k][i] += pressure[i];
   const BatchReport report = update<D>(law.skeleton, points);
   const auto& strain = points.strain_increment;
+  auto failed = report.failed.begin();
   for (Index i = 0; i < points.size; ++i)
   {
-    const double change = stiffness * (strain[0][i] + strain[1][i] + strain[2][i]);
-    pressure[i] -= std::isfinite(change) ? change : 0.0; // else the point has failed
+    const bool has_failed = failed != report.failed.end() && *failed == i;
+    failed += has_failed ? 1 : 0;
+    pressure[i] -= has_failed ? 0.0 : stiffness * (strain[0][i] + strain[1][i] + strain[2][i]);
     for (std::size_t k = 0; k < 3; ++k)
       points.stress[k][i] -= pressure[i];
     for (std::size_t k = 0; points.tangent && k < 9; ++k)

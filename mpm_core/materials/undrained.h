@@ -23,6 +23,8 @@ struct Undrained
   bool operator==(const Undrained&) const = default;
 };
 
+inline std::string law_name(const Undrained& law) { return "Undrained of " + law_name(law.skeleton); }
+
 /// One more than those of the skeleton: the last is `excess_pore_pressure`, u [Pa]
 inline int n_state(const Undrained& law) { return n_state(law.skeleton) + 1; }
 std::vector<std::string> state_names(const Undrained& law);

@@ -19,11 +19,14 @@ struct Implicit
   Relaxation<D> relaxation;
 };
 
-py::dict as_dict(const TrialReport& report)
+/// What a trial says; where it failed, with what stopped it in words.
+template <int D>
+py::dict as_dict(const Implicit<D>& implicit, const TrialReport& report)
 {
   using namespace py::literals;
+  const auto& trouble = implicit.step.trouble;
   return py::dict("residual"_a = report.residual, "scale"_a = report.scale, "plastic"_a = report.plastic,
-                  "failed"_a = report.failed);
+                  "failed"_a = report.failed, "reason"_a = trouble ? trouble_text(implicit.model, *trouble) : "");
 }
 
 py::tuple places(const CooEntries& entries) { return py::make_tuple(copied(entries.rows), copied(entries.columns)); }
@@ -61,7 +64,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
             py::gil_scoped_release release;
             const TrialReport report = find_residual(i.model, i.step, tangents);
             py::gil_scoped_acquire acquire;
-            return as_dict(report);
+            return as_dict(i, report);
           },
           py::arg("tangents") = false)
       .def(
@@ -81,7 +84,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
              py::gil_scoped_release release;
              i.relaxation = start_relaxation(i.model, i.step, kind);
              py::gil_scoped_acquire acquire;
-             return as_dict(i.relaxation.report);
+             return as_dict(i, i.relaxation.report);
            })
       .def("relax",
            [](I& i, double tolerance, int most)
@@ -89,14 +92,14 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
              py::gil_scoped_release release;
              const int done = relax(i.model, i.step, i.relaxation, tolerance, most);
              py::gil_scoped_acquire acquire;
-             return py::make_tuple(done, as_dict(i.relaxation.report));
+             return py::make_tuple(done, as_dict(i, i.relaxation.report));
            })
       .def(
           "finish",
           [](I& i)
           {
             const bool done = finish_step(i.model, i.step);
-            const std::string why = done ? "" : trouble_text(i.model);
+            const std::string why = done ? "" : trouble_text(i.model, *i.model.work.trouble);
             i.model.work.trouble.reset();
             return why;
           },

@@ -60,9 +60,8 @@ BatchReport update_rows(const L& law, const double* strain, double* stress, doub
         state[row * states + k] = state_columns[k][p];
     }
     total.plastic += report.plastic;
-    if (report.failed > 0 && total.failed == 0)
-      total.first_failed = first + report.first_failed;
-    total.failed += report.failed;
+    for (Index i : report.failed)
+      total.failed.push_back(first + i);
   }
   return total;
 }
@@ -114,6 +113,8 @@ py::class_<L> bind_law(py::module_& m, const char* name, const char* text)
   py::class_<L> type(m, name, text);
   m.attr("law_types").cast<py::list>().append(type);
   return type
+      .def_property_readonly(
+          "name", [](const L& law) { return law_name(law); }, "What the law is called in messages")
       .def_property_readonly(
           "n_state", [](const L& law) { return n_state(law); }, "Number of state variables")
       .def_property_readonly(

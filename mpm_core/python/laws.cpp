@@ -227,8 +227,9 @@ void bind_laws(py::module_& m)
 {
   py::class_<BatchReport>(m, "BatchReport")
       .def_readonly("plastic", &BatchReport::plastic)
-      .def_readonly("failed", &BatchReport::failed)
-      .def_readonly("first_failed", &BatchReport::first_failed);
+      .def_property_readonly("failed", [](const BatchReport& report) { return report.failed.size(); })
+      .def_property_readonly("first_failed", [](const BatchReport& report)
+                             { return report.failed.empty() ? -1 : report.failed.front(); });
   m.attr("law_types") = py::list();
   bind_elastic(m);
   bind_mohr_coulomb(m);

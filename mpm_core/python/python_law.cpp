@@ -16,61 +16,100 @@ py::array_t<double> rows_of(const double* const* columns, int width, Index size)
   return array;
 }
 
-void copy_back(const py::array_t<double>& array, double* const* columns, int width, Index size)
+/// The rows that a law works on
+struct Rows
 {
-  const double* const in = array.data();
-  for (int k = 0; k < width; ++k)
-    for (Index i = 0; i < size; ++i)
-      columns[k][i] = in[static_cast<std::ptrdiff_t>(i) * width + k];
+  py::array_t<double> strain, stress, state, tangent;
+};
+
+template <int D>
+Rows loaded(const PointBatch<D>& points, int states)
+{
+  constexpr int S = n_stress<D>;
+  py::array_t<double> tangent({points.tangent ? points.size : 0, S, S});
+  std::fill_n(tangent.mutable_data(), tangent.size(), 0.0);
+  return {rows_of(points.strain_increment.data(), S, points.size), rows_of(points.stress.data(), S, points.size),
+          rows_of(points.state, states, points.size), tangent};
 }
 
-/// Takes over what a law has written. Points whose stress or state is not finite have failed; then all is left as it
-/// was.
+/// Takes over what a law has written, but in the points whose stress or state is not finite: they have failed.
 template <int D>
-BatchReport stored(const PointBatch<D>& points, const py::array_t<double>& stress, const py::array_t<double>& state,
-                   const py::array_t<double>& tangent, int states)
+BatchReport stored(const PointBatch<D>& points, const Rows& rows, int states)
 {
   constexpr int S = n_stress<D>;
   const auto finite = [](const double* first, int count)
   { return std::all_of(first, first + count, [](double v) { return std::isfinite(v); }); };
   BatchReport report;
   for (Index i = 0; i < points.size; ++i)
-    if (!finite(stress.data() + i * S, S) || !finite(state.data() + i * states, states))
-      report.first_failed = report.failed++ == 0 ? i : report.first_failed;
-  if (report.failed > 0)
-    return report;
-  const Column before(points.state[0], points.state[0] + points.size);
-  copy_back(stress, points.stress.data(), S, points.size);
-  copy_back(state, points.state, states, points.size);
-  for (Index i = 0; i < points.size; ++i)
-    report.plastic += points.state[0][i] > before[static_cast<std::size_t>(i)] ? 1 : 0;
+  {
+    const double* const stress = rows.stress.data() + static_cast<std::ptrdiff_t>(i) * S;
+    const double* const state = rows.state.data() + static_cast<std::ptrdiff_t>(i) * states;
+    if (!finite(stress, S) || !finite(state, states))
+    {
+      report.failed.push_back(i);
+      continue;
+    }
+    report.plastic += state[0] > points.state[0][i] ? 1 : 0;
+    for (std::size_t k = 0; k < S; ++k)
+      points.stress[k][i] = stress[k];
+    for (int k = 0; k < states; ++k)
+      points.state[k][i] = state[k];
+  }
   if (points.tangent)
-    std::copy_n(tangent.data(), static_cast<std::size_t>(points.size) * S * S, points.tangent);
+    std::copy_n(rows.tangent.data(), static_cast<std::size_t>(points.size) * S * S, points.tangent);
   return report;
 }
 
-/// Calls the update of a Python object on one batch. An exception is printed, as no caller could take it through a
-/// parallel run, and all points count as failed.
-template <int D>
-BatchReport call(const py::object& law, int states, const PointBatch<D>& points)
+/// A Python object that updates points
+struct PythonObject
 {
-  constexpr int S = n_stress<D>;
+  py::object law;
+  int states;
+  /// Whether an exception of it has been printed; shared by all copies
+  std::shared_ptr<bool> has_told = std::make_shared<bool>(false);
+};
+
+/// The points of a batch one by one, so that an exception is that of a single point
+template <int D>
+BatchReport called_one_by_one(const PythonObject& object, const PointBatch<D>& points);
+
+/// Calls the update of a Python object on one batch. No caller could take an exception through a parallel run: the
+/// first is printed, and the points that raise one count as failed.
+template <int D>
+BatchReport called(const PythonObject& object, const PointBatch<D>& points)
+{
   py::gil_scoped_acquire acquire;
   try
   {
-    const auto strain = rows_of(points.strain_increment.data(), S, points.size);
-    const auto stress = rows_of(points.stress.data(), S, points.size);
-    const auto state = rows_of(points.state, states, points.size);
-    py::array_t<double> tangent({points.tangent ? points.size : 0, S, S});
-    std::fill_n(tangent.mutable_data(), tangent.size(), 0.0);
-    law.attr("update")(strain, stress, state, points.tangent ? py::object(tangent) : py::none());
-    return stored<D>(points, stress, state, tangent, states);
+    const Rows rows = loaded(points, object.states);
+    object.law.attr("update")(rows.strain, rows.stress, rows.state,
+                              points.tangent ? py::object(rows.tangent) : py::none());
+    return stored(points, rows, object.states);
   }
   catch (py::error_already_set& error)
   {
-    error.discard_as_unraisable("the update of a law");
-    return {0, points.size, 0};
+    if (!*object.has_told)
+      error.discard_as_unraisable("the update of a law");
+    *object.has_told = true;
   }
+  if (points.size == 1)
+    return {0, {0}};
+  return called_one_by_one(object, points);
+}
+
+template <int D>
+BatchReport called_one_by_one(const PythonObject& object, const PointBatch<D>& points)
+{
+  BatchReport report;
+  for (Index i = 0; i < points.size; ++i)
+  {
+    const OnePoint<D> point(points, i, object.states);
+    const BatchReport one = called(object, point.batch);
+    report.plastic += one.plastic;
+    if (!one.failed.empty())
+      report.failed.push_back(i);
+  }
+  return report;
 }
 
 ExternalLaw python_law(const py::object& law)
@@ -86,10 +125,11 @@ ExternalLaw python_law(const py::object& law)
     names = law.attr("state_names").cast<std::vector<std::string>>();
   if (static_cast<int>(names.size()) != states || names.front() != "plastic_strain")
     throw InputError("law has state_names of another number than n_state, or not plastic_strain as the first");
-  return checked(ExternalLaw{std::move(names), law.attr("p_wave_modulus").cast<double>(),
-                             [law, states](const PointBatch<2>& points) { return call<2>(law, states, points); },
-                             [law, states](const PointBatch<3>& points) { return call<3>(law, states, points); },
-                             law.ptr()});
+  const PythonObject object{law, states};
+  return checked(ExternalLaw{"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(), std::move(names),
+                             law.attr("p_wave_modulus").cast<double>(),
+                             [object](const PointBatch<2>& points) { return called(object, points); },
+                             [object](const PointBatch<3>& points) { return called(object, points); }, law.ptr()});
 }
 } // namespace
 
@@ -106,7 +146,9 @@ Args:
           tangent is None in the explicit scheme.
         - state_names: names of the state variables, optional.
 
-An exception in update is printed, and counts as a failure of its points; so does a value that is not finite.)")
+A point fails where its stress or a state of it is not finite afterwards: so a law tells that it found no solution there.
+An exception in update is a failure of all its points; they are then tried one by one, and the first exception of a law
+is printed.)")
       .def(py::init(&python_law), py::arg("law"));
 }
 } // namespace mpm::python

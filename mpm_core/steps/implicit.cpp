@@ -155,7 +155,7 @@ TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
   update(step.halos.nodes, model.work.velocity.data()->data(), D);
   if (step.options.mixed_discretisation)
     average_strains(model, step.dt);
-  const TrialCount count = try_stresses(model, step, tangents);
+  const TrialCount<D> count = try_stresses(model, step, tangents);
   find_forces(model, step);
 
   std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
@@ -184,6 +184,7 @@ TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
   sums[5] = static_cast<double>(count.failed);
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   model.last.plastic = count.plastic;
+  step.trouble = sums[5] > 0 ? shared_trouble(model.exchange, count.trouble) : std::nullopt;
   return {std::sqrt(sums[0]), std::sqrt(std::max({sums[1], sums[2], sums[3]})), static_cast<std::int64_t>(sums[4]),
           static_cast<std::int64_t>(sums[5])};
 }

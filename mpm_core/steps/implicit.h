@@ -67,6 +67,7 @@ struct ImplicitStep
   Halos halos;                       ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
+  std::optional<Trouble<D>> trouble; ///< of the last trial, where it failed
   std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
 

@@ -132,16 +132,21 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
 
 /// Strain and rotation of a cell.
 template <int D>
-CellStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell, TrialCount& count)
+struct TrialStrain
+{
+  CellStrain<D> strain;
+  bool keeps_volume;
+};
+
+template <int D>
+TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell)
 {
   const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
   const Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   if (step.options.mixed_discretisation)
     set_volumetric(strain, model.work.volumetric_strain[cell]);
-  if (!(growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth))
-    ++count.failed;
-  return strain;
+  return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
 /// Copies one run's stresses, turned, and its states to the scratch and prepares its strains.
@@ -160,6 +165,28 @@ void load_run(const Model<D>& model, const Run& run, const CellStrain<D>& strain
   rotate<D>(columns, at, at + size, strain.rotation);
   for (std::size_t k = 0; k < model.particles.state.size(); ++k)
     std::copy_n(model.particles.state[k].data() + run.first, size, scratch.state[k] + at);
+}
+
+/// Counts a failure, and keeps the trouble of the first.
+template <int D>
+void note_failure(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& increment,
+                  TrialCount<D>& count)
+{
+  if (count.failed++ == 0)
+    count.trouble = trouble_with(model, kind, particle, increment);
+}
+
+template <int D>
+void note_failed_laws(const Model<D>& model, const Batch& batch, const std::vector<Index>& failed,
+                      const TrialScratch<D>& scratch, TrialCount<D>& count)
+{
+  for (Index i : failed)
+  {
+    SymTensor<D> increment;
+    for (int k = 0; k < n_stress<D>; ++k)
+      increment[k] = scratch.strain[k][i];
+    note_failure(model, Trouble<D>::Kind::law_failed, batch.first + i, increment, count);
+  }
 }
 
 template <int D>
@@ -208,24 +235,29 @@ void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialS
 } // namespace
 
 template <int D>
-TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents)
+TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents)
 {
   const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
   step.stress.assign(cells, {});
   step.stiffness.assign(tangents ? cells : 0, {});
   TrialScratch<D> scratch;
   scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
-  TrialCount count;
+  TrialCount<D> count;
   const auto& runs = model.work.runs;
   for (std::size_t r = 0; r < runs.size();)
   {
     const Batch batch = next_batch(runs, r);
     for (r = batch.first_run; r < batch.last_run; ++r)
-      load_run(model, runs[r], cell_strain(model, step, runs[r].cell, count), runs[r].first - batch.first, scratch);
+    {
+      const TrialStrain<D> trial = cell_strain(model, step, runs[r].cell);
+      load_run(model, runs[r], trial.strain, runs[r].first - batch.first, scratch);
+      if (!trial.keeps_volume)
+        note_failure(model, Trouble<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
+    }
     const BatchReport report =
         update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
     count.plastic += report.plastic;
-    count.failed += report.failed;
+    note_failed_laws(model, batch, report.failed, scratch, count);
     for (r = batch.first_run; r < batch.last_run; ++r)
     {
       sum_run(model, step, runs[r], runs[r].first - batch.first, scratch);
@@ -235,15 +267,14 @@ TrialCount try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tange
   }
   if (tangents)
     step.tangents.resize(cells);
-  TrialCount counted;
   for (std::size_t c = 0; tangents && c < cells; ++c)
     if (model.work.moments[c].volume > 0)
       step.tangents[c] =
-          cell_tangent<D>(step.stiffness[c], step.stress[c], cell_strain(model, step, static_cast<Index>(c), counted),
+          cell_tangent<D>(step.stiffness[c], step.stress[c], cell_strain(model, step, static_cast<Index>(c)).strain,
                           step.options.mixed_discretisation);
   return count;
 }
 
-template TrialCount try_stresses(const Model<2>&, ImplicitStep<2>&, bool);
-template TrialCount try_stresses(const Model<3>&, ImplicitStep<3>&, bool);
+template TrialCount<2> try_stresses(const Model<2>&, ImplicitStep<2>&, bool);
+template TrialCount<3> try_stresses(const Model<3>&, ImplicitStep<3>&, bool);
 } // namespace mpm

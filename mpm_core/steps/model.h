@@ -25,9 +25,12 @@ struct Trouble
   {
     left_mesh,
     not_finite,
-    law_failed
+    law_failed,
+    law_failed_in_parts, ///< also when the strain increment was cut
+    lost_volume
   };
   Kind kind;
+  Index material;
   GlobalIndex particle;
   Vector<D> position;
   Vector<D> velocity;
@@ -132,10 +135,20 @@ inline Vector<D> current_gravity(const Model<D>& model)
 template <int D>
 void prepare(Model<D>& model);
 
+/// Trouble with a particle.
+template <int D>
+Trouble<D> trouble_with(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
+                        const SymTensor<D>& strain_increment);
+
 /// Notes what stops the run and where, unless something was noted before.
 template <int D>
 void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
                   const SymTensor<D>& strain_increment);
+
+/// The trouble of the lowest rank that has one, on all ranks.
+/// @note Collective
+template <int D>
+std::optional<Trouble<D>> shared_trouble(const NodeExchange& exchange, const std::optional<Trouble<D>>& own);
 
 /// Settles with all ranks what became of the particles in `work.lost`: they are in a cell of some rank and leave for
 /// it, went through an outflow facet, or are trouble. Then makes `work.trouble` known to all: that of the lowest rank

@@ -1,6 +1,7 @@
 #include "steps/particle_pass.h"
 
 #include "base/work_columns.h"
+#include "materials/substeps.h"
 #include "mesh/search.h"
 #include "steps/batches.h"
 #include "transfer/kinematics.h"
@@ -61,6 +62,22 @@ void find_cell_strains(const Model<D>& model, const PassOptions& options, const 
     }
 }
 
+/// A second chance for the particles whose law failed, unless the step is lost anyway.
+template <int D>
+void update_failed(Model<D>& model, const Batch& batch, const PointBatch<D>& points, const std::vector<Index>& failed)
+{
+  if (model.work.trouble)
+    return;
+  const BatchReport report = update_in_parts<D>(model.laws[batch.material], points, failed);
+  model.last.plastic += report.plastic;
+  if (report.failed.empty())
+    return;
+  SymTensor<D> increment;
+  for (int k = 0; k < n_stress<D>; ++k)
+    increment[k] = points.strain_increment[k][report.failed.front()];
+  note_trouble<D>(model, Trouble<D>::Kind::law_failed_in_parts, batch.first + report.failed.front(), increment);
+}
+
 template <int D>
 void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
@@ -89,13 +106,8 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
   points.state = state.data();
   const BatchReport report = update<D>(model.laws[batch.material], points);
   model.last.plastic += report.plastic;
-  if (report.failed > 0)
-  {
-    SymTensor<D> increment;
-    for (int k = 0; k < n_stress<D>; ++k)
-      increment[k] = scratch.strain[k][report.first_failed];
-    note_trouble<D>(model, Trouble<D>::Kind::law_failed, batch.first + report.first_failed, increment);
-  }
+  if (!report.failed.empty())
+    update_failed(model, batch, points, report.failed);
 }
 
 /// The new cell of a particle that is no longer in its old one; `none` when it is not to be gathered.

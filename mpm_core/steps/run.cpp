@@ -1,5 +1,6 @@
 #include "steps/run.h"
 
+#include "materials/substeps.h"
 #include "parallel/agreement.h"
 
 #include <algorithm>
@@ -23,9 +24,8 @@ std::string show(const std::array<double, N>& values)
 } // namespace
 
 template <int D>
-std::string trouble_text(const Model<D>& model)
+std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble)
 {
-  const Trouble<D>& trouble = *model.work.trouble;
   std::ostringstream out;
   out.precision(9);
   out << "particle " << trouble.particle << " at " << show(trouble.position) << " m with velocity "
@@ -39,7 +39,14 @@ std::string trouble_text(const Model<D>& model)
     out << "has a position that is not a number; the step may be too large for the stiffness";
     break;
   case Trouble<D>::Kind::law_failed:
-    out << "has a law that failed for the strain increment " << show(trouble.strain_increment);
+  case Trouble<D>::Kind::law_failed_in_parts:
+    out << "follows the law " << law_name(model.laws[static_cast<std::size_t>(trouble.material)]) << " (number "
+        << trouble.material << "), which failed for the strain increment " << show(trouble.strain_increment);
+    if (trouble.kind == Trouble<D>::Kind::law_failed_in_parts)
+      out << ", also when it was cut into " << most_parts << " parts";
+    break;
+  case Trouble<D>::Kind::lost_volume:
+    out << "is in a cell that would lose its volume by the strain increment " << show(trouble.strain_increment);
     break;
   }
   out << " (in the step after t = " << model.time << " s)";
@@ -79,7 +86,7 @@ std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const
       dt = next_step(model, run);
     explicit_step(model, options, dt);
     if (model.work.trouble)
-      throw RunError(trouble_text(model));
+      throw RunError(trouble_text(model, *model.work.trouble));
     ++done;
   }
   if (run.until - model.time <= closeness)
@@ -154,7 +161,7 @@ Diagnostics diagnostics(const Model<D>& model)
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template std::string trouble_text(const Model<D>&);                                                                  \
+  template std::string trouble_text(const Model<D>&, const Trouble<D>&);                                               \
   template std::int64_t run_explicit(Model<D>&, const ExplicitOptions&, const RunOptions&);                            \
   template Diagnostics diagnostics(const Model<D>&);
 INSTANTIATE(2)

@@ -27,9 +27,9 @@ inline constexpr std::int64_t control_interval = 32;
 template <int D>
 std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run);
 
-/// What stopped the last step, in words. @pre `work.trouble` is set
+/// What stopped a step of the model, in words.
 template <int D>
-std::string trouble_text(const Model<D>& model);
+std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble);
 
 /// Where a run stands, summed over ranks. Units SI; energies in J, masses in kg (per metre in plane strain).
 struct Diagnostics

@@ -36,11 +36,35 @@ void place_lost(Model<D>& model)
 } // namespace
 
 template <int D>
+Trouble<D> trouble_with(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
+                        const SymTensor<D>& strain_increment)
+{
+  const Particles<D>& particles = model.particles;
+  return {kind,
+          particles.material[particle],
+          particles.id[particle],
+          at<D>(particles.position, particle),
+          at<D>(particles.velocity, particle),
+          strain_increment};
+}
+
+template <int D>
 void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& strain_increment)
 {
   if (!model.work.trouble)
-    model.work.trouble = Trouble<D>{kind, model.particles.id[particle], at<D>(model.particles.position, particle),
-                                    at<D>(model.particles.velocity, particle), strain_increment};
+    model.work.trouble = trouble_with(model, kind, particle, strain_increment);
+}
+
+template <int D>
+std::optional<Trouble<D>> shared_trouble(const NodeExchange& exchange, const std::optional<Trouble<D>>& own)
+{
+  int rank = own ? exchange.rank : exchange.size;
+  MPI_Allreduce(MPI_IN_PLACE, &rank, 1, MPI_INT, MPI_MIN, exchange.comm);
+  if (rank == exchange.size)
+    return {};
+  Trouble<D> trouble = own.value_or(Trouble<D>{});
+  MPI_Bcast(&trouble, sizeof(trouble), MPI_BYTE, rank, exchange.comm);
+  return trouble;
 }
 
 template <int D>
@@ -48,23 +72,17 @@ void agree_on_trouble(Model<D>& model)
 {
   const NodeExchange& exchange = model.exchange;
   Workspace<D>& work = model.work;
-  auto first_with_trouble = [&] { return work.trouble ? exchange.rank : exchange.size; };
-  std::array<int, 2> least{first_with_trouble(), work.lost.empty()};
-  MPI_Allreduce(MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN, exchange.comm);
-  if (least[1] == 0)
-  {
+  std::array<int, 2> all_well{!work.trouble, work.lost.empty()};
+  MPI_Allreduce(MPI_IN_PLACE, all_well.data(), 2, MPI_INT, MPI_MIN, exchange.comm);
+  if (!all_well[1])
     place_lost(model);
-    least[0] = first_with_trouble();
-    MPI_Allreduce(MPI_IN_PLACE, least.data(), 1, MPI_INT, MPI_MIN, exchange.comm);
-  }
-  if (least[0] == exchange.size)
-    return;
-  Trouble<D> trouble = work.trouble.value_or(Trouble<D>{});
-  MPI_Bcast(&trouble, sizeof(trouble), MPI_BYTE, least[0], exchange.comm);
-  work.trouble = trouble;
+  if (!all_well[0] || !all_well[1])
+    work.trouble = shared_trouble(exchange, work.trouble);
 }
 
 #define INSTANTIATE(D)                                                                                                 \
+  template Trouble<D> trouble_with<D>(const Model<D>&, Trouble<D>::Kind, Index, const SymTensor<D>&);                  \
+  template std::optional<Trouble<D>> shared_trouble(const NodeExchange&, const std::optional<Trouble<D>>&);            \
   template void note_trouble<D>(Model<D>&, Trouble<D>::Kind, Index, const SymTensor<D>&);                              \
   template void agree_on_trouble(Model<D>&);
 INSTANTIATE(2)

@@ -77,7 +77,7 @@ TYPED_TEST(MohrCoulombBatch, EndsInsideTheSurfaceFromEveryRegion)
       const auto spectrum = mohr_coulomb::spectral(trial_of<D>(law, points, i));
       ++visits[static_cast<std::size_t>(mohr_coulomb::return_to_surface(surface, spectrum.stress).region)];
     }
-    EXPECT_EQ(points.update(law).failed, 0);
+    EXPECT_TRUE(points.update(law).failed.empty());
     const double c_cos = law.cohesion * std::cos(law.friction_angle * degree);
     const double sin_phi = std::sin(law.friction_angle * degree);
     double worst = 0;

@@ -117,7 +117,7 @@ def test_a_python_law_that_fails_ends_the_run_with_the_place(monkeypatch):
     def harm(strain_increment, stress, state, tangent):
         raise ArithmeticError("no root")
 
-    message = "particle .* has a law that failed for the strain increment"
+    message = "particle .* follows the law PythonLaw of Broken .* failed for the strain increment"
     printed = []
     monkeypatch.setattr(sys, "unraisablehook", lambda problem: printed.append(str(problem.exc_value)))
     with pytest.raises(mpm.RunError, match=message):

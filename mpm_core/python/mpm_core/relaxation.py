@@ -57,7 +57,7 @@ class RelaxationSolver:
         solution.converged = solution.residuals[-1] <= options.tolerance and not report["failed"]
         solution.easy = done <= options.max_iterations // 4
         if report["failed"]:
-            solution.reason = f"the law failed or cells lost their volume, {report['failed']} in number"
+            solution.reason = report["reason"]
         elif not solution.converged:
             solution.reason = f"|r| is {solution.residuals[-1]:.2e} after {done} iterations"
         return solution
