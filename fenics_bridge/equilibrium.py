@@ -46,6 +46,8 @@ class EquilibriumStep:
         self._fixed = body.constraints.dofs
         self._external, self._before = external, before
         self._scale = None
+        self.reason = ""
+        """Why the last move could not be made"""
         self._moved = displacement * body.constraints.values - body.solution.x.array[self._fixed]
         self._base = np.zeros_like(body.increment.x.array)
         self._correction = fem.Function(self._space)
@@ -69,8 +71,10 @@ class EquilibriumStep:
         """Add a share of the correction to the last point of the iteration; returns the residual there."""
         body, points = self._body, self._body.points
         body.increment.x.array[:] = self._base + step * self._correction.x.array
-        report = points.update(self._law, body.kinematics.strain_increment())
-        if self._comm.allreduce(report.failed):
+        strain = body.kinematics.strain_increment()
+        failure = points.failure(self._law, points.update(self._law, strain), strain)
+        self.reason = next(filter(None, self._comm.allgather(failure)), "")
+        if self.reason:
             return np.inf
         return self._residual(points.trial_stress)
 

@@ -58,7 +58,7 @@ def print_step(step):
     if MPI.COMM_WORLD.rank != 0:
         return
     report = step.report
-    state = "ok" if step.converged else "failed, halved"
+    state = "ok" if step.converged else f"failed, halved ({report.reason})"
     print(
         f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
         f"Newton {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",

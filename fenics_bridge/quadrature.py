@@ -46,6 +46,14 @@ class QuadraturePoints:
         np.copyto(self.trial_state, self.state)
         return law.update(strain_increment, self.trial_stress, self.trial_state, self.tangent)
 
+    def failure(self, law, report, strain_increment):
+        """The first point where a law failed, in words: law, place and strain increment; empty without failures."""
+        if not report.failed:
+            return ""
+        position = ", ".join(f"{x:.6g}" for x in self.coordinates()[report.first_failed])
+        strain = ", ".join(f"{e:.6g}" for e in strain_increment[report.first_failed])
+        return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
+
     def accept(self):
         """The trial becomes the last equilibrium."""
         np.copyto(self.stress, self.trial_stress)

@@ -62,9 +62,9 @@ class NewtonSolver:
             step.velocity = np.zeros_like(step.velocity)
             report = step.trial(tangents=True)
         solution = Solution([relative(report)])
-        while solution.residuals[-1] > self._options.tolerance:
+        while report["failed"] or solution.residuals[-1] > self._options.tolerance:
             if report["failed"]:
-                solution.reason = f"the law failed or cells lost their volume, {report['failed']} in number"
+                solution.reason = report["reason"]
                 return solution
             if solution.iterations >= self._options.max_iterations:
                 solution.reason = f"|r| is {solution.residuals[-1]:.2e} after {solution.iterations} iterations"
@@ -75,11 +75,11 @@ class NewtonSolver:
                 return solution
             solution.iterations += 1
             report = self._search(step, correction, report)
-            if report is None:
-                solution.reason = f"every part of the correction makes |r| = {solution.residuals[-1]:.2e} much larger"
+            if isinstance(report, str):
+                solution.reason = report
                 return solution
             solution.residuals.append(relative(report))
-        solution.converged = not report["failed"]
+        solution.converged = True
         solution.easy = solution.iterations <= EASY_ITERATIONS
         return solution
 
@@ -95,11 +95,11 @@ class NewtonSolver:
         solution.linear_iterations.append(self._tangent.iterations)
         return du / dt
 
-    def _search(self, step: Any, correction: NDArray[np.float64], before: dict) -> dict | None:
+    def _search(self, step: Any, correction: NDArray[np.float64], before: dict) -> dict | str:
         """Move by the largest of 1, 1/2, 1/4, ... of the correction that lowers |r|.
 
         Where none does, |r| has a kink in between, as plastic points begin to yield or change their edge; the one with
-        the least |r| leads over it. None when all fail or |r| becomes much larger.
+        the least |r| leads over it. Why there is none, when all fail or |r| becomes much larger.
         """
         start = step.velocity
         tried: list[tuple[float, float]] = []
@@ -113,7 +113,9 @@ class NewtonSolver:
             if lower or relative(report) <= self._options.tolerance:
                 return report if halvings == 0 else step.trial(tangents=True)
             tried.append((report["residual"], share))
-        if not tried or min(tried)[0] > MOST_GROWTH * before["residual"]:
-            return None
+        if not tried:
+            return report["reason"]
+        if min(tried)[0] > MOST_GROWTH * before["residual"]:
+            return f"every part of the correction makes |r| = {relative(before):.2e} much larger"
         step.velocity = start + min(tried)[1] * correction
         return step.trial(tangents=True)
