@@ -2,7 +2,7 @@
 
 Every choice is made by looking at what the installed DOLFINx offers, never by its version string. The rest of
 the bridge calls these functions and otherwise keeps to the part of the interface that all of them share.
-Tested with 0.5.2; the branches for 0.9 and 0.10 follow their documentation.
+Tested with 0.5.2 and 0.9.0; what differs in 0.10 follows its documentation.
 """
 
 from __future__ import annotations
@@ -34,11 +34,17 @@ def create_mesh(comm, points, cells, dim):
     points = np.ascontiguousarray(points, dtype=np.float64)
     if basix_ufl is not None:
         element = ufl.Mesh(basix_ufl.element("Lagrange", SHAPE[dim], 1, shape=(dim,)))
-        partitioner = mesh.create_cell_partitioner(GhostMode.shared_facet)
-        return mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
+        return mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=_partitioner())
     cell = ufl.Cell(SHAPE[dim], geometric_dimension=dim)
     element = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
     return mesh.create_mesh(comm, cells, points, element, ghost_mode=GhostMode.shared_facet)
+
+
+def _partitioner():
+    try:
+        return mesh.create_cell_partitioner(GhostMode.shared_facet)
+    except TypeError:  # newer ones also ask how many cells share a facet at most
+        return mesh.create_cell_partitioner(GhostMode.shared_facet, 2)
 
 
 def tags_from_nodes(domain, dim, entities, values):
@@ -50,6 +56,8 @@ def tags_from_nodes(domain, dim, entities, values):
     """
     entities = np.ascontiguousarray(entities, dtype=np.int64).reshape(-1, dim + 1)
     values = np.ascontiguousarray(values, dtype=np.int32)
+    if domain.comm.allreduce(len(values)) == 0:  # 0.9 divides by their number
+        return mesh.meshtags(domain, dim, np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32))
     owner = domain if hasattr(domain, "_cpp_object") else domain._mesh  # a Python function since 0.8
     local, local_values = io.distribute_entity_data(owner, dim, entities, values)
     tdim = domain.topology.dim

@@ -93,7 +93,10 @@ def _histories(folder: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
         except ValueError:  # with words in it; a table of results, not a history
             continue
         if len(values):
-            yield _caption(path), dict(zip(rows[0], values.T))
+            columns = dict(zip(rows[0], values.T))
+            # Over the first column that changes.
+            moving = [name for name, column in columns.items() if column.min() < column.max()]
+            yield _caption(path), {name: columns[name] for name in dict.fromkeys([*moving[:1], *columns])}
 
 
 def _sorted_out(results: Mapping[str, object]) -> tuple[dict, list[Section], dict]:
@@ -133,7 +136,8 @@ def _facts(numbers: Mapping[str, object]) -> dict[str, str]:
     facts = {}
     for key, value in numbers.items():
         counts = isinstance(value, (Real, np.number)) and not isinstance(value, (bool, np.bool_))
-        if counts and ":" not in key and not key.startswith(NOT_FACTS):
+        if counts and value != 0 and ":" not in key and not key.startswith(NOT_FACTS):
             name, unit = name_and_unit(key)
-            facts[name] = f"{float(value):.4g}" + ("" if unit == "-" else f" {unit}")
+            text = f"{value:,.0f}" if abs(value) >= 1e4 else f"{float(value):.4g}"
+            facts[name] = text + ("" if unit == "-" else f" {unit}")
     return dict(list(facts.items())[:MOST_FACTS])

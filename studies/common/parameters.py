@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,8 +80,8 @@ def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:
 
 
 def _told(action: argparse.Action) -> tuple[str, str]:
-    """Unit and meaning of an option, from its help: ``meaning [unit] (default: ...)``."""
-    text = (action.help or "").replace("%%", "%").split(" (default:")[0]
+    """Unit and meaning of an option, from its help: ``meaning [unit] (default: ...)``, or with the default before the unit."""
+    text = re.sub(r" \(default: [^)]*\)", "", (action.help or "").replace("%%", "%"))
     if text.endswith("]") and " [" in text:
         meaning, unit = text[:-1].rsplit(" [", 1)
         return unit, meaning

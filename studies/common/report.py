@@ -102,7 +102,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
         return f"{text}: {name.replace('_', ' ')}", unit
     if column in SPECIAL:
         return SPECIAL[column]
-    if column.endswith("unit_weight"):
+    if "unit_weight" in column:
         return _words(column), "N/m\u00b3"
     for ending, unit in UNITS.items():
         if column.endswith(ending):
@@ -112,7 +112,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
 
 def _words(name: str) -> str:
     text = name.replace("_", " ")
-    return text[:1].upper() + text[1:]
+    return text if len(text) == 1 else text[:1].upper() + text[1:]  # symbols keep their case
 
 
 def _part(name: str) -> str:

@@ -57,7 +57,11 @@ def _paragraphs(text: str) -> str:
 def _table(section: Section) -> str:
     if not section.rows:
         return ""
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in section.columns)
+    numeric = [_is_number(text) for text in section.rows[-1]]
+    head = "".join(
+        f"<th{' class=number' if right else ''}>{html.escape(name)}</th>"
+        for name, right in zip(section.columns, numeric)
+    )
     body = ""
     for k, row in enumerate(section.rows):
         cells = "".join(f"<td{' class=number' if _is_number(text) else ''}>{html.escape(text)}</td>" for text in row)
@@ -66,4 +70,4 @@ def _table(section: Section) -> str:
 
 
 def _is_number(text: str) -> bool:
-    return text.lstrip("≤≥= −-")[:1].isdigit()
+    return text.lstrip("≤≥= −-")[:1].isdigit() or text == "–"

@@ -203,7 +203,7 @@ class Body:
     ) -> tuple[int, bool, list[float]]:
         def checked() -> tuple[int, bool, list[float]]:
             self.mesh.require_tag("facet", facet_tag)
-            return facet_tag, whole, floats(name, vector, (self.mesh.dim,)).tolist()
+            return facet_tag, whole, [float(x) for x in floats(name, vector, (self.mesh.dim,))]
 
         wish = collectively(self.comm, checked)
         wishes = [*(other for other in self._wishes if other is not replaced), wish]

@@ -120,7 +120,7 @@ class Mesh:
         self.cell_numbers: int = 1 + comm.allreduce(int(numbers.max(initial=-1)), MPI.MAX)
         """One more than the highest number that a cell has over all ranks."""
         self._tags = {
-            "cell": set().union(*comm.allgather(set(self.cell_tags.tolist()))),
+            "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
         }
 

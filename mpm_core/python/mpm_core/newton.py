@@ -93,7 +93,7 @@ class NewtonSolver:
         if du is None:
             return None
         solution.linear_iterations.append(self._tangent.iterations)
-        return du / dt
+        return np.asarray(du / dt, dtype=np.float64)
 
     def _search(self, step: Any, correction: NDArray[np.float64], before: dict) -> dict | str:
         """Move by the largest of 1, 1/2, 1/4, ... of the correction that lowers |r|.
