@@ -56,8 +56,6 @@ def tags_from_nodes(domain, dim, entities, values):
     """
     entities = np.ascontiguousarray(entities, dtype=np.int64).reshape(-1, dim + 1)
     values = np.ascontiguousarray(values, dtype=np.int32)
-    if domain.comm.allreduce(len(values)) == 0:  # 0.9 divides by their number
-        return mesh.meshtags(domain, dim, np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32))
     owner = domain if hasattr(domain, "_cpp_object") else domain._mesh  # a Python function since 0.8
     local, local_values = io.distribute_entity_data(owner, dim, entities, values)
     tdim = domain.topology.dim
@@ -83,6 +81,8 @@ def facet_nodes(domain, facets):
     domain.topology.create_connectivity(dim, dim - 1)
     domain.topology.create_connectivity(dim - 1, 0)
     facets = np.asarray(facets, dtype=np.int32)
+    if len(facets) == 0:  # 0.9 divides by their number
+        return np.zeros((0, dim), dtype=np.int32)
     if hasattr(mesh, "entities_to_geometry"):
         nodes = mesh.entities_to_geometry(domain, dim - 1, facets)
     else:
