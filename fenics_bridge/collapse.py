@@ -66,7 +66,10 @@ def reduced_strength(law, factor):
     """Mohr-Coulomb law with cohesion and tan(phi) divided by a factor.
 
     The dilation angle stays where it can, and is limited to the new friction angle: associated flow stays associated.
+    law: one, or {cell tag: law}
     """
+    if isinstance(law, dict):
+        return {tag: reduced_strength(one, factor) for tag, one in law.items()}
     if not isinstance(law, mpm.MohrCoulomb):
         raise InputError(f"law: got {type(law).__name__}, expected MohrCoulomb")
     if not (np.isfinite(factor) and factor > 0):

@@ -30,6 +30,15 @@ class ElasticSolution:
         """The cells' own stress or, `smooth`, its average at the nodes as a continuous function. Collective."""
         return nodal_average(self.stress) if smooth else self.stress
 
+    def deviatoric_strain_function(self):
+        """sqrt(2/3 e : e) of the strain's deviator e [-], as a function that is constant in each cell. Collective."""
+        components = strain(self.displacement)
+        mean = (components[0] + components[1] + components[2]) / 3
+        normal = sum((components[k] - mean) ** 2 for k in range(3))
+        shear = sum(components[k] ** 2 for k in range(3, components.ufl_shape[0]))
+        size = ufl.as_vector([ufl.sqrt(2 / 3 * (normal + 0.5 * shear))])
+        return cell_function(self.displacement.function_space.mesh, size, 0, "deviatoric_strain")
+
     def evaluate_at(self, points, smooth=False):
         """Dictionary with `displacement` (n, D) [m] and `stress` (n, S) [Pa] at points, on any rank.
 

@@ -34,12 +34,12 @@ class Body:
 class EquilibriumStep:
     """One step of a Body to equilibrium, as `newton` wants it."""
 
-    def __init__(self, body, law, external, before, displacement):
+    def __init__(self, body, laws, external, before, displacement):
         """
-        external, before: nodal forces of the loads at the step's end and at its start
+        laws: in the order of the points; external, before: nodal forces of the loads at the step's end and at its start
         displacement: share of the displacements that the supports prescribe, at the step's end
         """
-        self._body, self._law = body, law
+        self._body, self._laws = body, laws
         self._space = body.solution.function_space
         self._comm = self._space.mesh.comm
         self._n_owned = self._space.dofmap.index_map.size_local * self._space.dofmap.index_map_bs
@@ -59,7 +59,7 @@ class EquilibriumStep:
         increment.x.array[self._fixed] = self._moved
         self._base[:] = increment.x.array
         spread = self._body.kinematics.strain_increment()
-        points.update(self._law, np.zeros_like(spread))
+        points.update(self._laws, np.zeros_like(spread))
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def correction(self):
@@ -71,8 +71,7 @@ class EquilibriumStep:
         """Add a share of the correction to the last point of the iteration; returns the residual there."""
         body, points = self._body, self._body.points
         body.increment.x.array[:] = self._base + step * self._correction.x.array
-        strain = body.kinematics.strain_increment()
-        failure = points.failure(self._law, points.update(self._law, strain), strain)
+        failure = points.update(self._laws, body.kinematics.strain_increment())
         self.reason = next(filter(None, self._comm.allgather(failure)), "")
         if self.reason:
             return np.inf

@@ -64,6 +64,18 @@ class PointSearch:
             result[rows[known]] = values[known]
         return result
 
+    def cell_sums(self, amounts):
+        """Sums over the points in each cell that this rank owns: (m,); a point outside the mesh counts nowhere.
+
+        (A conservative transfer: it keeps the total.) amounts: (n,), one for each of this rank's points. Collective.
+        """
+        answers, rank_of = self._answers(self._inside), np.full(len(self.points), -1)
+        for rank, (rows, inside) in zip(reversed(range(self._comm.size)), answers):
+            rank_of[rows[inside]] = rank  # on a border between ranks the lowest one counts
+        sent = [np.where(rank_of[rows] == rank, amounts[rows], 0.0) for rank, rows in enumerate(self._sent)]
+        received = np.concatenate(self._comm.alltoall(sent))
+        return np.bincount(self._cells, received[self._inside], owned_cells(self._domain))
+
     def _answers(self, array):
         """What each rank answered: (rows of this rank's points, values), the lowest rank last so that it holds."""
         answers = self._comm.alltoall(np.split(array, self._asked))

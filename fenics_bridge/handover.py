@@ -8,7 +8,11 @@ import numpy as np
 
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import PointSearch
+from fenics_bridge.moved import fitted_volumes, held_volumes, volume_change
 from fenics_bridge.quasi_static import QuasiStatic
+
+_BALANCED, _MOST_STEPS = 5e-4, 60
+"""Out-of-balance ratio to reach, and the steps that it may take: near collapse each one leaves a share of it."""
 
 
 @dataclass(frozen=True)
@@ -30,52 +34,68 @@ class Handover:
 def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True):
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
 
-    Each particle takes the stress and the state of the finite elements where it is, is returned to the yield surface
-    should it be outside, and loses its velocity. The model's gravity must be that of the equilibrium.
+    Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
+    to the yield surface should it be outside, and loses its velocity. The model's gravity must be that of the
+    equilibrium.
 
     model: `mpm_core.Model` with particles; fem: QuasiStatic, solved and converged, or ElasticSolution; the meshes and
         their partitions may differ
-    move: move particles with the body, by its displacement; otherwise they stay where they are. (Small strains: their
-        volumes stay in both cases.) A body that has moved does not fill cells as before and so is not in equilibrium at
-        once, not even on the same cells.
+    move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
+        Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
+        of the moved body (`moved.fitted_volumes`). A body that has moved is only near equilibrium: that of small
+        strains is one of the undeformed body, and now its surface cuts cells.
     count_displacement: displacements of particles include those of the finite elements; otherwise they start from zero
     smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
         equilibrium as it is; with other cells the smooth stress is far nearer to it.
-    equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads
-    Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh, for laws that
-    do not match, and for finite elements that did not converge. Collective.
+    equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads, to an
+        out-of-balance ratio of 5e-4
+    Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh or, moved,
+    outside the background mesh, for laws that do not match, and for finite elements that did not converge. Collective.
     """
-    plastic = isinstance(fem, QuasiStatic)
     particles = model.particles
-    agree(model.comm, _first_mistake(model, fem) if plastic else None)
+    _require_usable(model, fem, move)
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
-    stress = search.values(fem.stress_function(smooth))
-    state = particles.state
-    if plastic:
-        state[:, : fem.law.n_state] = search.values(fem.state_function())
-    returned = _returned(model.laws, particles.material, stress, state)
-    particles.set("stress", stress)
-    particles.set("state", state)
-    particles.set("velocity", np.zeros_like(particles.velocity))
-    _displace(model, search.values(fem.displacement), move, count_displacement)
+    if isinstance(fem, QuasiStatic):
+        _require_same_laws(model, fem, search.values(fem.material_function())[:, 0].astype(int))
+    returned = _take_stress_and_state(model, fem, search, smooth)
+    _displace(model, fem.displacement, search, move, count_displacement)
     before = model.out_of_balance()
     had_yielded = int(np.sum(particles.plastic_strain > 0))
-    settled = model.equilibrate().unbalanced_ratio if equilibrate else None
+    settled = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio if equilibrate else None
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
     return Handover(before, settled, returned / count, yielded / count)
 
 
-def _displace(model, displacement, move, count):
+def _take_stress_and_state(model, fem, search, smooth):
+    """Give the particles what the finite elements have where they are; returns how many stresses had to be returned."""
+    particles = model.particles
+    stress, state = search.values(fem.stress_function(smooth)), particles.state
+    if isinstance(fem, QuasiStatic):
+        values = search.values(fem.state_function())
+        state[:, : values.shape[1]] = values
+    returned = _returned(model.laws, particles.material, stress, state)
+    particles.set("stress", stress)
+    particles.set("state", state)
+    particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
+    particles.set("velocity", np.zeros_like(particles.velocity))
+    return returned
+
+
+def _displace(model, displacement, search, move, count):
     """Move the particles, count the displacement as theirs, both or neither; rows may have another order afterwards."""
-    start = model.particles.position
+    particles, start = model.particles, model.particles.position
+    moved = search.values(displacement)
     if count:
-        model.particles.set("initial_position", start if move else start - displacement)
+        particles.set("initial_position", start if move else start - moved)
     elif move:
-        model.particles.set("initial_position", start + displacement)
+        particles.set("initial_position", start + moved)
     if move:
-        model.place(start + displacement)
+        held = held_volumes(model.mesh.domain, displacement)
+        particles.set("volume", particles.volume * search.values(volume_change(displacement))[:, 0])
+        model.place(start + moved)
+        particles.set("volume", fitted_volumes(particles.volume, particles.cell, held))
 
 
 def _returned(laws, material, stress, state):
@@ -91,17 +111,31 @@ def _returned(laws, material, stress, state):
     return outside
 
 
-def _first_mistake(model, fem):
-    if not fem.converged:
-        return "fem: it has not been solved, or its last solution did not converge"
-    for number in np.unique(model.particles.material):
-        law = model.laws[number]
-        if type(law) is not type(fem.law):
-            return f"fem: its law is {type(fem.law).__name__}, that of material {number} is {type(law).__name__}"
-        for name in _parameters(law):
-            here, there = getattr(law, name), getattr(fem.law, name)
-            if here != there:
-                return f"fem: its law has {name}={there!r}, that of material {number} has {name}={here!r}"
+def _require_usable(model, fem, move):
+    solved = not isinstance(fem, QuasiStatic) or fem.converged
+    agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
+    known = not move or hasattr(model.mesh, "domain")
+    agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
+
+
+def _require_same_laws(model, fem, number):
+    """number: (n,) of the law that the finite elements have at each particle."""
+    laws = fem.laws
+    pairs = np.unique(np.column_stack([model.particles.material, number]), axis=0)
+    mistakes = (_law_mistake(material, model.laws[material], laws[there]) for material, there in pairs)
+    agree(model.comm, next((mistake for mistake in mistakes if mistake), None))
+
+
+def _law_mistake(material, law, there):
+    """What differs between the law of a material and that of the finite elements; None for nothing."""
+    if type(law) is not type(there):
+        return f"fem: its law is {type(there).__name__}, that of material {material} is {type(law).__name__}"
+    for name in _parameters(law):
+        if getattr(law, name) != getattr(there, name):
+            return (
+                f"fem: its law has {name}={getattr(there, name)!r}, that of material {material} has "
+                f"{name}={getattr(law, name)!r}"
+            )
     return None
 
 

@@ -10,19 +10,19 @@ from dolfinx import fem
 
 from fenics_bridge import compat
 from fenics_bridge.fields import assembled
-from fenics_bridge.supports import require_facet_tag
+from fenics_bridge.supports import require_tag
 
 
 @dataclass(frozen=True)
 class Load:
     """What acts on the body at the end of a stage.
 
-    unit_weight: [N/m3], against the last axis
+    unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
     pressure: [Pa] by facet tag, compression positive, along the normal of the undeformed boundary
     displacement: share of the displacements that the supports prescribe [-], for `prescribed` supports
     """
 
-    unit_weight: float = 0.0
+    unit_weight: float | dict = 0.0
     pressure: dict = field(default_factory=dict)
     displacement: float = 0.0
 
@@ -32,39 +32,63 @@ class Load:
         def between(a, b):
             return a + share * (b - a)
 
-        tags = {*self.pressure, *other.pressure}
-        pressure = {tag: between(self.pressure.get(tag, 0.0), other.pressure.get(tag, 0.0)) for tag in tags}
+        def between_tags(a, b):
+            return {tag: between(a.get(tag, a.get(None, 0.0)), b.get(tag, b.get(None, 0.0))) for tag in {*a, *b}}
+
+        weights = self.unit_weight, other.unit_weight
+        by_tag = any(isinstance(weight, dict) for weight in weights)
         return Load(
-            between(self.unit_weight, other.unit_weight), pressure, between(self.displacement, other.displacement)
+            between_tags(*map(_weight_by_tag, weights)) if by_tag else between(*weights),
+            between_tags(self.pressure, other.pressure),
+            between(self.displacement, other.displacement),
         )
+
+
+def _weight_by_tag(unit_weight):
+    """Unit weights by cell tag; None stands for all cells whose tag is not there."""
+    return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
 
 
 class LoadVectors:
     """Nodal forces of loads on a displacement space; each kind of load is assembled once."""
 
-    def __init__(self, space, facet_tags, test=None):
+    def __init__(self, space, facet_tags, cell_tags=None, test=None):
         """test: test function of the displacement, where it is only a part of the space."""
-        self._space, self._facet_tags = space, facet_tags
-        domain, dim = space.mesh, space.mesh.geometry.dim
+        self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
-        down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
-        self._weight = assembled(fem.form(ufl.inner(down, self._test) * ufl.dx), space).array.copy()
+        self._weight = {None: self._unit_weight(ufl.dx)}
         self._pressure = {}
 
     def forces(self, load):
         """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain).
 
-        Collective; raises InputError, on all ranks, for a facet tag that does not exist.
+        Collective; raises InputError, on all ranks, for a tag that does not exist.
         """
-        forces = load.unit_weight * self._weight
+        by_tag = _weight_by_tag(load.unit_weight)
+        elsewhere = by_tag.get(None, 0.0)
+        forces = elsewhere * self._weight[None]
+        for tag in sorted(tag for tag in by_tag if tag is not None):
+            forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
         return forces
 
+    def _unit_weight(self, dx):
+        domain, dim = self._space.mesh, self._space.mesh.geometry.dim
+        down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
+        return assembled(fem.form(ufl.inner(down, self._test) * dx), self._space).array.copy()
+
+    def _unit_weight_of(self, tag):
+        if tag not in self._weight:
+            require_tag(self._space.mesh.comm, self._cell_tags, tag, "unit_weight", "cell")
+            dx = ufl.Measure("dx", domain=self._space.mesh, subdomain_data=self._cell_tags)
+            self._weight[tag] = self._unit_weight(dx(tag))
+        return self._weight[tag]
+
     def _unit_pressure(self, tag):
         if tag not in self._pressure:
             domain = self._space.mesh
-            require_facet_tag(domain.comm, self._facet_tags, tag, "pressure")
+            require_tag(domain.comm, self._facet_tags, tag, "pressure")
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
             form = -ufl.inner(ufl.FacetNormal(domain), self._test) * ds(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
@@ -85,7 +109,7 @@ def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=Non
         force.interpolate(lambda x: body_force(x[: domain.geometry.dim]))
         work += ufl.inner(force, test) * ufl.dx
     for tag, value in traction.items():
-        require_facet_tag(domain.comm, facet_tags, tag, "traction")
+        require_tag(domain.comm, facet_tags, tag, "traction")
         ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
         work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(tag)
     return work

@@ -16,6 +16,7 @@ from fenics_bridge.fields import assembled, strain
 from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
+from fenics_bridge.materials import Materials
 from fenics_bridge.newton import newton
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.supports import Constraints
@@ -41,9 +42,8 @@ class MixedQuasiStatic:
         space = compat.taylor_hood_space(domain)
         self.domain, self.law = domain, law
         constraints = Constraints(space.sub(0), facet_tags, supports)
-        self._loads = LoadVectors(space, facet_tags, ufl.TestFunctions(space)[0])
-        self.points = QuadraturePoints(domain, law.n_state, 2)
-        self.points.reset_state(law)
+        self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0])
+        self.points = QuadraturePoints(domain, [law], Materials(domain, law, None).number, 2)
         self.load, self.converged = Load(), False
         unknowns = fem.Function(space), fem.Function(space)
         self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law)
@@ -67,7 +67,7 @@ class MixedQuasiStatic:
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
         forces = self._loads.forces(load), self._loads.forces(self.load)
-        report = newton(EquilibriumStep(self._body, law, *forces, load.displacement), **newton_options)
+        report = newton(EquilibriumStep(self._body, [law], *forces, load.displacement), **newton_options)
         self.converged = report.converged
         if report.converged:
             self._body.accept()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+_RUN_AWAY = 10.0
+
 
 class NewtonReport(NamedTuple):
     """How an iteration went.
@@ -30,7 +32,8 @@ def newton(system, tolerance=1e-8, max_iterations=25, max_halvings=5):
     makes this the last point. Residuals are relative.
     The full correction is halved until the work of the residual has fallen to 0.8 of what it was (Matthies, Strang
     1979, IJNME 14, 1613-1626); when no share does that, the one with the smallest residual is taken. Unlike a search
-    that wants the residual itself to fall, this goes on near collapse and with non-associated flow.
+    that wants the residual itself to fall, this goes on near collapse and with non-associated flow. An iteration whose
+    residual reaches ten times the forces at work is given up.
     """
     residuals = [system.start()]
     while residuals[-1] > tolerance or len(residuals) == 1:
@@ -41,6 +44,8 @@ def newton(system, tolerance=1e-8, max_iterations=25, max_halvings=5):
         residual = _line_search(system, max_halvings)
         if residual == float("inf"):
             return NewtonReport(False, residuals, system.reason)
+        if residual > _RUN_AWAY:
+            return NewtonReport(False, residuals, f"residual {residual:.1e}: the iteration ran away")
         system.keep()
         residuals.append(residual)
     return NewtonReport(True, residuals)

@@ -7,57 +7,70 @@ from dolfinx import fem
 
 from fenics_bridge import compat
 from fenics_bridge.fields import N_STRESS
-from fenics_bridge.tagged import owned_cells
+from fenics_bridge.tagged import cell_volumes
 
 
 class QuadraturePoints:
-    """The quadrature points of the cells that this rank owns, cell after cell.
+    """The quadrature points of the cells that this rank owns, cell after cell, the cells of each material together.
 
-    n: their number; per_cell: number in a cell; cells: (m,) int32, the cells
-    stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium
+    n: their number; per_cell: number in a cell; cells: (m,) int32, the cells; material: (m,) int32, of each of them
+    stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium; n_state: that of the law with most variables
+    deviatoric_strain: (n,) accumulated up to there, the sum of sqrt(2/3 de : de) as the particles have it [-]
     trial_stress, trial_state, tangent: (n, S), (n, n_state), (n, S, S) at the displacement under trial
     """
 
-    def __init__(self, domain, n_state, degree):
-        """degree: of the quadrature rule."""
+    def __init__(self, domain, laws, material, degree):
+        """laws: by number; material: (owned cells,) int32, number of each cell's law; degree: of the quadrature."""
         self.size = N_STRESS[domain.geometry.dim]
         self._domain = domain
         self.degree, self.reference = degree, compat.quadrature_points(domain, degree)
         self.per_cell = len(self.reference)
-        self.cells = np.arange(owned_cells(domain), dtype=np.int32)
+        # With the points of a law in one piece it works on them in place.
+        self.cells = np.argsort(material, kind="stable").astype(np.int32)
+        self.material = material[self.cells]
+        ends = self.per_cell * np.searchsorted(self.material, np.arange(len(laws) + 1))
+        self._pieces = [slice(*ends[number : number + 2]) for number in range(len(laws))]
         self.n = len(self.cells) * self.per_cell
         self.stress = np.zeros((self.n, self.size))
-        self.state = np.zeros((self.n, n_state))
+        self.state = np.zeros((self.n, max(law.n_state for law in laws)))
+        self.deviatoric_strain = np.zeros(self.n)
         self.trial_stress, self.trial_state = self.stress.copy(), self.state.copy()
+        self._trial_strain = np.zeros((self.n, self.size))
         self.tangent = np.zeros((self.n, self.size, self.size))
+        self.reset_state(laws)
 
-    def reset_state(self, law):
-        """State variables as a law wants them at the start: zero, but for the size of the cells [m] where it asks for it."""
-        self.state[:] = 0.0
-        if "cell_size" in law.state_names:
-            corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
-            filled = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))  # D! times the volume
-            size = filled ** (1 / self._domain.geometry.dim)
-            self.state[:, law.state_names.index("cell_size")] = np.repeat(size, self.per_cell)
+    def reset_state(self, laws):
+        """State variables as the laws want them at the start: zero, but for the size of cells [m] where asked for."""
+        self.state[:], self.deviatoric_strain[:] = 0.0, 0.0
+        size = np.repeat(cell_volumes(self._domain)[self.cells] ** (1 / self._domain.geometry.dim), self.per_cell)
+        for law, piece in zip(laws, self._pieces):
+            if "cell_size" in law.state_names:
+                self.state[piece, law.state_names.index("cell_size")] = size[piece]
 
-    def update(self, law, strain_increment):
-        """Trial stress, state and tangent by one call of the law; returns its report of this rank."""
+    def update(self, laws, strain_increment):
+        """Trial stress, state and tangent by one call of each law; returns where and why one failed, empty if none did."""
         np.copyto(self.trial_stress, self.stress)
         np.copyto(self.trial_state, self.state)
-        return law.update(strain_increment, self.trial_stress, self.trial_state, self.tangent)
+        self._trial_strain, failure = strain_increment, ""
+        for law, piece in zip(laws, self._pieces):
+            state = np.ascontiguousarray(self.trial_state[piece, : law.n_state])  # the columns themselves if it has all
+            report = law.update(strain_increment[piece], self.trial_stress[piece], state, self.tangent[piece])
+            self.trial_state[piece, : law.n_state] = state
+            if report.failed and not failure:
+                failure = self._failure(law, piece.start + report.first_failed)
+        return failure
 
-    def failure(self, law, report, strain_increment):
-        """The first point where a law failed, in words: law, place and strain increment; empty without failures."""
-        if not report.failed:
-            return ""
-        position = ", ".join(f"{x:.6g}" for x in self.coordinates()[report.first_failed])
-        strain = ", ".join(f"{e:.6g}" for e in strain_increment[report.first_failed])
+    def _failure(self, law, point):
+        """A point where a law failed, in words: law, place and strain increment."""
+        position = ", ".join(f"{x:.6g}" for x in self.coordinates()[point])
+        strain = ", ".join(f"{e:.6g}" for e in self._trial_strain[point])
         return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
 
     def accept(self):
         """The trial becomes the last equilibrium."""
         np.copyto(self.stress, self.trial_stress)
         np.copyto(self.state, self.trial_state)
+        self.deviatoric_strain += deviatoric_size(self._trial_strain)
 
     def coordinates(self):
         """Where the points are: (n, D) [m]."""
@@ -82,3 +95,9 @@ class QuadraturePoints:
 
     def _linear_shapes(self):
         return np.column_stack([1 - self.reference.sum(axis=1), self.reference])
+
+
+def deviatoric_size(strain):
+    """sqrt(2/3 e : e) of the deviators e of strains (n, S) with engineering shear: (n,)."""
+    deviator = strain[:, :3] - strain[:, :3].mean(axis=1, keepdims=True)
+    return np.sqrt(2 / 3 * (np.sum(deviator**2, axis=1) + 0.5 * np.sum(strain[:, 3:] ** 2, axis=1)))

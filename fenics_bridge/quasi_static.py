@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from dolfinx import fem
 
@@ -15,24 +17,27 @@ from fenics_bridge.kinematics import Kinematics
 from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
+from fenics_bridge.materials import Materials
 from fenics_bridge.newton import newton
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.supports import Constraints
 
 
 class QuasiStatic:
-    """Small-strain equilibrium of a body of one material, plane strain or 3D, loaded in stages.
+    """Small-strain equilibrium of a body of one or several materials, plane strain or 3D, loaded in stages.
 
-    displacement: function [m], total; load: the Load in equilibrium; law: the law in force
+    displacement: function [m], total; load: the Load in equilibrium; law: the law, or laws, in force
     points: QuadraturePoints with stress and state; converged: whether the last call reached its goal
     Every stage starts from the equilibrium before it; a step that fails leaves that equilibrium untouched.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_"):
+    def __init__(self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_", cell_tags=None):
         """
-        law: of `mpm_core`; facet_tags, supports: as for `solve_elastic`; degree: 1 or 2 of the displacement
+        law: of `mpm_core`, or {cell tag: law}; facet_tags, supports: as for `solve_elastic`
+        degree: 1 or 2 of the displacement
         nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1
         options_prefix: of the PETSc options of the linear solver
+        cell_tags: of the domain; needed where laws or unit weights are given by cell tag
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
         agree(domain.comm, None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2")
@@ -42,13 +47,18 @@ class QuasiStatic:
         self.displacement = fem.Function(space, name="displacement")
         self.increment = fem.Function(space, name="increment")
         constraints = Constraints(space, facet_tags, supports)
-        self._loads = LoadVectors(space, facet_tags)
-        self.points = QuadraturePoints(domain, law.n_state, max(1, 2 * (degree - 1)))
-        self.points.reset_state(law)
+        self._loads = LoadVectors(space, facet_tags, cell_tags)
+        self._materials = Materials(domain, law, cell_tags)
+        self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
         self.load, self.converged = Load(), False
         self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, constraints)
         solver = LinearSolver(space, options_prefix)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, solver)
+
+    @property
+    def laws(self):
+        """The laws in force as a list, in the order in which they were given. Collective."""
+        return self._materials.laws(self.law)
 
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
@@ -59,23 +69,25 @@ class QuasiStatic:
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
         agree(self.domain.comm, None if good else f"stress: got shape {np.shape(stress)}, expected finite {shape}")
         self.points.stress[:] = stress
-        self.points.reset_state(self.law)
+        self.points.reset_state(self.laws)
         self.displacement.x.array[:] = 0.0
         self.load = load
 
     def reset_displacement(self):
         """Count displacements from here on (the stress stays)."""
         self.displacement.x.array[:] = 0.0
-        self.load = Load(self.load.unit_weight, self.load.pressure, 0.0)
+        self.load = replace(self.load, displacement=0.0)
 
     def equilibrate(self, load, law=None, **newton_options):
-        """Go to the equilibrium under a load, with a law, in one step. Returns the NewtonReport.
+        """Go to the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns the NewtonReport.
 
         When it does not converge everything is left as it was. newton_options: as for `newton`. Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)
-        report = newton(EquilibriumStep(self._body, law, *forces, load.displacement), **newton_options)
+        report = newton(
+            EquilibriumStep(self._body, self._materials.laws(law), *forces, load.displacement), **newton_options
+        )
         self.converged = report.converged
         if report.converged:
             self._body.accept()
@@ -120,6 +132,14 @@ class QuasiStatic:
     def state_function(self):
         """State variables of the law as a function that is constant in each cell."""
         return self.points.cell_function(self.points.state, "state", 0)
+
+    def deviatoric_strain_function(self):
+        """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
+        return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
+
+    def material_function(self):
+        """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
+        return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)
 
     def evaluate_at(self, points, smooth=False):
         """Dictionary of `displacement` (n, D) [m], `stress` (n, S) [Pa], `state` (n, n_state) at points on any rank.

@@ -27,11 +27,18 @@ def fixed(facet_tag):
 
 
 def roller(facet_tag, normal):
-    """No displacement along `normal`, which must be an axis, e.g. (1, 0); free to slide across it."""
+    """No displacement along `normal`, which must be an axis, e.g. (1, 0); free to slide across it.
+
+    (The finite elements hold components of displacements; a roller at an angle to the axes would tie several of them
+    together. Particles can have one: `mpm_core.Model.roller`.)
+    """
     normal = np.asarray(normal, dtype=float)
     along = np.flatnonzero(normal)
     if len(along) != 1:
-        raise InputError(f"normal: got {tuple(normal)}, expected an axis such as (1, 0)")
+        raise InputError(
+            f"normal: got {tuple(normal.tolist())}, expected an axis such as (1, 0): the finite elements hold "
+            "components of the displacement, so their rollers cannot be inclined"
+        )
     return Support(facet_tag, tuple(0.0 if i == along[0] else None for i in range(len(normal))))
 
 
@@ -67,18 +74,17 @@ class Constraints:
         self.values = np.fromiter(value_of.values(), float, len(value_of))
 
 
-def require_facet_tag(comm, facet_tags, tag, argument):
-    """Raise InputError, on all ranks, when no facet on any rank has the tag. Collective."""
-    found = facet_tags is not None and bool(np.any(facet_tags.values == tag))
-    known = comm.allgather(sorted(set(facet_tags.values.tolist())) if facet_tags is not None else [])
+def require_tag(comm, tags, tag, argument, entity="facet"):
+    """Raise InputError, on all ranks, when no facet (or cell) on any rank has the tag. Collective."""
+    known = comm.allgather(set(tags.values.tolist()) if tags is not None else set())
     every = sorted(set().union(*known))
-    if not comm.allreduce(int(found)):
-        raise InputError(f"{argument}: no facet has the tag {tag!r}; the mesh has {every}")
+    if tag not in every:
+        raise InputError(f"{argument}: no {entity} has the tag {tag!r}; the mesh has {every}")
 
 
 def _first_mistake(domain, facet_tags, supports, dim):
     for support in supports:
-        require_facet_tag(domain.comm, facet_tags, support.facet_tag, "supports")
+        require_tag(domain.comm, facet_tags, support.facet_tag, "supports")
         displacement = support.displacement
         if displacement is not None and len(displacement) != dim:
             return f"supports: {support} has {len(displacement)} components, expected {dim}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,17 @@ def distributed_mesh(comm, arrays, dim):
 def owned_cells(domain):
     """Number of cells that this rank owns; they come before the ghosts."""
     return domain.topology.index_map(domain.topology.dim).size_local
+
+
+def cell_corners(domain):
+    """Corners of the cells that this rank owns: (m, D + 1, D) [m]."""
+    return domain.geometry.x[compat.cell_nodes(domain)[: owned_cells(domain)], : domain.geometry.dim]
+
+
+def cell_volumes(domain):
+    """Volumes of the cells that this rank owns: (m,) [m^D]."""
+    corners = cell_corners(domain)
+    return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / math.factorial(domain.geometry.dim)
 
 
 def tag_values(domain, tags, dim):

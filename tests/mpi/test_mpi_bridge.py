@@ -135,10 +135,38 @@ def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
     assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails
 
 
-def test_hand_over_between_different_partitions():
-    fem = slope_model(dilation_angle=0.0)
+def by_id(model, *names):
+    """Fields of all particles, by rising id."""
+    order = np.argsort(gathered(model.particles.id))
+    return [gathered(getattr(model.particles, name))[order] for name in names]
+
+
+@pytest.mark.parametrize(
+    ("degree", "cell_size", "options"),
+    [(2, 0.1, {}), (2, 0.05, {"smooth": True}), (1, 0.1, {"move": True}), (2, 0.05, {"move": True})],
+)
+def test_hand_over_between_different_partitions(degree, cell_size, options):
+    """Alone or shared, particles get the same from the finite elements, and come into equilibrium."""
+    results = []
+    for comm in (COMM, MPI.COMM_SELF):
+        fem = slope_model(dilation_angle=0.0, degree=degree, comm=comm)
+        fem.solve(bridge.Load(unit_weight=18e3))
+        model = slope_particles(18e3, cell_size=cell_size, comm=comm)
+        report = bridge.initialise(model, fem, equilibrate=False, **options)
+        if not options:
+            assert report.unbalanced_ratio < 1e-10 and report.returned_share == 0
+        fields = ("stress", "state", "volume", "position", "deviatoric_strain")
+        results.append((report.unbalanced_ratio, by_id(model, *fields) if comm is COMM else in_order(model, *fields)))
+    (here, fields_here), (alone, fields_alone) = results
+    assert here == pytest.approx(alone, rel=1e-3, abs=1e-10)
+    for mine, whole in zip(fields_here, fields_alone):
+        assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+    fem = slope_model(dilation_angle=0.0, degree=degree)
     fem.solve(bridge.Load(unit_weight=18e3))
-    same = bridge.initialise(slope_particles(18e3), fem)
-    assert same.unbalanced_ratio < 1e-10 and same.returned_share == 0
-    other = bridge.initialise(slope_particles(18e3, cell_size=0.05), fem, smooth=True)
-    assert other.settled_ratio < 1e-3 and other.yielded_share < 0.01
+    report = bridge.initialise(slope_particles(18e3, cell_size=cell_size), fem, **options)
+    assert report.settled_ratio < 1e-3 and report.yielded_share < 0.01
+
+
+def in_order(model, *names):
+    order = np.argsort(model.particles.id)
+    return [getattr(model.particles, name)[order] for name in names]

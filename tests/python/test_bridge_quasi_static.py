@@ -18,6 +18,8 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.compat import cell_nodes
+from fenics_bridge.tagged import owned_cells
 
 
 def elastic_column(dim, degree=2):
@@ -117,6 +119,90 @@ def test_compression_of_a_cube_ends_at_the_strength(degree, nmd):
     assert model.converged and np.allclose(model.points.stress[:, 2], -strength, rtol=1e-6)
     assert np.allclose(model.points.stress[:, [0, 1, 3, 4, 5]], 0, atol=1e-5 * strength)
     assert model.reaction(4)[2] == pytest.approx(strength, rel=1e-6)
+
+
+def layers(domain):
+    """Tags of the cells above (7) and below (4) half of the height."""
+    number = owned_cells(domain)
+    above = domain.geometry.x[cell_nodes(domain)[:number], 1].mean(axis=1) > 0.5
+    return mesh.meshtags(domain, 2, np.arange(number, dtype=np.int32), np.where(above, 7, 4).astype(np.int32))
+
+
+def layered_column(upper, lower, **options):
+    """QuasiStatic of the column, 1 m high, with a law for each layer."""
+    domain, facet_tags, supports, _ = column(2)
+    cell_tags = layers(domain)
+    return bridge.QuasiStatic(domain, {7: upper, 4: lower}, facet_tags, supports, cell_tags=cell_tags, **options)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_layers_with_their_own_law_and_weight(degree):
+    """One-dimensional compression: stress from the weights above, strain from each layer's oedometer modulus."""
+    soft, stiff = (mpm.LinearElastic(young=young, poisson=POISSON) for young in (YOUNG, 5 * YOUNG))
+    model = layered_column(soft, stiff, degree=degree)
+    weight = {7: 10e3, 4: 30e3}
+    model.solve(bridge.Load(unit_weight=weight))
+    assert model.converged and [law.young for law in model.laws] == [YOUNG, 5 * YOUNG]
+    assert model.reaction(bridge.BASE)[1] == pytest.approx(-0.5 * (0.5 * 10e3 + 0.5 * 30e3))
+    y = model.points.coordinates()[:, 1]
+    exact = -np.where(y > 0.5, 10e3 * (1 - y), 10e3 * 0.5 + 30e3 * (0.5 - y))
+    assert np.allclose(model.points.stress[:, 1], exact, atol=1e-8 * 20e3 if degree == 2 else 0.25 * 30e3)
+    modulus = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
+    upper = 10e3 * 0.5**2 / 2 / modulus
+    lower = (10e3 * 0.5 * 0.5 + 30e3 * 0.5**2 / 2) / (5 * modulus)
+    assert top_of_column(model) == pytest.approx(-upper - lower, rel=1e-9 if degree == 2 else 0.1)
+    model.solve(bridge.Load(unit_weight=30e3))  # from weights by tag to one for all
+    assert model.reaction(bridge.BASE)[1] == pytest.approx(-0.5 * 30e3)
+
+
+def test_layers_with_laws_of_different_kinds():
+    """A weak layer yields under pressure, the elastic one does not; laws with more and with fewer state variables."""
+    strong = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    plain = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=0.0)
+    weak = mpm.SofteningMohrCoulomb(
+        plain, residual_cohesion=1e3, residual_friction_angle=0.0, softening_strain=0.1, reference_length=0.1
+    )
+    stresses = []
+    for law in (plain, weak):  # softening to the strength at the start is no softening
+        model = layered_column(strong, law)
+        model.solve(bridge.Load(pressure={bridge.CREST: 10e3}))
+        assert model.converged
+        yielded = model.points.state[:, 0] > 0
+        assert yielded[model.points.coordinates()[:, 1] < 0.5].all()
+        assert not yielded[model.points.coordinates()[:, 1] > 0.5].any()
+        stresses.append(model.points.stress.copy())
+    assert np.allclose(stresses[0], stresses[1], atol=1e-6 * 10e3)
+    assert model.points.state.shape[1] == weak.n_state > plain.n_state
+
+
+def test_strength_of_layers_is_reduced_together():
+    laws = [mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=c, friction_angle=0.0) for c in (2e3, 4e3)]
+    weak = bridge.reduced_strength({7: laws[0], 4: laws[1]}, 2.0)
+    assert weak[7].cohesion == 1e3 and weak[4].cohesion == 2e3
+
+
+@pytest.mark.parametrize(
+    ("law", "tagged", "words"),
+    [
+        ({7: 1}, True, "law.*tag 4"),
+        ({7: 1, 4: 1, 9: 1}, True, "law.*tag 9.*4, 7"),
+        ({7: 1, 4: 1}, False, "cell_tags.*None"),
+    ],
+)
+def test_laws_that_do_not_fit_the_cell_tags_are_named(law, tagged, words):
+    good = layered_column(*[mpm.LinearElastic(young=YOUNG, poisson=POISSON)] * 2)
+    laws = dict.fromkeys(law, good.laws[0])
+    with pytest.raises(bridge.InputError, match=words):
+        bridge.QuasiStatic(good.domain, laws, good.facet_tags, [], cell_tags=layers(good.domain) if tagged else None)
+    with pytest.raises(bridge.InputError, match="law.*cell tags"):
+        good.equilibrate(bridge.Load(), good.laws[0])
+    with pytest.raises(bridge.InputError, match="unit_weight.*cell.*tag 3"):
+        good.solve(bridge.Load(unit_weight={3: 1.0}))
+
+
+def test_inclined_rollers_are_refused_with_the_reason():
+    with pytest.raises(bridge.InputError, match=r"normal.*\(1.0, 1.0\).*axis.*inclined"):
+        bridge.roller(bridge.LEFT, (1, 1))
 
 
 @pytest.mark.parametrize("dilation_angle", [25.0, 0.0])

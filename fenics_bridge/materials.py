@@ -1,0 +1,44 @@
+"""Which law holds in which cell of a body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+from fenics_bridge.tagged import owned_cells, tag_values
+
+
+class Materials:
+    """One law for the whole body, or one for each cell tag.
+
+    tags: of the laws, in their order; (None,) for a law of the whole body
+    number: (m,) int32, position in `tags` of the law of each owned cell
+    """
+
+    def __init__(self, domain, law, cell_tags):
+        """law: of `mpm_core`, or {cell tag: law}. Raises InputError, on all ranks, for other tags. Collective."""
+        self._comm, n_cells = domain.comm, owned_cells(domain)
+        self.tags = tuple(law) if isinstance(law, dict) else (None,)
+        if not isinstance(law, dict):
+            self.number = np.zeros(n_cells, dtype=np.int32)
+            return
+        agree(
+            self._comm,
+            "cell_tags: got None, expected the tags that the laws are given for" if cell_tags is None else None,
+        )
+        values = tag_values(domain, cell_tags, domain.topology.dim)[:n_cells]
+        known = sorted(set().union(*self._comm.allgather(set(values.tolist()))))
+        without = [tag for tag in known if tag not in law]
+        unknown = [tag for tag in law if tag not in known]
+        agree(self._comm, f"law: no law for cells with tag {without[0]} (0: untagged)" if without else None)
+        agree(self._comm, f"law: no cell has the tag {unknown[0]!r}; the mesh has {known}" if unknown else None)
+        self.number = np.zeros(n_cells, dtype=np.int32)
+        for number, tag in enumerate(self.tags):
+            self.number[values == tag] = number
+
+    def laws(self, law):
+        """The laws in their order; law: as above. Raises InputError, on all ranks, for other tags. Collective."""
+        given = law if isinstance(law, dict) else {None: law}
+        expected = f"laws for the cell tags {list(self.tags)}" if self.tags != (None,) else "one law"
+        agree(self._comm, None if set(given) == set(self.tags) else f"law: got {law!r}, expected {expected}")
+        return [given[tag] for tag in self.tags]
