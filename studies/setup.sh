@@ -10,7 +10,7 @@ build=$root/build
 log=$build/setup.log
 
 # What a study needs. ninja, git and ffmpeg could be done without, but make it faster or nicer.
-packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev pkg-config pybind11-dev
+packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev libptscotch-dev pkg-config pybind11-dev
   python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
   python3-numpy python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.

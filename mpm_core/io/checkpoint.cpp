@@ -16,6 +16,9 @@ namespace mpm
 {
 namespace
 {
+/// Of the table that says which cells each rank owns.
+constexpr char owned_cells_name[] = "owned_cells";
+
 /// The columns of one real field.
 template <class C>
 struct Field
@@ -59,7 +62,7 @@ template <int D>
 void write_particles(Hdf5File& file, const Mesh<D>& mesh, const Particles<D>& particles)
 {
   const RowSlice rows = row_slice(file.comm(), particles.id.size());
-  int loaded = !particles.traction[0].empty();
+  int loaded = particles.loaded;
   MPI_Allreduce(MPI_IN_PLACE, &loaded, 1, MPI_INT, MPI_MAX, file.comm());
   const auto n = particles.id.size();
   for (const auto& field : real_fields(particles))
@@ -120,13 +123,16 @@ std::string put_in_place(const std::filesystem::path& aside, const std::filesyst
 }
 
 /// This rank's rows of an array of which each rank of the file wrote some, on as many ranks as now.
-RowSlice own_rows(Hdf5Input& file, const NodeExchange& exchange, const std::string& name)
+RowSlice own_rows(Hdf5Input& file, MPI_Comm comm, const std::string& name)
 {
-  const auto counts = file.read<std::int64_t>("/ranks/rows_of_" + name, {0, exchange.size, 0}, 1);
+  int rank = 0, size = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  const auto counts = file.read<std::int64_t>("/ranks/rows_of_" + name, {0, size, 0}, 1);
   RowSlice rows;
-  for (int r = 0; r < exchange.rank; ++r)
+  for (int r = 0; r < rank; ++r)
     rows.before += counts[static_cast<std::size_t>(r)];
-  rows.local = counts[static_cast<std::size_t>(exchange.rank)];
+  rows.local = counts[static_cast<std::size_t>(rank)];
   return rows;
 }
 
@@ -220,6 +226,21 @@ std::string checkpoint_description(MPI_Comm comm, const std::filesystem::path& p
 }
 
 template <int D>
+Table owned_cells_table(const Mesh<D>& mesh)
+{
+  return {owned_cells_name, 1, {mesh.global_cells.begin(), mesh.global_cells.begin() + mesh.owned_cells}};
+}
+
+std::vector<GlobalIndex> checkpoint_cells(MPI_Comm comm, const std::filesystem::path& path)
+{
+  Hdf5Input file(comm, path);
+  const auto cells =
+      file.read<double>(std::string("/cells/") + owned_cells_name, own_rows(file, comm, owned_cells_name), 1);
+  file.check();
+  return {cells.begin(), cells.end()};
+}
+
+template <int D>
 Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
                               std::size_t state_columns, const StateTables& expected)
 {
@@ -231,7 +252,7 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
   checkpoint.same_parts = false;
   if (ranks == exchange.size)
   {
-    const auto cells = read_particles(file, own_rows(file, exchange, "particles"), particles);
+    const auto cells = read_particles(file, own_rows(file, exchange.comm, "particles"), particles);
     file.check();
     checkpoint.same_parts = are_same_parts(exchange, mesh, cells, particles);
   }
@@ -253,7 +274,7 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
     checkpoint.state.cells.clear();
   std::erase_if(checkpoint.state.cells, [&](const Table& table) { return !file.has("/cells/" + table.name); });
   for (Table& table : checkpoint.state.cells)
-    table.values = file.read<double>("/cells/" + table.name, own_rows(file, exchange, table.name), table.width);
+    table.values = file.read<double>("/cells/" + table.name, own_rows(file, exchange.comm, table.name), table.width);
   file.check();
   return checkpoint;
 }
@@ -290,6 +311,7 @@ std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh)
                                  const StateTables&, const std::string&);                                              \
   template Checkpoint<D> read_checkpoint(const NodeExchange&, const std::filesystem::path&, const Mesh<D>&,            \
                                          std::size_t, const StateTables&);                                             \
+  template Table owned_cells_table(const Mesh<D>&);                                                                    \
   template std::uint64_t mesh_fingerprint(MPI_Comm, const Mesh<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

@@ -35,6 +35,17 @@ void write_checkpoint(MPI_Comm comm, const std::filesystem::path& path, const Me
 /// @note Collective
 std::string checkpoint_description(MPI_Comm comm, const std::filesystem::path& path);
 
+/// A table for `StateTables::cells` that says which cells each rank owns, and in which order. Needed where the mesh has
+/// been cut anew since the run began, so that a restart can cut it the same way.
+template <int D>
+Table owned_cells_table(const Mesh<D>& mesh);
+
+/// The cells of this rank in that table.
+/// @pre The checkpoint has it, and is of as many ranks as now
+/// @throws RunError on all ranks, with path and reason
+/// @note Collective
+std::vector<GlobalIndex> checkpoint_cells(MPI_Comm comm, const std::filesystem::path& path);
+
 template <int D>
 struct Checkpoint
 {

@@ -24,7 +24,7 @@ void pack(const Particles<D>& particles, const Leaver& leaver, Bytes& bytes)
                   { put(column.empty() ? std::remove_cvref_t<decltype(column[0])>{} : column[leaver.particle]); });
 }
 
-/// Appends the particles that a message holds.
+/// Appends the particles that a message holds; tractions among them are made room for.
 template <int D>
 void unpack(const Bytes& bytes, const std::unordered_map<GlobalIndex, Index>& cell_numbers, Particles<D>& particles)
 {
@@ -45,6 +45,8 @@ void unpack(const Bytes& bytes, const std::unordered_map<GlobalIndex, Index>& ce
                     {
                       std::remove_cvref_t<decltype(column[0])> value;
                       get(value);
+                      if (column.empty() && value != 0)
+                        require_traction(particles);
                       if (!column.empty())
                         column[p] = value;
                     });

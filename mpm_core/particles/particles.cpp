@@ -7,10 +7,9 @@ namespace mpm
 template <int D>
 void resize(Particles<D>& particles, Index size)
 {
-  const bool loaded = !particles.traction[0].empty();
   const auto n = static_cast<std::size_t>(size);
   for_each_column(particles, [n](const char*, int, auto& column) { column.resize(n); });
-  if (!loaded)
+  if (!particles.loaded)
     for (auto& column : particles.traction)
       column.clear();
 }
@@ -18,6 +17,7 @@ void resize(Particles<D>& particles, Index size)
 template <int D>
 void require_traction(Particles<D>& particles)
 {
+  particles.loaded = true;
   for (auto& column : particles.traction)
     column.resize(particles.id.size(), 0.0);
 }

@@ -17,7 +17,7 @@ struct Run
   Index material;
 };
 
-/// All columns have one entry per particle, but for `traction`, which is empty where no particle carries any.
+/// All columns have one entry per particle, but for `traction`, which is empty unless `loaded`.
 template <int D>
 struct Particles
 {
@@ -30,6 +30,7 @@ struct Particles
   Column deviatoric_strain;               ///< accumulated deviatoric strain, sum of sqrt(2/3 de : de)
   std::vector<Column> state; ///< state variables of the law; 0 is the accumulated plastic deviatoric strain
   std::array<Column, D> initial_position; ///< [m]; displacement is position minus this
+  bool loaded = false;                    ///< whether there are tractions; a rank without particles must know it too
   std::array<Column, D> traction;         ///< force from a loaded boundary, t_p of (15) [N], moves with the particle
   std::vector<Index> material;            ///< number of the law
   std::vector<Index> cell;                ///< cell on this rank that holds the particle

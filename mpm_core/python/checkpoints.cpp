@@ -1,6 +1,7 @@
 #include "python/bindings.h"
 
 #include "io/checkpoint.h"
+#include "python/arrays.h"
 #include "steps/state.h"
 
 namespace mpm::python
@@ -10,11 +11,13 @@ namespace
 namespace py = pybind11;
 
 template <int D>
-void save(Model<D>& model, const std::string& path, const std::string& description)
+void save(Model<D>& model, const std::string& path, const std::string& description, bool with_partition)
 {
   prepare(model);
-  write_checkpoint<D>(model.exchange.comm, path, model.mesh, model.particles, {rank_state(model), cell_state(model)},
-                      description);
+  StateTables state{rank_state(model), cell_state(model)};
+  if (with_partition)
+    state.cells.push_back(owned_cells_table(model.mesh));
+  write_checkpoint<D>(model.exchange.comm, path, model.mesh, model.particles, state, description);
 }
 
 template <int D>
@@ -42,6 +45,8 @@ void bind_checkpoints(py::module_& m)
 {
   m.def("checkpoint_description",
         [](std::uintptr_t comm, const std::string& path) { return checkpoint_description(communicator(comm), path); });
+  m.def("checkpoint_cells", [](std::uintptr_t comm, const std::string& path)
+        { return copied(checkpoint_cells(communicator(comm), path)); });
   bind<2>(m);
   bind<3>(m);
 }

@@ -1,10 +1,12 @@
 #include "python/bindings.h"
 
 #include "mesh/search.h"
+#include "parallel/partition.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
 #include "steps/mapping.h"
 #include "steps/placement.h"
+#include "steps/rebalance.h"
 #include "steps/run.h"
 
 namespace mpm::python
@@ -121,7 +123,7 @@ py::object column(const Model<D>& model, const std::string& name)
   if (name == "initial_position")
     return rows(p.initial_position, n);
   if (name == "traction")
-    return rows(p.traction, p.traction[0].size());
+    return rows(p.traction, p.loaded ? n : 0);
   if (name == "state")
     return rows(p.state, n);
   throw InputError("particle field is '" + name + "', which does not exist");
@@ -151,7 +153,10 @@ void set_column(Model<D>& model, const std::string& name, const py::array& array
   else if (name == "initial_position")
     set_rows(name.c_str(), array, p.initial_position, n);
   else if (name == "traction")
+  {
     set_rows(name.c_str(), array, p.traction, n);
+    p.loaded = true;
+  }
   else if (name == "state")
     set_rows(name.c_str(), array, p.state, n);
   else
@@ -186,6 +191,16 @@ py::array_t<Index> cells_of(const Mesh<D>& mesh, const py::array& points)
   return cells;
 }
 
+/// A row for each cell, a number for each of its vertices.
+template <std::size_t N>
+py::array_t<Index> cell_rows(const std::vector<std::array<Index, N>>& rows)
+{
+  py::array_t<Index> array({rows.size(), N});
+  for (std::size_t c = 0; c < rows.size(); ++c)
+    std::copy(rows[c].begin(), rows[c].end(), array.mutable_data() + c * N);
+  return array;
+}
+
 template <int D>
 std::unique_ptr<Model<D>> new_model(const Mesh<D>& mesh, std::vector<Law> laws, std::uintptr_t comm)
 {
@@ -208,6 +223,20 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def_property_readonly("owned_cells", [](const Mesh<D>& mesh) { return mesh.owned_cells; })
       .def_property_readonly("cell_tags", [](const Mesh<D>& mesh) { return copied(mesh.cell_tags); })
       .def("cells_of", &cells_of<D>)
+      .def_property_readonly("neighbours", [](const Mesh<D>& mesh) { return cell_rows(mesh.neighbours); })
+      .def_property_readonly("facet_tags", [](const Mesh<D>& mesh) { return cell_rows(mesh.facet_tags); })
+      .def("with_ghost_values",
+           [](const Mesh<D>& mesh, const py::array& owned, std::uintptr_t comm)
+           {
+             check_array<double>("owned", owned, {static_cast<py::ssize_t>(mesh.owned_cells)});
+             return copied(with_ghost_values<D>(mesh, values<double>(owned), communicator(comm)));
+           })
+      .def("weighted_parts",
+           [](const Mesh<D>& mesh, const py::array& weights, std::uintptr_t comm)
+           {
+             check_array<GlobalIndex>("weights", weights, {static_cast<py::ssize_t>(mesh.owned_cells)});
+             return copied(weighted_parts<D>(mesh, values<GlobalIndex>(weights), communicator(comm)));
+           })
       .def("volumes",
            [](const Mesh<D>& mesh)
            {
@@ -250,6 +279,7 @@ void bind_model(py::module_& m, const std::string& suffix)
                requests.push_back({tag, whole, vector});
              model.supports = make_supports<D>(model.mesh, model.exchange, requests);
            })
+      .def("set_partition", &set_partition<D>)
       .def_readwrite("outflow_tags", &M::outflow_tags)
       .def_readwrite("gravity", &M::gravity)
       .def_readwrite("gravity_ramp", &M::gravity_ramp)

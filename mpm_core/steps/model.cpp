@@ -68,7 +68,7 @@ void prepare(Model<D>& model)
   sort_particles(model);
   work.moments.assign(cells, CellMoments<D>{});
   // A rank without particles must still agree with the others on what is exchanged.
-  int loaded = !model.particles.traction[0].empty();
+  int loaded = model.particles.loaded;
   MPI_Allreduce(MPI_IN_PLACE, &loaded, 1, MPI_INT, MPI_MAX, model.exchange.comm);
   if (loaded)
     require_traction(model.particles);

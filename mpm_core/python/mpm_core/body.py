@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, partition
 from ._core import InputError
 from .checks import positive
 from .collective import collectively
@@ -36,6 +36,8 @@ class Body:
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run
+        self._first_mesh: Mesh | None = None  # when `mesh` has been cut anew since
+        self._left_imbalance = 1.0  # by the last cut
         self.particles = Particles(self._core, mesh.dim)
         """The particles on this rank."""
 
@@ -195,6 +197,28 @@ class Body:
             return floats("position", position, (len(self.particles), self.mesh.dim))
 
         self._core.place_particles(collectively(self.comm, checked))
+
+    # --- ranks ---------------------------------------------------------------------------------------------------
+
+    def imbalance(self) -> float:
+        """Most particles on a rank over their mean on all ranks; 1 is best [-]. Collective."""
+        return partition.imbalance(self)
+
+    def rebalance(self) -> float:
+        """Cut the background mesh anew, so that ranks have about as many particles, and move cells and particles there.
+
+        Afterwards ``mesh`` is another object: cells and nodes have other local numbers, and those over all ranks as before.
+        Results change by round-off only. Runs do this by themselves, with ``rebalance=``.
+
+        Returns:
+            The imbalance that is left.
+
+        Raises:
+            RunError: the program was built without PT-SCOTCH.
+        """
+        if self.comm.size > 1:
+            partition.cut_anew(self)
+        return self.imbalance()
 
     # --- supports and loads --------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from . import _core
+from . import _core, partition
 from ._core import InputError, RunError
 from .collective import collectively
 from .implicit import StepControl
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def save(model: Model, path: str | os.PathLike[str]) -> None:
     """See `Model.save`."""
-    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1))
+    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1), _is_cut_anew(model))
 
 
 def restore(model: Model, path: str | os.PathLike[str]) -> None:
@@ -28,8 +28,15 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     text = _core.checkpoint_description(MPI._addressof(model.comm), name)
     here = _description(model)
     there = collectively(model.comm, lambda: _matching(name, text, here))
+    if there.get("cut_anew") and there["ranks"] == model.comm.size:
+        cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
+        partition.take_partition(model, cells)
     _core.restore(model._core, name)
     _take(model, there)
+
+
+def _is_cut_anew(model: Model) -> bool:
+    return model._first_mesh is not None
 
 
 def _matching(path: str, text: str, here: dict[str, Any]) -> dict[str, Any]:
@@ -69,6 +76,8 @@ def _description(model: Model) -> dict[str, Any]:
         "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
         "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
         "next_id": model._next_id,
+        "cut_anew": _is_cut_anew(model),
+        "left_imbalance": model._left_imbalance,
         "implicit": None if model._control is None else vars(model._control),
     }
 
@@ -89,6 +98,7 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._wishes = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
     model._prescribed = {int(tag): model._wishes[k] for tag, k in there["prescribed"].items()}
     model._next_id = there["next_id"]
+    model._left_imbalance = there.get("left_imbalance", 1.0)
     model._control = None
     model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
     collectively(model.comm, lambda: core.set_supports(model._wishes))

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .checks import positive, within
+from .partition import keep_balance
 from .report import Report
 
 if TYPE_CHECKING:
@@ -61,17 +62,23 @@ def report_times(model: Model, until: float, every: float | None, since: float |
 
 
 def run_explicit(
-    model: Model, options: Any, run: Any, times: Sequence[float], watch: Callable[[], bool] | None
+    model: Model,
+    options: Any,
+    run: Any,
+    times: Sequence[float],
+    watch: Callable[[], bool] | None,
+    rebalance: float,
 ) -> Iterator[Report]:
     """Step to each of the times, with a report there."""
     # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
-    pauses = 1 if watch is not None else max(1, 2_000_000 // most // _core.control_interval)
+    pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     run.max_steps = pauses * _core.control_interval
     for until in times:
         run.until = until
         while model.time < until:
+            keep_balance(model, rebalance)
             model._core.run_explicit(options, run)
             if watch is not None and watch():
                 yield model.report()

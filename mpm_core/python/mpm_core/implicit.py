@@ -13,6 +13,7 @@ from ._core import RunError
 from .checks import within
 from .explicit import require_particles
 from .ghost import GhostPenalty
+from .partition import keep_balance
 from .report import ImplicitReport
 from .solution import Solution
 
@@ -63,13 +64,18 @@ class Stepper:
 
     def __init__(self, model: Model, solver: Any, options: Any, dt: float) -> None:
         self._model, self._core = model, model._core
-        self._step = (_core.ImplicitStep2 if model.mesh.dim == 2 else _core.ImplicitStep3)(model._core)
-        self._solver = solver.solver(model.comm, model.mesh.dim)
-        self._options = options
-        self._changed = True
+        self._options, self._method = options, solver
+        self.begin_anew()
         self.control = StepControl(dt, dt)
         self.last = Solution()
         """How the last step tried was solved"""
+
+    def begin_anew(self) -> None:
+        """Forget what belongs to the nodes of this rank, after they have changed."""
+        dim = self._model.mesh.dim
+        self._step = (_core.ImplicitStep2 if dim == 2 else _core.ImplicitStep3)(self._core)
+        self._solver = self._method.solver(self._model.comm, dim)
+        self._changed = True
 
     def advance(self, until: float) -> None:
         """One step towards a time, cut as often as it must be.
@@ -122,6 +128,7 @@ def run_implicit(
     dt: float,
     every_step: bool,
     watch: Callable[[], bool] | None,
+    rebalance: float,
 ) -> Iterator[ImplicitReport]:
     """Step until each of the times; reports then, or after each step."""
     stepper = Stepper(model, solver, options, dt)
@@ -132,6 +139,8 @@ def run_implicit(
     for until in times:
         close = 1e-9 * abs(until)
         while until - model.time > close:
+            if keep_balance(model, rebalance):
+                stepper.begin_anew()
             stepper.advance(until)
             if until - model.time <= close:
                 model._core.time = until

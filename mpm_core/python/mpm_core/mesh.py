@@ -21,6 +21,11 @@ def _integers(name: str, values: ArrayLike, dtype: type, width: int | None) -> N
     return np.ascontiguousarray(array, dtype=dtype)
 
 
+def _numbers(given: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Numbers over all ranks; by default those on this rank."""
+    return np.array(given, dtype=np.int64) if np.size(given) else np.arange(count, dtype=np.int64)
+
+
 def floats(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Values as finite float64 numbers in the given shape (None: any length).
 
@@ -116,8 +121,11 @@ class Mesh:
         """Node numbers of each cell, shape (cells, D + 1); owned cells first."""
         self.cell_tags: NDArray[np.int32] = self._core.cell_tags
         self.facets: NDArray[np.int32] = np.array(facets, dtype=np.int32).reshape(-1, self.dim)
-        numbers = np.asarray(global_cells) if np.size(global_cells) else np.arange(len(self.cells))
-        self.cell_numbers: int = 1 + comm.allreduce(int(numbers.max(initial=-1)), MPI.MAX)
+        self.global_nodes: NDArray[np.int64] = _numbers(global_nodes, len(self.points))
+        """Number of each node over all ranks, shape (nodes,)."""
+        self.global_cells: NDArray[np.int64] = _numbers(global_cells, len(self.cells))
+        """Number of each cell over all ranks, shape (cells,); it is the same however the mesh is cut."""
+        self.cell_numbers: int = 1 + comm.allreduce(int(self.global_cells.max(initial=-1)), MPI.MAX)
         """One more than the highest number that a cell has over all ranks."""
         self._tags = {
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),

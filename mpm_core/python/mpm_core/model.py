@@ -15,6 +15,7 @@ from .ghost import GhostPenalty
 from .implicit import implicit_options, run_implicit, settle
 from .mesh import floats
 from .newton import Newton
+from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 
@@ -120,6 +121,7 @@ class Model(Body):
         nmd: bool = False,
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         allow_unstable: bool = False,
+        rebalance: float | None = None,
     ) -> Iterator[Report]:
         """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
 
@@ -137,6 +139,8 @@ class Model(Body):
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             allow_unstable: take ``dt`` even above the critical time step.
+            rebalance: most particles on a rank over their mean, above 1, from which on the mesh is cut anew (see the method
+                ``rebalance``); looked at every 32 steps. By default the mesh stays as it was cut.
 
         Raises:
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
@@ -144,7 +148,8 @@ class Model(Body):
         """
         options = explicit_options(damping, pic, nmd, stress_update)
         run = run_options(dt, courant, allow_unstable)
-        return run_explicit(self, options, run, report_times(self, until, every, since), watch)
+        times = report_times(self, until, every, since)
+        return run_explicit(self, options, run, times, watch, rebalance_threshold(rebalance))
 
     def implicit(
         self,
@@ -160,6 +165,7 @@ class Model(Body):
         pic: float = 0.0,
         nmd: bool = False,
         ghost: GhostPenalty | None = None,
+        rebalance: float | None = None,
     ) -> Iterator[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
 
@@ -179,6 +185,7 @@ class Model(Body):
             pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+            rebalance: see ``explicit``; looked at before each step.
 
         Raises:
             InputError: an argument out of its range.
@@ -189,8 +196,9 @@ class Model(Body):
         longest = positive("dt", dt, "s")
         times = report_times(self, until, every, since)
         return run_implicit(
-            self, solver or Newton(), options, times=times, dt=longest, every_step=every is None, watch=watch
-        )
+            self, solver or Newton(), options, times=times, dt=longest, every_step=every is None, watch=watch,
+            rebalance=rebalance_threshold(rebalance),
+        )  # fmt: skip
 
     def equilibrate(
         self,

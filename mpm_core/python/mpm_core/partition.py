@@ -1,0 +1,113 @@
+"""The background mesh on other ranks: cut anew, so that all have about as many particles, or as a checkpoint says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ._core import InputError
+from .mesh import Mesh
+from .rows import carried, exchanged
+
+if TYPE_CHECKING:
+    from .body import Body
+
+PARTICLE_WEIGHT = 16
+"""of a particle in the cut, where a cell has 1: cells without particles cost little, but should not all go to one rank"""
+
+GROWTH = 1.05
+"""of the imbalance that the last cut left, before another is tried: some meshes cannot be cut any better"""
+
+
+def imbalance(body: Body) -> float:
+    """Most particles on a rank over their mean; 1 is best, and what it is without particles. Collective."""
+    counts = np.array([len(body.particles)] * 2, dtype=np.int64)
+    most, total = np.empty(1, np.int64), np.empty(1, np.int64)
+    body.comm.Allreduce(counts[:1], most, MPI.MAX)
+    body.comm.Allreduce(counts[1:], total, MPI.SUM)
+    return float(most[0]) * body.comm.size / float(total[0]) if total[0] > 0 else 1.0
+
+
+def rebalance_threshold(given: float | None) -> float:
+    """The threshold of a run; infinite when there is none."""
+    if given is not None and not 1 < given < np.inf:
+        raise InputError(f"rebalance is {given}, expected a number above 1: most particles on a rank over their mean")
+    return np.inf if given is None else float(given)
+
+
+def keep_balance(body: Body, threshold: float) -> bool:
+    """Cut the mesh anew where the ranks' particles are too unequal; returns whether it was. Collective."""
+    if threshold == np.inf or body.comm.size == 1 or imbalance(body) <= max(threshold, GROWTH * body._left_imbalance):
+        return False
+    cut_anew(body)
+    return True
+
+
+def cut_anew(body: Body) -> None:
+    """Cut the mesh by the number of particles, and move cells and particles to their new ranks. Collective."""
+    mesh, address = body.mesh, MPI._addressof(body.comm)
+    particles = np.bincount(body.particles.cell, minlength=mesh.owned_cells)
+    parts = mesh._core.weighted_parts(1 + PARTICLE_WEIGHT * particles.astype(np.int64), address)
+    first = sum(body.comm.allgather(mesh.owned_cells)[: body.comm.rank])
+    take_mesh(body, redistributed(mesh, parts, first + np.arange(mesh.owned_cells)))
+    body._left_imbalance = imbalance(body)
+
+
+def take_partition(body: Body, cells: NDArray) -> None:
+    """Bring the model to a partition, given by the numbers of the cells that this rank is to own, in their order. Collective."""
+    mesh, comm = body.mesh, body.comm
+    place = np.column_stack([np.full(len(cells), comm.rank), np.arange(len(cells))]).astype(np.float64)
+    rank, order = carried(comm, cells, place, mesh.global_cells[: mesh.owned_cells]).T.astype(np.int64)
+    take_mesh(body, redistributed(mesh, rank, order))
+
+
+def take_mesh(body: Body, mesh: Mesh) -> None:
+    """Give the model its mesh cut otherwise, and all that hangs on it. Collective."""
+    body._core.set_partition(mesh._core)
+    body._core.set_supports(body._wishes)
+    body._first_mesh = body._first_mesh or body.mesh  # commonly with the owner of the communicator
+    body.mesh = mesh
+
+
+def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
+    """The same mesh on other ranks, with the cells across the facets of owned ones as ghosts.
+
+    Cells of a rank are in the given order, ghosts by their numbers, and nodes as these cells name them: what a rank has
+    depends only on which cells it owns, and in which order.
+
+    Args:
+        ranks: new owner of each cell that this rank owns now.
+        order: place of the cell among those of its new owner: the lower number comes first.
+
+    Note:
+        Collective.
+    """
+    n, d, comm = mesh.owned_cells, mesh.dim, mesh.comm
+    ghosted = mesh._core.with_ghost_values(np.asarray(ranks, np.float64), MPI._addressof(comm)).astype(np.int64)
+    nodes, neighbours = mesh.cells[:n], mesh._core.neighbours[:n]
+    whole = np.column_stack([
+        mesh.global_cells[:n], ranks, order, mesh.cell_tags[:n], mesh.global_nodes[nodes], mesh._core.facet_tags[:n],
+        mesh.points[nodes].reshape(n, d * (d + 1)).view(np.int64),
+    ]).astype(np.int64, copy=False)  # fmt: skip
+    wanted = np.column_stack([ranks, np.where(neighbours < 0, ranks[:, None], ghosted[neighbours])])
+    pairs = np.unique(np.column_stack([np.repeat(np.arange(n), d + 2), wanted.ravel()]), axis=0)
+    rows, _ = exchanged(comm, pairs[:, 1], whole[pairs[:, 0]])
+
+    ghost = rows[:, 1] != comm.rank
+    rows = rows[np.lexsort([np.where(ghost, rows[:, 0], rows[:, 2]), ghost])]
+    numbers, owners, _, tags = rows[:, :4].T
+    corners, facet_tags = rows[:, 4 : 5 + d].ravel(), rows[:, 5 + d : 6 + 2 * d]
+    points = np.ascontiguousarray(rows[:, 6 + 2 * d :]).view(np.float64).reshape(-1, d)
+    known, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
+    named = np.argsort(first)
+    cells = np.argsort(named)[inverse].reshape(-1, d + 1)
+    facets = np.concatenate([np.column_stack([np.sort(np.delete(cells, k, axis=1), axis=1), facet_tags[:, k]])
+                             for k in range(d + 1)])  # fmt: skip
+    facets = np.unique(facets[facets[:, -1] >= 0], axis=0)
+    return Mesh(
+        points[first[named]], cells, cell_tags=tags, facets=facets[:, :-1], facet_tags=facets[:, -1],
+        global_nodes=known[named], global_cells=numbers, cell_owners=owners, comm=comm,
+    )  # fmt: skip
