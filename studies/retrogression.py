@@ -1,8 +1,10 @@
 """A slope of sensitive clay: a disturbed toe slips, and the bank fails back piece by piece, on two mesh sizes.
 
 The clay does not drain and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell
-size). Finite elements find the stresses of the intact slope; the strength of a zone around the toe is then taken away, and
-the explicit scheme follows the failure to rest. All of it is done with the cell size given and with half of it.
+size, so that a slip dissipates the same energy on any mesh). Finite elements find the stresses of the intact slope; the
+strength of a zone around the toe is then taken away, and the explicit scheme follows the failure until the slope is at rest:
+until its kinetic energy has stayed below a thousandth of its largest for two seconds. All of it is done with the cell size
+given and with half of it, and the two are compared.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from common.animation import Frame, save_animation
 from common.history import History
@@ -19,8 +22,9 @@ from common.interrupt import Interrupt
 from common.movie import Movie, particle_frame
 from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
 from common.page import Page
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, save_history, save_particles
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, paper_style, save_particles
 from common.progress import Progress
+from common.ranks import run_study
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import OutputError, results_folder, write_summary
 from mpi4py import MPI
@@ -29,9 +33,18 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
-COLUMNS = ["time_s", "retrogression_m", "runout_m", "kinetic_energy_J_per_m", "plastic_share", "dt_s"]
-AT_REST = 1e-3
-"""Share of the largest kinetic energy below which the slope is at rest."""
+COLUMNS = [
+    "time_s", "retrogression_m", "runout_m", "work_of_stresses_J_per_m", "kinetic_energy_J_per_m", "plastic_share", "dt_s"
+]  # fmt: skip
+MEASURES = {
+    "retrogression_m": "Failed length of the crest [m]", "runout_m": "Run-out past the toe [m]",
+    "work_of_stresses_J_per_m": "Work of the stresses [MJ/m]",
+}  # fmt: skip
+"""What the mesh sizes are compared by. Nearly all of the stresses' work is dissipated in the slips: what the soil stores
+elastically changes little."""
+AT_REST, REST = 1e-3, 2.0
+"""At rest is a slope whose kinetic energy has stayed below this share of its largest for so long [s]: a scarp may stand for
+a moment before it fails too."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -42,8 +55,8 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_slope_options(p)
     change_defaults(
-        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=0.5, particles_per_cell=3, unit_weight=18e3,
-        material="softening", young=2e6, poisson=0.45, cohesion=18e3, friction_angle=0.0, residual_cohesion=1e3,
+        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=18e3,
+        material="softening", young=2e6, poisson=0.45, cohesion=18e3, friction_angle=0.0, residual_cohesion=4e3,
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
     add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
@@ -106,12 +119,19 @@ class Slide:
         scarp = comm.allreduce(float(failed.min(initial=np.inf)), MPI.MIN)
         front = comm.allreduce(float(p.position[:, 0].max(initial=-np.inf)), MPI.MAX)
         self.history.add(
-            time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=front - self.case.toe,
-            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share, dt_s=report.dt,
+            time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=max(0.0, front - self.case.toe),
+            work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share, dt_s=report.dt,
         )  # fmt: skip
         frame = particle_frame(self.case.model, report.time)
         if frame is not None:
             self.frames.append(frame)
+
+
+def is_at_rest(history: History) -> bool:
+    """Whether the kinetic energy has been low for long enough."""
+    time, energy = history["time_s"], history["kinetic_energy_J_per_m"]
+    moving = np.flatnonzero(energy >= AT_REST * energy.max())
+    return bool(energy.max() > 0 and len(moving) and time[-1] - time[moving[-1]] >= REST)
 
 
 def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> Slide:
@@ -130,8 +150,7 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
             for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd):
                 result.look(report)
                 progress.show(report.time, report.steps, runout=f"{history['runout_m'][-1]:.2f} m")
-                energy = history["kinetic_energy_J_per_m"]
-                result.at_rest = bool(energy[-1] < AT_REST * energy.max() and len(energy) > 5)
+                result.at_rest = is_at_rest(history)
                 if interrupt.requested():
                     result.stopped = f"interrupted at {report.time:g} s"
                 if result.at_rest or result.stopped:
@@ -165,18 +184,30 @@ def draw(result: Slide, folder: Path) -> Movie | None:
 
 
 def compare(results: list[Slide], folder: Path) -> None:
-    """Retrogression and run-out over time on all mesh sizes; on the first rank."""
+    """The measures over time on all mesh sizes; on the first rank."""
     if comm.rank != 0:
         return
-    time = max((r.history["time_s"] for r in results), key=len)
-    for column, label in [
-        ("retrogression_m", "Failed length of the crest [m]"),
-        ("runout_m", "Run-out past the toe [m]"),
-    ]:
-        curves = {
-            f"cells of {r.cell_size:g} m": np.interp(time, r.history["time_s"], r.history[column]) for r in results
-        }
-        save_history(folder / f"{column.removesuffix('_m')}.png", time, curves, label)
+    with paper_style():
+        figure, axes = plt.subplots(1, len(MEASURES), figsize=(10, 3.2), layout="constrained")
+        for ax, (column, label) in zip(axes, MEASURES.items(), strict=True):
+            for result, style in zip(results, ("-", "--")):
+                values = result.history[column] * (1e-6 if "[MJ" in label else 1.0)
+                ax.plot(
+                    result.history["time_s"], values, style, color="#1f3b73", label=f"cells of {result.cell_size:g} m"
+                )
+            ax.set(xlabel="Time [s]", ylabel=label, xlim=(0, None), ylim=(0, None))
+            ax.grid(linewidth=0.3, color="#d0d0d0")
+        axes[0].legend(frameon=False)
+        figure.savefig(folder / "meshes.png", dpi=200)
+        plt.close(figure)
+
+
+def differences(results: list[Slide]) -> dict[str, float]:
+    """By how much the measures on the two mesh sizes differ in the end, as shares of their mean."""
+    if len(results) < 2:
+        return {}
+    ends = {column: [r.history[column][-1] for r in results] for column in MEASURES}
+    return {column: float(abs(np.diff(end)[0]) / max(np.mean(end), 1e-300)) for column, end in ends.items()}
 
 
 # --- 5. All together -------------------------------------------------------------------------------------------------
@@ -196,29 +227,26 @@ def main(arguments: list[str] | None = None) -> int:
         compare(results, folder)
     found = {
         f"{r.cell_size:g}_m": {
-            "retrogression_m": r.history["retrogression_m"][-1], "runout_m": r.history["runout_m"][-1],
+            **{column: r.history[column][-1] for column in MEASURES},
             "time_s": r.history["time_s"][-1], "at_rest": r.at_rest, "stopped_because": r.stopped,
             "initial_out_of_balance_ratio": r.ratio, "particles": comm.allreduce(len(r.case.model.particles)),
         }
         for r in results
     }  # fmt: skip
     stopped = any(r.stopped for r in results)
-    write_summary(folder, a, {"finished_run": not stopped, "cells": found}, comm, Page(movies=movies))
+    write_summary(folder, a, {"finished_run": not stopped, "cells": found, "difference_between_meshes": differences(results)},
+                  comm, Page(movies=movies))  # fmt: skip
     if comm.rank == 0:
         for result in results:
             if result.stopped:
                 print(f"the run with cells of {result.cell_size:g} m ended early: {result.stopped}", file=sys.stderr)
         for size, f in found.items():
             print(f"{size}: failed back {f['retrogression_m']:.2f} m, run-out {f['runout_m']:.2f} m, "
+                  f"work of the stresses {f['work_of_stresses_J_per_m'] / 1e6:.3f} MJ/m, "
                   f"{'at rest' if f['at_rest'] else 'not at rest'} after {f['time_s']:.1f} s")  # fmt: skip
         print(f"results in {folder}")
     return interrupt.exit_code or (1 if stopped else 0)
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        if comm.rank == 0:
-            print(f"studies/run retrogression: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)
