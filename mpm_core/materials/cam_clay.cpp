@@ -72,7 +72,8 @@ Result<D> result_of(const Start<D>& a, double x, double multiplier)
 
 /// The return, for a point that yields. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the
 /// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between
-/// them the yield function has its root. The unknown is the share of that x.
+/// them the yield function has its root. The unknown is the share of that x. In small increments the share is small,
+/// and the secant method takes a few evaluations; where it does not get there, by bracketing.
 template <int D>
 Result<D> returned(const Start<D>& a)
 {
@@ -85,9 +86,20 @@ Result<D> returned(const Start<D>& a)
     return result_of(a, x, share / (left * pc * sum * mean_growth(sum * critical * left)));
   };
   const double scale = a.preconsolidation * a.preconsolidation;
-  const double share = root_between([&](double s) { return at(s).yield(a.slope_squared) / scale; },
-                                    {0, at(0).yield(a.slope_squared) / scale}, {1, -1});
-  return at(share);
+  const auto excess = [&](const Result<D>& r) { return r.yield(a.slope_squared) / scale; };
+  const Sample start{0, excess(at(0))};
+  Sample before = start;
+  double share = 1e-3;
+  for (int evaluations = 0; evaluations < 8 && share > 0 && share < 1; ++evaluations)
+  {
+    const Result<D> result = at(share);
+    const Sample now{share, excess(result)};
+    if (std::abs(now.f) <= 1e-13)
+      return result;
+    share -= now.f * (now.x - before.x) / (now.f - before.f);
+    before = now;
+  }
+  return at(root_between([&](double s) { return excess(at(s)); }, start, {1, -1}));
 }
 
 /// Derivatives of a result by the volumetric strain (compression positive) and by q of the trial at a fixed modulus

@@ -75,8 +75,11 @@ BatchReport update(const Hencky& law, const PointBatch<D>& points)
   constexpr std::size_t n = n_stress<D>;
   double* const log_volume = points.state[n_state(law.law)];
   for (Index i = 0; i < points.size; ++i)
+  {
+    const double volume = std::exp(log_volume[i]);
     for (std::size_t k = 0; k < n; ++k)
-      points.stress[k][i] *= std::exp(log_volume[i]);
+      points.stress[k][i] *= volume;
+  }
   BatchReport report = updated_law(law, points);
   auto failed = report.failed.begin();
   for (Index i = 0; i < points.size; ++i)

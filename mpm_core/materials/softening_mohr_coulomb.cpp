@@ -10,6 +10,13 @@ using namespace mohr_coulomb;
 
 namespace
 {
+Surface surface_of(const MohrCoulomb& law)
+{
+  constexpr double degree = std::numbers::pi / 180;
+  return mohr_coulomb::surface(elastic_moduli(law.young, law.poisson), law.poisson, law.cohesion,
+                               law.friction_angle * degree, law.dilation_angle * degree, law.tension_cutoff);
+}
+
 /// A trial stress and how the strength falls with the plastic strain of its return
 struct Softener
 {
@@ -74,10 +81,7 @@ struct Softener
 private:
   Surface mohr_coulomb_surface(double strain) const
   {
-    constexpr double degree = std::numbers::pi / 180;
-    const MohrCoulomb now = softened(law, strain, cell_size, cohesion_deviation);
-    return mohr_coulomb::surface(elastic_moduli(now.young, now.poisson), now.poisson, now.cohesion,
-                                 now.friction_angle * degree, now.dilation_angle * degree, now.tension_cutoff);
+    return surface_of(softened(law, strain, cell_size, cohesion_deviation));
   }
 };
 
@@ -118,6 +122,14 @@ void add_softening(const Softener& softener, const Surface& m, const Spectral<D>
     for (std::size_t j = 0; j < n_stress<D>; ++j)
       tangent[i * n_stress<D> + j] +=
           by_strain[i] * ((j < 3 ? volumetric : 0.0) + 2 * m.moduli.shear * by_trial[j]) / (1 - own);
+}
+
+/// Whether a point is surely elastic: it has its whole strength yet, and the trial stress is inside. Most points of a
+/// slope are, and this spares them their own surface and their principal stresses.
+template <int D>
+bool is_intact(const Surface& peak, const PointBatch<D>& points, Index i, const SymTensor<D>& trial)
+{
+  return points.state[0][i] == 0 && points.state[2][i] >= 0 && !may_yield(peak, trial);
 }
 
 /// Returns one trial stress that may be outside; whether it was.
@@ -181,6 +193,7 @@ template <int D>
 BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
 {
   const ElasticModuli moduli = elastic_moduli(law.peak.young, law.peak.poisson);
+  const Surface peak = surface_of(law.peak);
   if (points.tangent)
     fill_elastic_tangent<D>(moduli, points.size, points.tangent);
   BatchReport report;
@@ -192,7 +205,7 @@ BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
       report.failed.push_back(i);
       continue;
     }
-    if (update_point<D>(law, points, i, trial))
+    if (!is_intact(peak, points, i, trial) && update_point<D>(law, points, i, trial))
       ++report.plastic;
     else
       for (std::size_t k = 0; k < n_stress<D>; ++k)

@@ -96,6 +96,21 @@ def rate(model: mpm.Model, particle_steps: float, repetitions: int, **options) -
     return best, report
 
 
+def other_laws(soil: mpm.MohrCoulomb) -> dict[str, object]:
+    """Laws of like stiffness and strength as the soil."""
+    elastic = {"young": soil.young, "poisson": soil.poisson}
+    clay = mpm.CamClay(compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.33, void_ratio=1.0,
+                       preconsolidation=5e3, attraction=2e3)  # fmt: skip
+    return {
+        "Tresca": mpm.tresca(**elastic, shear_strength=5e3), "von Mises": mpm.von_mises(**elastic, yield_stress=9e3),
+        "Drucker-Prager": mpm.matched_drucker_prager(**elastic, cohesion=1e3, friction_angle=25.0),
+        "softening": mpm.SofteningMohrCoulomb(soil, residual_cohesion=500.0, residual_friction_angle=20.0,
+                                              softening_strain=0.1, reference_length=0.05),
+        "Cam-Clay": clay, "Hencky of Mohr-Coulomb": mpm.Hencky(soil),
+        "undrained Mohr-Coulomb": mpm.Undrained(soil, water_modulus=1e6, porosity=0.4),
+    }  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="file for the results")
@@ -111,6 +126,7 @@ def main() -> None:
         ("block 3D, linear elastic", lambda: block(16, elastic), {}),
         ("block 3D, Mohr-Coulomb", lambda: block(16, soil), {}),
     ]
+    cases += [(f"slope 2D, {name}", lambda law=law: slope(0.05, law), {}) for name, law in other_laws(soil).items()]
     if a.small:
         cases = [case for case in cases if case[1]().mesh.cells.shape[0] < 20000]
     bandwidth = triad_bandwidth()
