@@ -86,11 +86,14 @@ def assert_same(one, other, relative=1e-8):
         np.testing.assert_allclose(one[name] / scale, values / scale, rtol=0, atol=relative, err_msg=name)
 
 
-def sliding_slope(comm, owners_of=bands, per_cell=3):
-    """A block of soil on a smooth base, on an incline: it slides, yields and spreads over several times its length."""
+def sliding_slope(comm, owners_of=bands, per_cell=3, laws=None):
+    """A block of soil on a smooth base, on an incline: it slides, yields and spreads over several times its length.
+
+    laws: of the model; a Mohr-Coulomb soil by default.
+    """
     mesh = spread_box((24, 6), (2.4, 0.6), comm, owners_of, diagonals="alternating", body=((0.1, 0), (0.6, 0.4)))
     soil = mpm.MohrCoulomb(young=4e6, poisson=0.3, cohesion=1e3, friction_angle=25.0)
-    model = mpm.Model(mesh, soil)
+    model = mpm.Model(mesh, soil if laws is None else laws)
     model.seed(density=2000.0, per_cell=per_cell, cell_tag=1)
     model.roller(1, (1, 0))
     model.roller(3, (0, 1))

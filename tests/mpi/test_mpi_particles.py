@@ -96,7 +96,7 @@ def test_an_error_on_one_rank_is_raised_on_all(comm, phase):
         "material": "material is 9",
         "seed": "density",
         "state": "mass and volume of particle",
-        "run": "law that failed|left the background mesh",
+        "run": "failed for the strain increment|left the background mesh",
     }
     model = block(comm, (0.0, 0.0), one_does_all)
     with pytest.raises((mpm.InputError, mpm.RunError), match=expected[phase]) as raised:

@@ -22,6 +22,9 @@ class VonMises:
     n_state = 1
     p_wave_modulus = NATIVE.p_wave_modulus
 
+    def __init__(self, strength=STRENGTH):
+        self.strength = strength
+
     def update(self, strain_increment, stress, state, tangent):
         s = strain_increment.shape[1]
         shear, bulk = YOUNG / (2 * (1 + POISSON)), YOUNG / (3 * (1 - 2 * POISSON))
@@ -32,7 +35,7 @@ class VonMises:
         p = stress[:, :3].mean(axis=1, keepdims=True) * normal
         deviator = stress - p
         size = np.sqrt(1.5 * (deviator**2 @ np.where(normal, 1.0, 2.0)))
-        ratio = np.minimum(1.0, STRENGTH / np.maximum(size, 1e-300))
+        ratio = np.minimum(1.0, self.strength / np.maximum(size, 1e-300))
         stress[:] = p + ratio[:, None] * deviator
         state[:, 0] += (1 - ratio) * size / (3 * shear)
         if tangent is not None:
