@@ -1,10 +1,9 @@
 """Sphinx: how the documentation is built. `tests/run docs` calls it with the built package on the path."""
 
+import shutil
 from pathlib import Path
 
 import mpm_core
-
-ROOT = Path(__file__).parents[1]
 
 project = "Talus"
 author = copyright = "The Talus developers"
@@ -13,8 +12,17 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
-html_theme = "furo"
+html_theme = "sphinx_rtd_theme"
 html_title = "Talus"
+# Formulas without a network: Debian's MathJax 2 is copied to the pages; elsewhere they load MathJax from the network.
+MATHJAX = Path("/usr/share/javascript/mathjax")
+if MATHJAX.is_dir():
+    mathjax_path = "mathjax/MathJax.js?config=TeX-AMS_CHTML"
+    delimiters = {"inlineMath": [["\\(", "\\)"]], "displayMath": [["\\[", "\\]"]]}
+    mathjax2_config = {
+        "tex2jax": {**delimiters, "processClass": "math", "ignoreClass": "mathjax_ignore"},
+        "messageStyle": "none",
+    }
 # Single backticks stand for code in the docstrings.
 default_role = "code"
 autodoc_member_order = "bysource"
@@ -34,6 +42,15 @@ def readable(app, what, name, obj, options, lines):
         lines[:] = [f"| {line}" if line.strip() else "" for line in lines]
 
 
+def copy_mathjax(app, error):
+    if MATHJAX.is_dir() and app.builder.name == "html" and not error:
+        parts = shutil.ignore_patterns(
+            "unpacked", "docs", "test", "localization", "MathML", "AsciiMath", "SVG", "HTML-CSS"
+        )
+        shutil.copytree(MATHJAX, Path(app.outdir) / "_static/mathjax", ignore=parts, dirs_exist_ok=True)
+
+
 def setup(app):
+    app.connect("build-finished", copy_mathjax)
     # Before napoleon, which makes markup of its own.
     app.connect("autodoc-process-docstring", readable, priority=400)

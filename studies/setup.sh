@@ -16,7 +16,7 @@ packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-d
 # What the tests need besides.
 test_packages=(gfortran python3-pytest python3-hypothesis python3-h5py python3-meshio python3-scipy python3-vtk9
   chromium chromium-driver python3-selenium clang-format black mypy)
-docs_packages=(python3-sphinx python3-myst-parser furo)
+docs_packages=(python3-sphinx python3-myst-parser python3-sphinx-rtd-theme libjs-mathjax)
 
 say() { printf "%s: %s\n" "$program" "$*" >&2; }
 die() { say "$*"; exit 1; }

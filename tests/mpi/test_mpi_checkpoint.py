@@ -190,7 +190,7 @@ def test_a_checkpoint_that_cannot_be_written_or_read(comm, shared_path, checkpoi
 
 
 IMPLICIT = dict(until=0.2, dt=0.04, every=0.1, since=0.0, damping=0.3, nmd=True)
-FEW = mpm.Newton(max_iterations=4)  # so few that steps are cut, and their length is part of the state
+FEW = mpm.Newton(max_iterations=3)  # so few that steps are cut, and their length is part of the state
 
 
 @pytest.mark.parametrize("owners_of", [bands, one_does_all])
