@@ -6,16 +6,14 @@ drawn. Laws of one's own: --python-law FILE.py:CLASS, or --umat LIBRARY.so with 
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from common.history import History
-from common.options import add_choice, add_count, add_number, check, study_parser
+from common.options import add_choice, add_count, add_number, study_parser
 from common.plots import paper_style
 from common.slope_case import add_soil_options
 from common.soils import add_law_options, law_of
@@ -41,27 +39,7 @@ def parser() -> ArgumentParser:
     add_count(p, "--steps", 400, "increments")
     add_soil_options(p, dilation_angle=0.0)
     add_law_options(p)
-    p.add_argument("--python-law", metavar="FILE:CLASS", help="a law written in Python, made without arguments")
-    p.add_argument("--umat", metavar="LIBRARY", help="shared library with an Abaqus UMAT")
-    p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
-    p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     return p
-
-
-def chosen_law(p: ArgumentParser, a: Namespace) -> Any:
-    """The law that the options name."""
-    if a.umat:
-        return mpm.Umat(a.umat, properties=a.properties, n_variables=a.variables, p_wave_modulus=a.young)
-    if a.python_law:
-        file, _, name = a.python_law.rpartition(":")
-        check(p, Path(file).is_file(), f"--python-law is '{a.python_law}', expected a file, a colon and a class in it")
-        sys.path.insert(0, str(Path(file).parent))  # for what it imports beside it
-        spec = importlib.util.spec_from_file_location("law_of_the_user", file)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        check(p, hasattr(module, name), f"--python-law names the class '{name}', which {file} does not have")
-        return mpm.PythonLaw(getattr(module, name)())
-    return law_of(a)
 
 
 # --- 2. The test -----------------------------------------------------------------------------------------------------
@@ -139,7 +117,7 @@ def draw(history: History, a: Namespace, path: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
-    law = chosen_law(p, a)
+    law = law_of(a)
     folder = results_folder("element_test", a.output)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
     with History(folder / "history.csv", COLUMNS) as history:

@@ -17,12 +17,13 @@ from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
-from common.movie import Movie, fem_frame
+from common.movie import PORE, Movie, fem_frame, has_pore_pressure
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
 from common.page import Page
 from common.plots import (
     DISPLACEMENT,
+    PORE_PRESSURE,
     SHEAR_STRAIN,
     VERTICAL_STRESS,
     colour_limits,
@@ -95,7 +96,7 @@ class Files:
         restarted = case.args.restart is not None
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
         a = case.args
-        self.names = ["position", *a.fields.split(",")]
+        self.names = ["position", *a.fields.split(","), *([PORE] if has_pore_pressure(self.model) else [])]
         self.particles = ParticleOutput(particles, comm, not a.float64, a.compression)
         self.mesh = MeshOutput(
             background, comm, mesh.points, mesh.cells[: mesh.owned_cells], not a.float64, a.compression
@@ -183,6 +184,8 @@ def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
         ("figure_4_shear_strain", "shear_strain", SHEAR_STRAIN),
         ("figure_5_vertical_stress", "vertical_stress", VERTICAL_STRESS),
     ]
+    if PORE in last:
+        drawn.append(("figure_7_excess_pore_pressure", PORE, PORE_PRESSURE))
     title = f"$t$ = {last['time']:.1f} s"
     for name, key, quantity in drawn:
         limits = colour_limits(quantity, [frame[key] for frame in watch.frames])
@@ -207,6 +210,7 @@ def page(case: SlopeCase, watch: Watch, summary: dict) -> Page:
         "figure_2_mesh": "Background mesh and particles at the start", "figure_3_displacement": "Total displacement at the end",
         "figure_4_shear_strain": "Accumulated plastic shear strain at the end",
         "figure_5_vertical_stress": "Vertical stress at the end", "figure_6_crest": "Displacement of the crest over time",
+        "figure_7_excess_pore_pressure": "Excess pore pressure at the end",
     }  # fmt: skip
     facts = {
         "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",

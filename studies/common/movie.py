@@ -11,11 +11,13 @@ import numpy as np
 
 import mpm_core as mpm
 
-from .plots import DISPLACEMENT, SHEAR_STRAIN, SPEED, VERTICAL_STRESS, Quantity, Scene, disc_diameter
+from .plots import DISPLACEMENT, PORE_PRESSURE, SHEAR_STRAIN, SPEED, VERTICAL_STRESS, Quantity, Scene, disc_diameter
 
 QUANTITIES = {
     "shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS, "speed": SPEED
 }  # fmt: skip
+PORE = "excess_pore_pressure"
+"""The state variable; frames of models that have it have it too"""
 LEVELS = 65534
 ABSENT = 65535
 MOST_BYTES = 60e6
@@ -34,13 +36,17 @@ class Movie:
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
             (n,) [m^3 per metre], quantities by their keys (n,) in SI units, and ``id`` (n,) when rows change their order
             or number from frame to frame.
-        quantities: those of the frames that can be chosen, by key.
+        quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
     """
 
     title: str
     scene: Scene
     frames: Sequence[Mapping[str, np.ndarray]]
     quantities: Mapping[str, Quantity] = field(default_factory=lambda: QUANTITIES)
+
+    def __post_init__(self) -> None:
+        if self.frames and PORE in self.frames[0]:
+            object.__setattr__(self, "quantities", {**self.quantities, PORE: PORE_PRESSURE})
 
 
 # --- frames ----------------------------------------------------------------------------------------------------------
@@ -49,11 +55,18 @@ class Movie:
 def particle_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray] | None:
     """All particles of a plane model as they are, on the first rank; None on the others. Collective."""
     p = model.particles
+    pore = {PORE: model.state(PORE)} if has_pore_pressure(model) else {}
     return _gathered(model, time, {
         "position": p.position, "volume": p.volume, "id": p.id, "displacement": np.linalg.norm(p.displacement, axis=1),
         # Plastic, because elastic oscillations during a long creep add up in the total.
         "shear_strain": p.plastic_strain, "vertical_stress": p.stress[:, 1], "speed": np.linalg.norm(p.velocity, axis=1),
+        **pore,
     })  # fmt: skip
+
+
+def has_pore_pressure(model: mpm.Model) -> bool:
+    """Whether the state of any of the laws has an excess pore pressure."""
+    return any(PORE in law.state_names for law in model.laws)
 
 
 def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | None = None) -> dict | None:
@@ -69,10 +82,12 @@ def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | N
     plastic = (
         found["state"][:, fem.law.state_names.index("plastic_strain")] if fem.law.n_state else np.zeros(len(places))
     )
+    pore = {PORE: found["state"][:, fem.law.state_names.index(PORE)]} if has_pore_pressure(model) else {}
     return _gathered(model, time, {
         "position": places + found["displacement"], "volume": p.volume, "id": p.id,
         "displacement": np.linalg.norm(found["displacement"], axis=1), "shear_strain": plastic,
         "vertical_stress": found["stress"][:, 1], "speed": np.zeros(len(places)),
+        **pore,
     })  # fmt: skip
 
 

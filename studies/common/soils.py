@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
+import sys
+from pathlib import Path
 from typing import Any
 
 import mpm_core as mpm
@@ -36,6 +39,11 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     add_switch(p, "--undrained", False, "effective stresses, with pore water that does not drain")
     add_number(p, "--water-modulus", 2e7, "Pa", "undrained: bulk modulus of the pore water", above=0)
     add_number(p, "--porosity", 0.4, "-", "undrained: porosity", above=0, below=1)
+    p.add_argument("--python-law", metavar="FILE:CLASS", help="a law written in Python, made without arguments, instead of "
+                   "--material")  # fmt: skip
+    p.add_argument("--umat", metavar="LIBRARY", help="shared library with an Abaqus UMAT, instead of --material")
+    p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
+    p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")
 
 
@@ -43,7 +51,7 @@ def law_of(args: argparse.Namespace) -> Any:
     """The law that the options describe.
 
     Raises:
-        InputError: options that do not fit together, by the law's own parameter names.
+        InputError: options that do not fit together, by the law's own parameter names; a law that is not there.
     """
     law = _skeleton(args)
     if args.finite_strain:
@@ -53,8 +61,27 @@ def law_of(args: argparse.Namespace) -> Any:
     return law
 
 
+def _python_law(text: str) -> Any:
+    """The law of a class in a file, "FILE:CLASS"."""
+    file, _, name = text.rpartition(":")
+    if not Path(file).is_file():
+        raise mpm.InputError(f"--python-law is '{text}', expected a file, a colon and a class in it")
+    sys.path.insert(0, str(Path(file).parent))  # for what it imports beside it
+    spec = importlib.util.spec_from_file_location("law_of_the_user", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, name):
+        raise mpm.InputError(f"--python-law names the class '{name}', which {file} does not have")
+    return mpm.PythonLaw(getattr(module, name)())
+
+
 def _skeleton(a: argparse.Namespace) -> Any:
     elastic = {"young": a.young, "poisson": a.poisson}
+    if a.umat:
+        modulus = mpm.LinearElastic(**elastic).p_wave_modulus
+        return mpm.Umat(a.umat, properties=a.properties, n_variables=a.variables, p_wave_modulus=modulus)
+    if a.python_law:
+        return _python_law(a.python_law)
     strength = {"cohesion": a.cohesion, "friction_angle": a.friction_angle, "dilation_angle": a.dilation_angle}
     strength["tension_cutoff"] = a.tension_cutoff
     match a.material:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from .movie import particle_frame
+from .movie import PORE, has_pore_pressure, particle_frame
 from .slope_case import SlopeCase
 
 
@@ -21,10 +21,12 @@ class Watch:
 
     def fields(self) -> dict[str, np.ndarray]:
         p = self.model.particles
+        pore = {PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else {}
         return {
             "position": p.position, "displacement": p.displacement, "velocity": p.velocity, "stress": p.stress,
             "deviatoric_strain": p.deviatoric_strain, "plastic_strain": p.plastic_strain, "volume": p.volume,
             "id": p.id, "material": p.material,
+            **pore,
         }  # fmt: skip
 
     def crest_displacement(self, fields: dict[str, np.ndarray]) -> float:

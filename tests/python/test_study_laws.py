@@ -68,27 +68,6 @@ def test_bad_options_are_named(tmp_path, options, named):
     assert named in result.stderr
 
 
-# Without friction, or undrained from no stress at all, the slope would not carry 20 kN/m3: elastic stresses are its start
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["softening"],
-        ["cam-clay"],
-        ["drucker-prager"],
-        ["tresca", "--nmd", "--initial", "elastic"],
-        ["mohr-coulomb", "--undrained", "--nmd", "--initial", "elastic"],
-    ],
-    ids=str,
-)
-def test_slope_of_any_soil(tmp_path, options):
-    small = ["--cell-size", "0.25", "--crest", "1", "--frames", "2", "--time", "0.1"]
-    result = study("slope", tmp_path, "--material", *options, *small)
-    assert result.returncode == 0, result.stderr
-    found = summary(tmp_path)
-    assert found["initial_out_of_balance_ratio"] < 1e-5
-    assert found["crest_displacement_m"] > 1e-4
-
-
 def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
     small = [
         "--cell-size",
