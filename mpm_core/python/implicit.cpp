@@ -144,6 +144,7 @@ void bind_implicit(py::module_& m)
       .def_readwrite("mixed_discretisation", &ImplicitOptions::mixed_discretisation)
       .def_readwrite("ghost", &ImplicitOptions::ghost)
       .def_readwrite("hold_positions", &ImplicitOptions::hold_positions)
+      .def_readwrite("load_share", &ImplicitOptions::load_share)
       .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);
   bind_implicit_step<2>(m, "2");
   bind_implicit_step<3>(m, "3");

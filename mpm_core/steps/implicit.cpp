@@ -146,7 +146,10 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   step.external.resize(work.nodes.size());
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
     for (int a = 0; a < D; ++a)
-      step.external[i][a] = work.nodes[i].traction[a] + work.nodes[i].mass * gravity[a];
+    {
+      const double load = work.nodes[i].traction[a] + work.nodes[i].mass * gravity[a];
+      step.external[i][a] = work.nodes[i].internal[a] + options.load_share * (load - work.nodes[i].internal[a]);
+    }
 }
 
 template <int D>

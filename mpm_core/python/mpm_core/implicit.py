@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 MAX_CUTS = 10
 """A step is not made shorter than dt / 2^MAX_CUTS."""
 
+SMALLEST_PART = 1 / 2**MAX_CUTS
+"""of the out-of-balance force, which is applied in parts where all of it at once is too much"""
+
 
 def implicit_options(
     model: Model, damping: float, pic: float, nmd: bool, quasi_static: bool, ghost: GhostPenalty | None
@@ -156,21 +159,41 @@ def run_implicit(
 def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
     """Quasi-static steps at the present time until the particles balance their loads.
 
-    Only the first moves the particles. One that moves again may cross into the next cell and back for ever, each time with a
-    jump of the nodal forces that sends it there.
+    What the loads are out of balance by is applied at once, or in parts where that fails. The steps that apply it move the
+    particles; those that follow do not. One that moves them again may send a particle into the next cell and back for ever,
+    each time with a jump of the nodal forces that sends it there.
     """
     stepper = Stepper(model, solver, options, 1.0)
-    time = model.time
+    applied, part = 0.0, 1.0
     for _ in range(max_steps):
-        model._core.time = time - 1.0  # loads are those of the step's end
-        reason = stepper.attempt(1.0)
-        model._core.time = time
+        while True:
+            part = min(part, 1.0 - applied)
+            options.load_share = part / (1.0 - applied) if applied < 1.0 else 1.0
+            reason = _attempt_without_time(stepper, model)
+            if not reason:
+                break
+            stepper.control.cuts += 1
+            part /= 2
+            if part < SMALLEST_PART or applied == 1.0:
+                raise RunError(
+                    f"no equilibrium at t = {model.time:.9g} s with more than {applied:.4g} of the loads: {reason}"
+                )
+        applied = min(1.0, applied + part)
+        if applied < 1.0:
+            part *= 2 if stepper.last.easy else 1
+            continue
         options.hold_positions = True
-        if reason:
-            raise RunError(f"no equilibrium at t = {time:.9g} s: {reason}")
-        report = stepper.report()
-        if report.unbalanced_ratio <= tolerance:
-            return report
+        if model.report().unbalanced_ratio <= tolerance:
+            return stepper.report()
     raise RunError(
-        f"out-of-balance ratio is {report.unbalanced_ratio:.3g} after {max_steps} steps without load, expected {tolerance:.3g}"
+        f"out-of-balance ratio is {model.report().unbalanced_ratio:.3g} after {max_steps} steps, of which the last applied "
+        f"{applied:.3g} of the loads, expected {tolerance:.3g}"
     )
+
+
+def _attempt_without_time(stepper: Stepper, model: Model) -> str:
+    time = model.time
+    model._core.time = time - 1.0  # loads are those of the step's end
+    reason = stepper.attempt(1.0)
+    model._core.time = time
+    return reason
