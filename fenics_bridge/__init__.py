@@ -3,6 +3,8 @@
 What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 """
 
+from mpm_core.newton import NewtonReport
+
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.box_mesh import BODY, box_mesh
 from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
@@ -18,7 +20,6 @@ from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
 from fenics_bridge.mixed import MixedQuasiStatic
-from fenics_bridge.newton import NewtonReport
 from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh

@@ -6,6 +6,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc
+from mpm_core.newton import newton
 
 import mpm_core as mpm
 from fenics_bridge import compat
@@ -17,7 +18,6 @@ from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
-from fenics_bridge.newton import newton
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.supports import Constraints
 

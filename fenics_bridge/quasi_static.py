@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
+from mpm_core.newton import newton
 
 from fenics_bridge import compat
 from fenics_bridge.averaged import AveragedKinematics
@@ -18,7 +19,6 @@ from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import advance
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
-from fenics_bridge.newton import newton
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.supports import Constraints
 

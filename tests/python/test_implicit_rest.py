@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from core_cases import box
+from implicit_cases import crest_displacement, slope
 
 import mpm_core as mpm
+from mpm_core import RunError
 
 
 def test_reactions_take_the_place_of_external_force_under_prescribed_displacement():
@@ -30,3 +32,22 @@ def test_a_body_is_quasi_static_after_it_has_been_brought_to_equilibrium():
     *_, moving = model.implicit(0.02, dt=0.01)
     assert not moving.is_quasi_static(1e-3)
     assert model.equilibrate(tolerance=1e-4).is_quasi_static(1e-3)
+
+
+@pytest.mark.parametrize("nmd", [False, True])
+def test_equilibrate_from_zero_in_one_call(nmd):
+    """Little soil is left elastic at 87 % of the collapse load."""
+    model = slope(0.1, weight=20e3)
+    report = model.equilibrate(nmd=nmd, tolerance=1e-6)
+    assert report.unbalanced_ratio < 1e-6
+    assert report.plastic_share > 0
+    assert 0.03 < crest_displacement(model) < 0.1
+
+
+def test_equilibrate_applies_the_loads_in_parts_and_says_how_far_it_came():
+    """A slope at 3.5 times its collapse load finds no equilibrium, but carries a part of it."""
+    model = slope(0.2)
+    with pytest.raises(RunError, match=r"no equilibrium at t = 0 s with more than 0\.\d+ of the loads") as error:
+        model.equilibrate(max_steps=100)
+    part = float(str(error.value).split("more than ")[1].split()[0])
+    assert 20e3 < part * 80e3 < 45e3

@@ -26,6 +26,9 @@ MAX_CUTS = 10
 SMALLEST_PART = 1 / 2**MAX_CUTS
 """of the out-of-balance force, which is applied in parts where all of it at once is too much"""
 
+FADING = 0.1
+"""of the ghost penalty between steps that only redistribute stresses"""
+
 
 def implicit_options(
     model: Model, damping: float, pic: float, nmd: bool, quasi_static: bool, ghost: GhostPenalty | None
@@ -161,10 +164,11 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
 
     What the loads are out of balance by is applied at once, or in parts where that fails. The steps that apply it move the
     particles; those that follow do not. One that moves them again may send a particle into the next cell and back for ever,
-    each time with a jump of the nodal forces that sends it there.
+    each time with a jump of the nodal forces that sends it there. The penalty's forces, which are part of a step's equilibrium
+    but not of the particles', fade from step to step.
     """
     stepper = Stepper(model, solver, options, 1.0)
-    applied, part = 0.0, 1.0
+    applied, part, ghost = 0.0, 1.0, options.ghost
     for _ in range(max_steps):
         while True:
             part = min(part, 1.0 - applied)
@@ -182,7 +186,9 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
         if applied < 1.0:
             part *= 2 if stepper.last.easy else 1
             continue
-        options.hold_positions = True
+        if options.hold_positions:
+            ghost.stiffness *= FADING
+        options.ghost, options.hold_positions = ghost, True
         if model.report().unbalanced_ratio <= tolerance:
             return stepper.report()
     raise RunError(
