@@ -120,7 +120,8 @@ class Slide:
         front = comm.allreduce(float(p.position[:, 0].max(initial=-np.inf)), MPI.MAX)
         self.history.add(
             time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=max(0.0, front - self.case.toe),
-            work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share, dt_s=report.dt,
+            work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy,
+            plastic_share=report.plastic_share, dt_s=report.dt,
         )  # fmt: skip
         frame = particle_frame(self.case.model, report.time)
         if frame is not None:

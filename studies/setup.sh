@@ -14,7 +14,7 @@ packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-d
   python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
   python3-numpy python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.
-test_packages=(gfortran python3-pytest python3-hypothesis python3-h5py python3-meshio python3-scipy python3-vtk9
+test_packages=(gfortran python3-pytest python3-hypothesis python3-h5py python3-meshio python3-pandas python3-scipy python3-vtk9
   chromium chromium-driver python3-selenium clang-format black mypy)
 docs_packages=(python3-sphinx python3-myst-parser python3-sphinx-rtd-theme libjs-mathjax)
 

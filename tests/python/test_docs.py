@@ -21,16 +21,60 @@ def name(page):
     return str(page.relative_to(ROOT))
 
 
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """The folder results/ with a short run of the study slope in it, for pages that read from there."""
+    folder = tmp_path_factory.mktemp("results")
+    command = [
+        sys.executable,
+        ROOT / "studies/slope.py",
+        "--time",
+        "0.1",
+        "--frames",
+        "2",
+        "--output",
+        folder / "slope",
+    ]
+    subprocess.run(command, capture_output=True, check=True, timeout=120)
+    return folder
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
-def test_the_blocks_of_a_page_run_one_after_the_other(page, tmp_path):
+def test_the_blocks_of_a_page_run_one_after_the_other(page, tmp_path, results):
     script = tmp_path / "page.py"
     script.write_text("\n".join(blocks(page, "python")))
+    if "results/" in script.read_text():
+        (tmp_path / "results").symlink_to(results)
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     ran = subprocess.run(
         [sys.executable, "-W", "error::DeprecationWarning:__main__", script], cwd=tmp_path, capture_output=True, text=True,
         timeout=120, env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_block_says_what_it_is(page):
+    """So that no Python block escapes: each fence is closed and of a kind that is run, or checked, or shows output; none is
+    an indented block."""
+    fences = re.findall(r"^\s*(```|~~~|:::)(\S*)", page.read_text(), re.MULTILINE)
+    kinds = [kind for _, kind in fences[::2]]
+    assert all(end == "" for _, end in fences[1::2]) and len(fences) % 2 == 0
+    assert {fence for fence, _ in fences} <= {"```"}
+    assert set(kinds) <= {"python", "console", "bash", "toml", "text", "{toctree}", "{eval-rst}"}
+    assert kinds.count("python") == len(blocks(page, "python"))
+    assert re.findall(r"\n\n {4}\S.*", BLOCK.sub("", page.read_text())) == []
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "toml")], ids=name)
+def test_toml_blocks_are_parameters_of_the_study_that_the_page_runs_with_them(page, tmp_path):
+    for block in blocks(page, "toml"):
+        file = tmp_path / re.match(r"# (\w+\.toml)", block).group(1)
+        file.write_text(block)
+        study = re.search(rf"studies/run (\w+) --parameters {file.name}", page.read_text()).group(1)
+        command = [sys.executable, ROOT / f"studies/{study}.py", "--parameters", file, "--help"]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert ran.returncode == 0, ran.stderr
 
 
 def named_options(page):
@@ -68,3 +112,15 @@ def test_files_that_pages_link_to_exist():
     for page in PAGES:
         for target in re.findall(r"\]\((?!http|#)([^)#]+)\)", page.read_text()):
             assert (page.parent / target).exists(), f"{name(page)} links to {target}"
+
+
+def test_every_equation_has_a_number_and_those_that_the_code_cites_are_there():
+    text = (ROOT / "docs/guide/theory.md").read_text()
+    numbers = [re.findall(r"\\tag\{(.*?)\}", equation) for equation in re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL)]
+    assert all(
+        len(found) == 1 for found in numbers
+    ), "an equation without \\tag{...}: T and a number if it is not in the paper"
+    there = {number.strip() for (found,) in numbers for number in found.split(",")}
+    sources = [path.read_text() for path in (ROOT / "mpm_core").rglob("*.h")]
+    cited = {number for source in sources for number in re.findall(r"\((1[1-9]|2\d)\)", source)}
+    assert {"11", "18", "24"} <= cited <= there
