@@ -69,7 +69,10 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_scheme_options(p)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
+    add_count(p, "--frame-steps", None, "steps between further times at which particles are stored (default: none)")
     add_output_options(p, FIELDS)
+    add_number(p, "--rebalance", None, "-", "cut the mesh anew when the most particles on a rank are this much above the mean, "
+               "such as 1.2 (default: never)", above=1)  # fmt: skip
     add_checkpoint_options(p)
     add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p
@@ -92,7 +95,8 @@ class Files:
     """Particles and background mesh over time, for ParaView."""
 
     def __init__(self, case: SlopeCase, folder: Path) -> None:
-        self.model, mesh = case.model, case.model.mesh
+        self.model = case.model
+        self.start = mesh = case.model.mesh  # of which the files tell, however the mesh is cut later
         restarted = case.args.restart is not None
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
         a = case.args
@@ -106,7 +110,10 @@ class Files:
     def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
         """Add a frame. Collective."""
         self.particles.write(time, {name: fields[name] for name in self.names})
-        nodes = {name: self.model.nodal(name) for name in ("mass", "velocity", "internal_force")}
+        nodes = {
+            name: self.start.nodal_of(self.model.mesh, self.model.nodal(name))
+            for name in ("mass", "velocity", "internal_force")
+        }
         self.mesh.write(time, nodes, {"tag": self.tags})
 
     def __enter__(self) -> Files:
@@ -147,7 +154,7 @@ def slide(
         look(report)
         if a.scheme == "quasi-static":
             model.set_gravity((0.0, -GRAVITY), ramp=a.time)
-        run = run_scheme(a, model, a.time / a.frames, between_steps)
+        run = run_scheme(a, model, a.time / a.frames, between_steps, rebalance=a.rebalance, every_steps=a.frame_steps)
         started = perf_counter()
         try:
             for report in run:

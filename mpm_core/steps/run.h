@@ -12,7 +12,7 @@ struct RunOptions
   std::optional<double> dt;    ///< step [s]; by default `courant` times the critical one
   double courant = 0.5;        ///< alpha_c of (17)
   bool allow_unstable = false; ///< take `dt` even above the critical step
-  std::int64_t max_steps = 0;  ///< return earlier, after this many steps; a multiple of `control_interval`
+  std::int64_t max_steps = 0;  ///< return earlier, after this many steps
 };
 
 /// Steps between two looks at the critical time step.

@@ -56,7 +56,7 @@ def particle_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray] | Non
     """All particles of a plane model as they are, on the first rank; None on the others. Collective."""
     p = model.particles
     pore = {PORE: model.state(PORE)} if has_pore_pressure(model) else {}
-    return _gathered(model, time, {
+    return frame_of(model, time, {
         "position": p.position, "volume": p.volume, "id": p.id, "displacement": np.linalg.norm(p.displacement, axis=1),
         # Plastic, because elastic oscillations during a long creep add up in the total.
         "shear_strain": p.plastic_strain, "vertical_stress": p.stress[:, 1], "speed": np.linalg.norm(p.velocity, axis=1),
@@ -83,7 +83,7 @@ def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | N
         found["state"][:, fem.law.state_names.index("plastic_strain")] if fem.law.n_state else np.zeros(len(places))
     )
     pore = {PORE: found["state"][:, fem.law.state_names.index(PORE)]} if has_pore_pressure(model) else {}
-    return _gathered(model, time, {
+    return frame_of(model, time, {
         "position": places + found["displacement"], "volume": p.volume, "id": p.id,
         "displacement": np.linalg.norm(found["displacement"], axis=1), "shear_strain": plastic,
         "vertical_stress": found["stress"][:, 1], "speed": np.zeros(len(places)),
@@ -91,7 +91,8 @@ def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | N
     })  # fmt: skip
 
 
-def _gathered(model: mpm.Model, time: float, fields: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+def frame_of(model: mpm.Model, time: float, fields: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+    """Fields of all particles, on the first rank; None on the others. Collective."""
     single = {name: values if name == "id" else values.astype(np.float32) for name, values in fields.items()}
     parts = model.comm.gather(single)
     if parts is None:

@@ -131,7 +131,7 @@ def add_number(
 
 
 def add_count(
-    parser: argparse.ArgumentParser, name: str, default: int, text: str, *, choices: Sequence[int] | None = None
+    parser: argparse.ArgumentParser, name: str, default: int | None, text: str, *, choices: Sequence[int] | None = None
 ) -> None:
     """Add an option that takes a whole number from 1 on, or one of ``choices``."""
     expected = "a whole number from 1 on" if choices is None else "one of " + ", ".join(map(str, choices))

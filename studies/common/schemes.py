@@ -47,7 +47,13 @@ def time_step(options: argparse.Namespace, model: mpm.Model) -> float | None:
 
 
 def run_scheme(
-    options: argparse.Namespace, model: mpm.Model, every: float, watch: Callable[[], bool]
+    options: argparse.Namespace,
+    model: mpm.Model,
+    every: float,
+    watch: Callable[[], bool],
+    *,
+    rebalance: float | None = None,
+    every_steps: int | None = None,
 ) -> Iterator[mpm.Report]:
     """Run a model to ``--time`` by the scheme asked for; yields reports.
 
@@ -55,12 +61,23 @@ def run_scheme(
         options: with those of `add_scheme_options` and time, damping, pic and nmd.
         every: time between reports, counted from zero [s].
         watch: called between steps; true ends the run after a report.
+        rebalance: see ``Model.explicit``.
+        every_steps: steps between further reports.
 
     Raises:
         RunError: see ``Model.explicit`` and ``Model.implicit``; quasi-static, beyond the collapse load.
     """
     a, dt = options, time_step(options, model)
-    common = {"every": every, "since": 0.0, "watch": watch, "damping": a.damping, "pic": a.pic, "nmd": a.nmd}
+    common = {
+        "every": every,
+        "every_steps": every_steps,
+        "rebalance": rebalance,
+        "since": 0.0,
+        "watch": watch,
+        "damping": a.damping,
+        "pic": a.pic,
+        "nmd": a.nmd,
+    }
     if a.scheme == "explicit":
         return model.explicit(a.time, dt=dt, **common)
     return model.implicit(

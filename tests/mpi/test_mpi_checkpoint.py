@@ -197,7 +197,7 @@ FEW = mpm.Newton(max_iterations=3)  # so few that steps are cut, and their lengt
 def test_an_implicit_run_goes_on_to_the_last_bit(comm, shared_path, owners_of):
     never_stopped = sliding_slope(comm, owners_of)
     reports = list(never_stopped.implicit(**IMPLICIT, solver=FEW))
-    assert reports[-1].cuts > 0
+    assert sum(report.cuts for report in reports) > 0
 
     model = sliding_slope(comm, owners_of)
     *_, first = model.implicit(**IMPLICIT, solver=FEW, watch=lambda: model.time > 0.13)

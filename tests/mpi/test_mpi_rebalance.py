@@ -70,7 +70,7 @@ def test_an_implicit_run_that_is_rebalanced_is_the_same_run(comm):
     reports = [list(model.implicit(**options, rebalance=1.2)), list(alone.implicit(**options))]
     assert [r.iterations for r in reports[0]] == [r.iterations for r in reports[1]]
     assert_same(all_by_id(model), all_by_id(alone), 1e-7)
-    assert comm.size == 1 or model._first_mesh is not None
+    assert comm.size == 1 or model.cuts > 0
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
@@ -118,6 +118,19 @@ def test_supports_and_tags_go_along(comm):
     assert report.outflow_particles + report.particles == start and report.outflow_particles > 0
     model.prescribe(2, (1.0, 0.0))
     assert model.rebalance() >= 1.0
+
+
+def test_nodal_values_of_a_mesh_cut_anew(comm):
+    model = sliding_slope(comm)
+    start = model.mesh
+    list(model.explicit(0.1))
+    model.rebalance()
+    function = np.column_stack([model.mesh.points @ [2.0, -1.0], model.mesh.global_nodes])
+    np.testing.assert_array_equal(start.nodal_of(model.mesh, function[:, 1]), start.global_nodes)
+    found = start.nodal_of(model.mesh, function)
+    np.testing.assert_array_equal(found, np.column_stack([start.points @ [2.0, -1.0], start.global_nodes]))
+    with pytest.raises(mpm.InputError, match="values has shape"):
+        start.nodal_of(model.mesh, function[:-1])
 
 
 def test_everything_on_one_rank_and_back(comm):

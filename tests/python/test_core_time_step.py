@@ -104,3 +104,16 @@ def test_until_and_every():
     assert list(model.explicit(0.01)) == []
     with pytest.raises(mpm.InputError, match="until is 0.005 s.*0.01 s"):
         run(model, 0.005)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+def test_reports_after_a_number_of_steps(scheme):
+    model = soil_block(2)
+    dt = 1e-3 * model.critical_time_step()
+    reports = list(getattr(model, scheme)(100 * dt, dt=dt, every_steps=45))
+    assert [report.steps for report in reports] == [45, 90, 100]
+    assert [report.steps for report in getattr(model, scheme)(200 * dt, dt=dt, every=40 * dt, since=0.0, every_steps=45)] == [
+        120, 135, 160, 180, 200
+    ]  # fmt: skip
+    with pytest.raises(mpm.InputError, match="every_steps is 0, expected a whole number from 1"):
+        getattr(model, scheme)(300 * dt, dt=dt, every_steps=0)

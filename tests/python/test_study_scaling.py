@@ -1,6 +1,8 @@
 """The study scaling: what is counted follows from geometry where the cut is known."""
 
 import csv
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -24,3 +26,26 @@ def test_scaling_runs_small_and_counts_what_geometry_says(tmp_path):
     assert 1.2 < int(rows[2, 16]["shared_nodes"]) / int(rows[2, 64]["shared_nodes"]) < 3
     with open(tmp_path / "timed.csv", newline="") as file:
         assert [row["kind"] for row in csv.DictReader(file)] == ["strong", "weak"] * 2
+
+
+def test_balance_lowers_the_most_particles_on_a_rank(tmp_path):
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    command = [
+        sys.executable,
+        str(STUDIES / "balance.py"),
+        "--output",
+        str(tmp_path),
+        "--cell-size",
+        "0.2",
+        "--crest",
+        "1.2",
+    ]
+    small = ["--particles-per-cell", "3", "--time", "0.2", "--frames", "5"]
+    result = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", *command, *small],
+                            capture_output=True, text=True, timeout=120, env={**os.environ, **root})  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["cuts"] >= 1 and summary["largest_difference_m"] < 1e-8
+    assert summary["mean_imbalance_cut_anew"] < 1.2 < summary["mean_imbalance_as_cut_at_first"] < 2
+    alone = subprocess.run([*command, *small], capture_output=True, text=True, timeout=60)
+    assert alone.returncode == 2 and "--ranks" in alone.stderr

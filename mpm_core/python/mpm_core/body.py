@@ -36,7 +36,9 @@ class Body:
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run
-        self._first_mesh: Mesh | None = None  # when `mesh` has been cut anew since
+        self.cuts = 0
+        """How often the mesh has been cut anew."""
+        self._first_mesh = mesh  # kept, since it may own the communicator
         self._left_imbalance = 1.0  # by the last cut
         self.particles = Particles(self._core, mesh.dim)
         """The particles on this rank."""

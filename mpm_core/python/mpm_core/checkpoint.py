@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def save(model: Model, path: str | os.PathLike[str]) -> None:
     """See `Model.save`."""
-    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1), _is_cut_anew(model))
+    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1), model.cuts > 0)
 
 
 def restore(model: Model, path: str | os.PathLike[str]) -> None:
@@ -28,15 +28,12 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     text = _core.checkpoint_description(MPI._addressof(model.comm), name)
     here = _description(model)
     there = collectively(model.comm, lambda: _matching(name, text, here))
-    if there.get("cut_anew") and there["ranks"] == model.comm.size:
+    if there.get("cuts") and there["ranks"] == model.comm.size:
         cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
         partition.take_partition(model, cells)
+        model.cuts = there["cuts"]
     _core.restore(model._core, name)
     _take(model, there)
-
-
-def _is_cut_anew(model: Model) -> bool:
-    return model._first_mesh is not None
 
 
 def _matching(path: str, text: str, here: dict[str, Any]) -> dict[str, Any]:
@@ -76,7 +73,7 @@ def _description(model: Model) -> dict[str, Any]:
         "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
         "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
         "next_id": model._next_id,
-        "cut_anew": _is_cut_anew(model),
+        "cuts": model.cuts,
         "left_imbalance": model._left_imbalance,
         "implicit": None if model._control is None else vars(model._control),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,23 @@ def report_times(model: Model, until: float, every: float | None, since: float |
     return [until if k == count else start + k * interval for k in range(done + 1, count + 1)]
 
 
+def steps_to_report(model: Model, every: int | None) -> int:
+    """Steps until the next report that is due after a number of steps since the model was made."""
+    return sys.maxsize if every is None else every - model.steps % every
+
+
+def is_report_due(model: Model, every: int | None) -> bool:
+    """Whether as many steps have been done."""
+    return every is not None and model.steps % every == 0
+
+
+def steps_between(every_steps: int | None) -> int | None:
+    """A number of steps that a caller gives."""
+    if every_steps is not None and (int(every_steps) != every_steps or every_steps < 1):
+        raise InputError(f"every_steps is {every_steps}, expected a whole number from 1")
+    return None if every_steps is None else int(every_steps)
+
+
 def run_explicit(
     model: Model,
     options: Any,
@@ -68,19 +86,22 @@ def run_explicit(
     times: Sequence[float],
     watch: Callable[[], bool] | None,
     rebalance: float,
+    every_steps: int | None,
 ) -> Iterator[Report]:
-    """Step to each of the times, with a report there."""
+    """Step to each of the times, with a report there, and after every so many steps."""
     # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    run.max_steps = pauses * _core.control_interval
     for until in times:
         run.until = until
         while model.time < until:
             keep_balance(model, rebalance)
+            run.max_steps = min(pauses * _core.control_interval, steps_to_report(model, every_steps))
             model._core.run_explicit(options, run)
-            if watch is not None and watch():
+            ends = watch is not None and watch()
+            if ends or (model.time < until and is_report_due(model, every_steps)):
                 yield model.report()
+            if ends:
                 return
         yield model.report()

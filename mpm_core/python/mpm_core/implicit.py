@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import RunError
 from .checks import within
-from .explicit import require_particles
+from .explicit import is_report_due, require_particles
 from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
@@ -132,11 +132,11 @@ def run_implicit(
     *,
     times: Sequence[float],
     dt: float,
-    every_step: bool,
+    every_steps: int | None,
     watch: Callable[[], bool] | None,
     rebalance: float,
 ) -> Iterator[ImplicitReport]:
-    """Step until each of the times; reports then, or after each step."""
+    """Step until each of the times; reports then, and after every so many steps."""
     stepper = Stepper(model, solver, options, dt)
     resumed, model._resumed = model._resumed, None
     if resumed is not None:
@@ -151,12 +151,11 @@ def run_implicit(
             if until - model.time <= close:
                 model._core.time = until
             ends = watch is not None and watch()
-            if every_step or ends:
+            if ends or (model.time < until and is_report_due(model, every_steps)):
                 yield stepper.report()
             if ends:
                 return
-        if not every_step:
-            yield stepper.report()
+        yield stepper.report()
 
 
 def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .collective import collectively
+from .rows import carried
 
 
 def _integers(name: str, values: ArrayLike, dtype: type, width: int | None) -> NDArray:
@@ -145,6 +146,23 @@ class Mesh:
     def cells_of(self, points: ArrayLike) -> NDArray[np.int32]:
         """Number of the cell on this rank that holds each point, -1 where none does; shape (n,)."""
         return self._core.cells_of(floats("points", points, (None, self.dim)))
+
+    def nodal_of(self, other: "Mesh", values: ArrayLike) -> NDArray[np.float64]:
+        """Nodal values of the same mesh cut otherwise, at the nodes of this one; shape (nodes,) or (nodes, k). Collective.
+
+        Example:
+            >>> start = model.mesh
+            >>> list(model.explicit(until=1.0, rebalance=1.2))
+            >>> start.nodal_of(model.mesh, model.nodal("velocity"))
+        """
+        array = np.asarray(values, dtype=np.float64)
+        if array.ndim not in (1, 2) or len(array) != len(other.points):
+            raise InputError(f"values has shape {array.shape}, expected a row for each of {len(other.points)} nodes")
+        if other is self:
+            return array
+        known = np.unique(other.cells[: other.owned_cells])
+        rows = array.reshape(len(array), -1)[known]
+        return carried(self.comm, other.global_nodes[known], rows, self.global_nodes).reshape(-1, *array.shape[1:])
 
     def require_tag(self, kind: str, tag: int) -> int:
         """The tag, where cells or facets (``kind``) with it exist on any rank.

@@ -10,7 +10,7 @@ from . import checkpoint
 from ._core import StressUpdate
 from .body import Body
 from .checks import positive
-from .explicit import explicit_options, report_times, run_explicit, run_options
+from .explicit import explicit_options, report_times, run_explicit, run_options, steps_between
 from .ghost import GhostPenalty
 from .implicit import implicit_options, run_implicit, settle
 from .mesh import floats
@@ -112,6 +112,7 @@ class Model(Body):
         until: float,
         *,
         every: float | None = None,
+        every_steps: int | None = None,
         since: float | None = None,
         watch: Callable[[], bool] | None = None,
         dt: float | None = None,
@@ -128,6 +129,7 @@ class Model(Body):
         Args:
             until: time to reach [s].
             every: time between reports [s]; by default only at the end.
+            every_steps: steps between reports, counted since the model was made.
             since: time from which ``every`` counts [s]; by default the present. A run that goes on from a checkpoint gives
                 the start of the first run, so that it meets the same times to the last bit.
             watch: called between steps, after every 32nd and before each report, on all ranks alike; the model may be
@@ -149,7 +151,9 @@ class Model(Body):
         options = explicit_options(damping, pic, nmd, stress_update)
         run = run_options(dt, courant, allow_unstable)
         times = report_times(self, until, every, since)
-        return run_explicit(self, options, run, times, watch, rebalance_threshold(rebalance))
+        return run_explicit(
+            self, options, run, times, watch, rebalance_threshold(rebalance), steps_between(every_steps)
+        )
 
     def implicit(
         self,
@@ -158,6 +162,7 @@ class Model(Body):
         dt: float,
         solver: Newton | Relaxation | None = None,
         every: float | None = None,
+        every_steps: int | None = None,
         since: float | None = None,
         watch: Callable[[], bool] | None = None,
         quasi_static: bool = False,
@@ -176,6 +181,7 @@ class Model(Body):
             dt: longest time step [s].
             solver: what solves each step; Newton's method by default.
             every: time between reports [s]; by default after each step.
+            every_steps: steps between reports, counted since the model was made.
             since: time from which ``every`` counts [s]; by default the present, see ``explicit``.
             watch: called after each step, on all ranks alike; the model may be saved then. When it returns true (on all
                 ranks), the run ends with a report.
@@ -196,7 +202,8 @@ class Model(Body):
         longest = positive("dt", dt, "s")
         times = report_times(self, until, every, since)
         return run_implicit(
-            self, solver or Newton(), options, times=times, dt=longest, every_step=every is None, watch=watch,
+            self, solver or Newton(), options, times=times, dt=longest, watch=watch,
+            every_steps=steps_between(1 if every is None and every_steps is None else every_steps),
             rebalance=rebalance_threshold(rebalance),
         )  # fmt: skip
 

@@ -68,8 +68,8 @@ def take_mesh(body: Body, mesh: Mesh) -> None:
     """Give the model its mesh cut otherwise, and all that hangs on it. Collective."""
     body._core.set_partition(mesh._core)
     body._core.set_supports(body._wishes)
-    body._first_mesh = body._first_mesh or body.mesh  # commonly with the owner of the communicator
     body.mesh = mesh
+    body.cuts += 1
 
 
 def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
