@@ -42,7 +42,7 @@ def background_mesh(domain, cell_tags=None, facet_tags=None):
     import mpm_core as mpm
 
     mesh = mpm.Mesh(**background_arrays(domain, cell_tags, facet_tags), comm=domain.comm)
-    mesh.domain = domain  # it owns the communicator
+    mesh.domain = domain  # type: ignore[attr-defined]  # it owns the communicator
     return mesh
 
 

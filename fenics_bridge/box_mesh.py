@@ -39,7 +39,7 @@ def _arrays(lengths, counts, diagonals, body):
     grid = np.indices(counts + 1).reshape(dim, -1).T
     points, cells = grid * (lengths / counts), _simplices(counts, diagonals == "alternating")
     centres = points[cells].mean(axis=1)
-    low, high = (np.full(dim, -np.inf), np.full(dim, np.inf)) if body is None else np.asarray(body, dtype=float)
+    low, high = np.asarray([[-np.inf] * dim, [np.inf] * dim] if body is None else body, dtype=float)
     inside = ((centres > low) & (centres < high)).all(axis=1)
     return MeshArrays(points, cells, np.where(inside, BODY, 0).astype(np.int32), *_sides(grid, cells, counts))
 

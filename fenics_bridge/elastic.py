@@ -109,9 +109,10 @@ def solve_nearly_incompressible(
     both = _solved(
         space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix, factor="mumps"
     )
+    moved, pressed = ufl.split(both)
     u = both.sub(0).collapse()
     u.name = "displacement"
-    return ElasticSolution(u, cell_function(domain, _mixed_stress(*ufl.split(both), shear), 1, "stress"))
+    return ElasticSolution(u, cell_function(domain, _mixed_stress(moved, pressed, shear), 1, "stress"))
 
 
 def _mixed_stress(u, p, shear):

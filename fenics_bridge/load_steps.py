@@ -6,6 +6,7 @@ import sys
 from typing import NamedTuple
 
 from mpi4py import MPI
+from mpm_core.newton import NewtonReport
 
 _MOST_STEPS = 1000
 _EASY = 8
@@ -18,7 +19,7 @@ class LoadStep(NamedTuple):
     number: int
     value: float
     size: float
-    report: object
+    report: NewtonReport
 
     @property
     def converged(self):
@@ -34,7 +35,8 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
     below which it is not halved any further
     progress: called with each LoadStep, or None. Returns all steps; the last converged one is the last equilibrium.
     """
-    steps, value, size, easy, failed = [], start, min(first_step, end - start), 0, False
+    steps: list[LoadStep] = []
+    value, size, easy, failed = start, min(first_step, end - start), 0, False
     while value < end and len(steps) < _MOST_STEPS:
         target = end if size >= (end - value) * (1 - 1e-12) else value + size
         steps.append(LoadStep(len(steps) + 1, target, target - value, equilibrate(target)))

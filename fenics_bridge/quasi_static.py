@@ -51,7 +51,8 @@ class QuasiStatic:
         self._materials = Materials(domain, law, cell_tags)
         self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
         self.load, self.converged = Load(), False
-        self._kinematics = (AveragedKinematics if nmd else Kinematics)(self.increment, self.points, constraints)
+        kinematics: type = AveragedKinematics if nmd else Kinematics
+        self._kinematics = kinematics(self.increment, self.points, constraints)
         solver = LinearSolver(space, options_prefix)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, solver)
 

@@ -21,7 +21,7 @@ struct ImplicitOptions
   GhostOptions ghost;          ///< of the remedy for nodes with hardly any mass
   bool quasi_static = false;   ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
   bool hold_positions = false; ///< stresses and volumes change, places do not; for quasi-static steps without new load
-  double load_share = 1;       ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
+  double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 
 /// Derivatives of sum V sigma over the particles of a cell, without zz in plane strain.
