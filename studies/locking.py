@@ -1,141 +1,138 @@
-"""Volumetric locking of linear triangles: Cook's membrane, nearly incompressible, by particles against Taylor-Hood elements.
+"""Volumetric locking of linear triangles: particles with and without mixed discretisation against Taylor-Hood elements.
 
-All diagonals of the mesh run one way, the arrangement in which linear triangles lock. One quasi-static step of the material
-point method with plain triangles and with nodal mixed discretisation (NMD), for Poisson ratios up to 0.499999975.
+Three bodies that keep, or nearly keep, their volume: Cook's membrane (elastic), a strip footing and a slope on undrained
+soil (friction angle 0). All diagonals of their meshes run one way, the arrangement in which linear triangles lock. Particles
+fill every cell, plain and with nodal mixed discretisation (NMD), in quasi-static implicit steps and by damped explicit motion,
+on meshes of rising fineness. The explicit step shrinks as the Poisson ratio nears 0.5, so explicit runs have 0.49 to 0.499.
 """
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from time import perf_counter
+from types import ModuleType
 
-import matplotlib.pyplot as plt
-import numpy as np
-from common.field_plots import save_log_log
-from common.options import add_count, study_parser
-from common.plots import WIDTH, Quantity, Scene, colour_limits, discs, draw_bar, draw_scene, paper_style
-from common.ranks import end_all_on_error
-from common.summary import ROOT, OutputError, results_folder, write_summary
-from matplotlib.colors import Normalize
+from common.options import add_count, check, study_parser
+from common.page import Page
+from common.ranks import run_study
+from common.summary import OutputError, results_folder, write_summary
+from locking_cases import CASES
+from locking_cases.pictures import save_errors, save_pressures
+from locking_cases.runs import Found
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-comm = MPI.COMM_SELF
-SHEAR = 0.375
-"""Shear modulus of the benchmark [Pa]; the same for all Poisson ratios."""
-TRACTION = 1 / 16
-SCALE = 1e-4
-"""Of the load, so that the displacements stay small; results are divided by it."""
-MID_EDGE = np.array([[48.0, 52.0]])
-POISSON = (1 / 3, 0.49, 0.4999, 0.499999975)
-PRESSURE = Quantity("Mean stress over shear modulus", "-", scale=1 / (SHEAR * SCALE), colours="viridis")
+comm = MPI.COMM_WORLD
+SCHEMES = ("implicit", "explicit")
+ELEMENTS = {"plain": False, "NMD": True}
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    for name, known in (("cases", tuple(CASES)), ("schemes", SCHEMES)):
+        for word in getattr(options, name).split(","):
+            check(p, word in known, f"--{name} names '{word}', expected some of {', '.join(known)}")
+    return options
+
+
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    add_count(p, "--divisions", 8, "cells along each side on the coarsest mesh")
+    for name, known in (("cases", tuple(CASES)), ("schemes", SCHEMES)):
+        p.add_argument(f"--{name}", default=",".join(known), metavar="NAME,...",
+                       help=f"{name} to run, of {', '.join(known)} (default: all)")  # fmt: skip
     add_count(p, "--meshes", 4, "meshes, each twice as fine as the one before")
-    add_count(p, "--reference-divisions", 64, "Taylor-Hood elements along each side, for the reference")
+    add_count(p, "--reference-mesh", 4, "mesh on which Taylor-Hood elements give the reference, 1 for the coarsest")
     return p
 
 
-# --- 2. One mesh -----------------------------------------------------------------------------------------------------
+# --- 2. One case, one scheme -----------------------------------------------------------------------------------------
 
 
-def membrane(divisions: int) -> tuple:
-    """Cook's membrane: mesh, cell tags and facet tags, clamped edge 1, loaded edge 2."""
-    return bridge.read_mesh(ROOT / "meshes" / "cook.geo", comm, parameters={"divisions": divisions})
+def compare(a: Namespace, case: ModuleType, scheme: str) -> tuple[list[dict], dict[str, Found]]:
+    """Errors of all elements on all meshes, and the particles of the last Poisson ratio on the finest mesh. Collective."""
+    rows, last = [], {}
+    meshes = [case.DIVISIONS[scheme] * 2**k for k in range(a.meshes)]
+    best = min(case.MIXED_FINEST, case.DIVISIONS["implicit"] * 2 ** (a.reference_mesh - 1))
+    for poisson in case.POISSON[scheme]:
+        mixed = {n: case.taylor_hood(n, poisson) for n in dict.fromkeys([*meshes, best]) if n <= case.MIXED_FINEST}
+        reference = case.EXACT or mixed[best]
+        common = {"case": case.NAME, "scheme": scheme, "poisson": poisson, "reference": reference}
+        rows += [row(case, common, "Taylor-Hood", n, mixed[n]) for n in meshes if n in mixed]
+        for elements, nmd in ELEMENTS.items():
+            for n in meshes:
+                found = last[elements] = case.by_particles(n, poisson, nmd, scheme)
+                rows.append(row(case, common, elements, n, found.value, found))
+    return rows, last
 
 
-def reference(divisions: int, poisson: float) -> float:
-    """Deflection at the middle of the loaded edge by Taylor-Hood elements [m]."""
-    domain, _, facet_tags = membrane(divisions)
-    solution = bridge.solve_nearly_incompressible(
-        domain, facet_tags, [bridge.fixed(1)], 2 * SHEAR * (1 + poisson), poisson, 0.0, traction={2: (0.0, TRACTION)}
-    )
-    return float(solution.evaluate_at(MID_EDGE)["displacement"][0, 1])
+def row(case: ModuleType, common: dict, elements: str, n: int, value: float, found: Found | None = None) -> dict:
+    """One line of the table, printed as it is made."""
+    result = {**common, "elements": elements, "divisions": n, "cell_size_m": case.cell_size(n), "value": value,
+              "error": abs(value / common["reference"] - 1)}  # fmt: skip
+    if found:
+        result |= {"steps": found.steps, "processor_seconds": found.seconds}
+    if comm.rank == 0:
+        print("{case:8}{scheme:9} nu {poisson:<12.9g} {elements:12}{divisions:4} divisions: {value:10.4f}, reference "
+              "{reference:8.4f}, error {error:.2%}".format(**result), flush=True)  # fmt: skip
+    return result
 
 
-def by_particles(divisions: int, poisson: float, nmd: bool) -> tuple[float, mpm.Model]:
-    """Deflection at the middle of the loaded edge by one quasi-static step [m], and the model after it."""
-    mesh = bridge.background_mesh(*membrane(divisions))
-    model = mpm.Model(mesh, mpm.LinearElastic(young=2 * SHEAR * (1 + poisson), poisson=poisson))
-    model.seed(density=1.0, per_cell=3)
-    model.fix(1)
-    model.traction(2, (0.0, SCALE * TRACTION))
-    # K / G of 2e7 leaves a residual of some 1e-8 from round-off, the default tolerance.
-    for _ in model.implicit(1.0, dt=1.0, quasi_static=True, nmd=nmd, solver=mpm.Newton(tolerance=1e-6)):
-        pass
-    nearest = np.argmin(np.linalg.norm(mesh.points - MID_EDGE, axis=1))
-    return float(model.nodal("velocity")[nearest, 1]) / SCALE, model
+def finest(rows: list[dict]) -> dict[str, dict[str, float]]:
+    """Errors on the finest mesh by scheme and Poisson ratio."""
+    found: dict[str, dict[str, float]] = {}
+    for one in rows:  # the last of a name is the one on the finest mesh
+        found.setdefault(f"{one['scheme']}, nu = {one['poisson']:.9g}", {})[f"{one['elements']}_error"] = one["error"]
+    return found
 
 
-# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+# --- 3. All together -------------------------------------------------------------------------------------------------
 
 
-def save_pressures(path: Path, models: dict[str, mpm.Model]) -> None:
-    """Mean stress of the particles on the finest mesh, side by side, in one colour scale."""
-    mean = {name: model.particles.stress[:, :3].mean(axis=1) for name, model in models.items()}
-    limits = colour_limits(PRESSURE, [mean["NMD"]])  # that of locked triangles is larger by orders
-    with paper_style():
-        figure, panels = plt.subplots(1, len(models), figsize=(WIDTH, 4.4), sharey=True)
-        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.25, top=0.94, wspace=0.05)
-        for axes, (name, model) in zip(panels, models.items()):
-            p, scene = model.particles, Scene(model.mesh.points, model.mesh.cells)
-            lower, upper = scene.limits([p.position])
-            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal", xlabel="$x$ [m]")
-            draw_scene(axes, scene)
-            drawn = discs(axes, p.position, p.volume, cmap=PRESSURE.colours, norm=Normalize(*limits), linewidths=0)
-            drawn.set_array(PRESSURE.scale * mean[name])
-            axes.set_title(name, loc="left")
-        panels[0].set_ylabel("$y$ [m]")
-        draw_bar(figure, figure.add_axes((0.25, 0.12, 0.5, 0.025)), PRESSURE, limits)
-        figure.savefig(path)
-        plt.close(figure)
-
-
-# --- 4. All together -------------------------------------------------------------------------------------------------
+def draw(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]], folder: Path) -> None:
+    """Error over cell size, and the mean stresses side by side; on the first rank."""
+    save_errors(folder / f"error_{case.NAME}.png", rows, case.TITLE)
+    for scheme, found in last.items():
+        poisson = case.POISSON[scheme][-1]
+        title = f"{case.TITLE}, {scheme}, $\\nu$ = {poisson:.9g}"
+        fields = {name: one.field for name, one in found.items()}
+        save_pressures(folder / f"pressure_{case.NAME}_{scheme}.png", fields, case.PRESSURE_UNIT, title)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    a = parser().parse_args(arguments)
+    a = parse(arguments)
+    start = perf_counter()
     folder = results_folder("locking", a.output, comm)
-    divisions = [a.divisions * 2**k for k in range(a.meshes)]
-    rows, models, curves = [], {}, {}
-    for poisson in POISSON:
-        expected = reference(a.reference_divisions, poisson)
-        for name, nmd in (("plain", False), ("NMD", True)):
-            for n in divisions:
-                found, models[name] = by_particles(n, poisson, nmd)
-                rows.append({"poisson": poisson, "elements": name, "divisions": n, "deflection_m": found,
-                             "reference_m": expected, "error": abs(found / expected - 1)})  # fmt: skip
-                print(f"nu {poisson:<12.9g} {name:5} {n:4} cells a side: {found:8.4f} m, Taylor-Hood {expected:8.4f} m, "
-                      f"error {rows[-1]['error']:.2%}", flush=True)  # fmt: skip
-            if poisson in (POISSON[0], POISSON[-1]):
-                curves[f"{name}, $\\nu$ = {poisson:.9g}"] = [row["error"] for row in rows[-len(divisions) :]]
-    save_log_log(
-        folder / "error.png", [44 / n for n in divisions], curves, "Relative error of the deflection [-]", slope=1.0
-    )
-    save_pressures(folder / "pressure.png", models)
-    write_summary(folder, a, {"cook": rows}, comm)
-    print(f"results in {folder}")
+    results, captions = {}, {}
+    for name in a.cases.split(","):
+        case, last = CASES[name], {}
+        results[name] = []
+        for scheme in a.schemes.split(","):
+            rows, last[scheme] = compare(a, case, scheme)
+            results[name] += rows
+            captions[
+                f"pressure_{name}_{scheme}"
+            ] = f"{case.TITLE}, {scheme}: mean stress of plain triangles and with NMD."
+        if comm.rank == 0:
+            draw(case, results[name], last, folder)
+        captions[f"error_{name}"] = f"{case.TITLE}: error of the {case.QUANTITY}. "
+    summary = {
+        **{f"{name} on its finest mesh": finest(rows) for name, rows in results.items()},
+        **results,
+        "wall_seconds": perf_counter() - start,
+    }
+    write_summary(folder, a, summary, comm, Page(captions=captions))
+    if comm.rank == 0:
+        print(f"results in {folder}")
     return 0
 
 
 if __name__ == "__main__":
-    end_all_on_error(MPI.COMM_WORLD)
-    if MPI.COMM_WORLD.size > 1:
-        print("studies/run locking: runs on one rank", file=sys.stderr)
-        sys.exit(2)
-    try:
-        sys.exit(main())
-    except (mpm.InputError, mpm.RunError, OutputError) as error:
-        print(f"studies/run locking: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, mpm.RunError, bridge.InputError, OutputError)
