@@ -23,7 +23,7 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 GROUPS = {
-    "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured"),
+    "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica"),
 }
 CASES = tuple(name for names in GROUPS.values() for name in names)
 

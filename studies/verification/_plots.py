@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.plots import CURVES, paper_style
+from common.plots import CURVES, WIDTH, paper_style
+from matplotlib.ticker import FuncFormatter
 
 Curve = tuple[np.ndarray, np.ndarray]
 LINES = ("-", "--", ":", "-.")
@@ -51,5 +52,34 @@ def save_comparison(
         axes.tick_params(top=True, right=True)
         axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(fontsize=8)
+        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
+        plt.close(figure)
+
+
+def save_refinement(
+    path: Path, numbers: Sequence[int], label: str, panels: Mapping[str, Mapping[str, Sequence[float]]]
+) -> None:
+    """Draw errors over a number of cells, both logarithmic.
+
+    Args:
+        numbers: of cells, rising; label: what they count.
+        panels: errors by the name of their curve, by the label of their panel.
+    """
+    with paper_style():
+        figure, row = plt.subplots(
+            1, len(panels), figsize=(WIDTH if len(panels) > 1 else 4.9, 3.0), squeeze=False, layout="constrained"
+        )
+        for axes, (what, curves) in zip(row[0], panels.items()):
+            for k, (name, values) in enumerate(curves.items()):
+                axes.loglog(
+                    numbers, values, "os^vD"[k % 5] + "-", color=CURVES[k % len(CURVES)], markersize=4, label=name
+                )
+            axes.set_xticks(numbers, [f"{number}" for number in numbers])
+            axes.minorticks_off()
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
+            axes.set(xlabel=label, ylabel=what)
+            axes.tick_params(top=True, right=True, which="both")
+            axes.grid(linewidth=0.3, color="#d0d0d0")
+        row[0][0].legend(fontsize=8)
         figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
         plt.close(figure)

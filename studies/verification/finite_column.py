@@ -1,0 +1,95 @@
+"""Column under its own weight, finite strains: 50 m high, it settles by a metre.
+
+Cauchy stress follows a rate law and ν = 0, so σ = E ln(stretch) and σ = -w (H - X) at the place that was X above the base:
+u(X) = ∫ exp(-w (H - s) / E) ds - X, -0.986801 m at the top. The weight rises in ten implicit steps without inertia.
+
+Finer cells do not bring particles nearer: they are crossed more often, and each crossing shifts the share 1 / (particles in a
+cell) of the cell's force to its neighbour, which strains both. So the error grows with the number of cells crossed, and with
+the number of steps in which that happens, and falls with the number of particles in a cell. With a mesh that goes with the
+particles there are no crossings, and what is left is the error of the steps' lengths.
+"""
+
+import numpy as np
+from _case import Check, Result, run_alone
+from _moving_mesh import in_order, on_moved_mesh
+from _plots import save_refinement
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+HEIGHT, WEIGHT, YOUNG, GRAVITY = 50.0, 800.0, 1e6, 10.0  # m, N/m3, Pa, m/s2
+STEPS = 10
+CROSSING = (
+    "Particles that cross cells shift forces between them; more particles in a cell, not more cells, make that less."
+)
+
+
+def exact(x: np.ndarray) -> np.ndarray:
+    """Displacement of the place that was x above the base [m]."""
+    base = np.exp(-WEIGHT * HEIGHT / YOUNG)
+    return YOUNG / WEIGHT * (np.exp(-WEIGHT * (HEIGHT - x) / YOUNG) - base) - x
+
+
+def settled(cells: int, per_cell: int, steps: int, moving_mesh: bool) -> tuple[float, float]:
+    """Displacement of the highest particle, and what it should be [m]; on each rank alike, which computes all of it."""
+    width = HEIGHT / cells
+    mesh = bridge.background_mesh(*bridge.box_mesh(MPI.COMM_SELF, [width, HEIGHT], [1, cells], diagonals="one-way"))
+    sides = [
+        np.abs(mesh.points[:, 0]) < 1e-9,
+        np.abs(mesh.points[:, 0] - width) < 1e-9,
+        np.abs(mesh.points[:, 1]) < 1e-9,
+    ]
+
+    def build(nodes: np.ndarray) -> mpm.Model:
+        facets = [(tag, np.sort(edge)) for tag, side in enumerate(sides, 1)
+                  for edge in mesh.cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2) if side[edge].all()]  # fmt: skip
+        tagged = mpm.Mesh(nodes, mesh.cells, facets=np.array([edge for _, edge in facets], np.int32),
+                          facet_tags=np.array([tag for tag, _ in facets], np.int32))  # fmt: skip
+        model = mpm.Model(tagged, mpm.LinearElastic(young=YOUNG, poisson=0.0))
+        for tag in (1, 2):
+            model.roller(tag, (1, 0))
+        model.fix(3)
+        return model
+
+    nodes = mesh.points
+    model = build(nodes)
+    model.seed(density=WEIGHT / GRAVITY, per_cell=per_cell)
+    start = in_order(model, "position")
+    for k in range(1, steps + 1):
+        model.set_gravity((0.0, -GRAVITY * k / steps))
+        for _ in model.implicit(model.time + 1.0, dt=1.0, quasi_static=True):
+            pass
+        if moving_mesh:
+            nodes = nodes + model.nodal("velocity")  # times one second
+            model = on_moved_mesh(model, nodes, build)
+    top = np.argmax(start[:, 1])
+    return float((in_order(model, "position") - start)[top, 1]), float(exact(start[top, 1]))
+
+
+def run(quick: bool, folder) -> Result:
+    meshes = (5, 10) if quick else (10, 20, 40)
+    checks, errors = [], {}
+    for name, per_cell, steps, moving in (
+        ("mesh goes with them", 3, STEPS, True),
+        ("66 particles a cell", 66, STEPS, False),
+        ("24 particles a cell", 24, STEPS, False),
+        ("24 particles a cell, 40 steps", 24, 40, False),
+    ):
+        errors[name] = []
+        for cells in meshes:
+            found, expected = settled(cells, per_cell, steps, moving)
+            errors[name].append(abs(found / expected - 1))
+            checks.append(Check(f"settlement of the top, {cells} cells, {name}", expected, "σ = E ln(stretch), integrated", found,
+                                0.005 if not quick else 0.01, "m", limit=CROSSING if per_cell == 24 else ""))  # fmt: skip
+    if MPI.COMM_WORLD.rank == 0:
+        save_refinement(
+            folder / "error.png", meshes, "Cells over the height", {"Error of the top's settlement": errors}
+        )
+    return Result(
+        checks, {"error.png": "Error of the settlement over the number of cells: with crossings, and without"}
+    )
+
+
+if __name__ == "__main__":
+    run_alone(run)
