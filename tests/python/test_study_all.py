@@ -2,7 +2,9 @@
 
 import importlib
 import json
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +14,7 @@ STUDIES = Path(__file__).parents[2] / "studies"
 sys.path.insert(0, str(STUDIES))
 
 SMALL = {
+    "balance": "--cell-size 0.5 --mesh fitted --particles-per-cell 1 --time 0.02 --frames 2",
     "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
     "element_test": "--steps 5",
@@ -27,7 +30,8 @@ SMALL = {
     "verification": "--quick --cases column",
 }
 """Each study at a size that takes a second or less; a new study needs its line here."""
-WITH_PARTICLES = ("compare_fem", "handover", "retrogression", "slope", "slope_schemes")
+ON_TWO_RANKS = ("balance",)
+WITH_PARTICLES = ("balance", "compare_fem", "handover", "retrogression", "slope", "slope_schemes")
 NAMES = sorted(
     [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
 )
@@ -35,7 +39,13 @@ TIMED = re.compile("seconds|date$|per_second|finished$|versions|^output$|^parame
 
 
 def main(name, arguments):
-    """Run a study in this process."""
+    """Run a study in this process, or on two ranks if it needs them."""
+    if name in ON_TWO_RANKS and "--help" not in arguments:
+        launch = ["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", sys.executable]
+        # What MPI has put into the environment of this process, past os.environ, is not for another run of it.
+        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        command = [*launch, STUDIES / f"{name}.py", *map(str, arguments)]
+        return subprocess.run(command, timeout=120, env={**os.environ, **root}).returncode
     if (STUDIES / f"{name}.py").exists():
         module = importlib.import_module(name)
     else:
@@ -109,6 +119,6 @@ def test_the_page_has_everything_in_it(name, first_run):
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))
     assert bool(data["movies"]) == (name in WITH_PARTICLES)
     for movie in data["movies"]:
-        assert movie["count"] > 0 and {"x", "y", "displacement", "vertical_stress"} <= set(movie["fields"])
+        assert movie["count"] > 0 and {"x", "y", "radius"} < set(movie["fields"])
     options = re.findall(r"^([a-z0-9-]+) = ", (folder / "parameters.toml").read_text(), re.MULTILINE)
     assert options and all(f'<td class="name">{option}</td>' in page for option in options)
