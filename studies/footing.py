@@ -7,12 +7,11 @@ Pressure at collapse = cohesion x Nc; with associated flow (the default) Nc conv
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.ranks import run_study
 from common.slope_case import soil_of
@@ -46,6 +45,7 @@ def parser() -> ArgumentParser:
     )
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    add_flow_options(p)
     return p
 
 
@@ -88,56 +88,50 @@ def prandtl_line(half_width: float, friction_angle: float) -> np.ndarray:
 # --- 3. Collapse on each mesh ----------------------------------------------------------------------------------------
 
 
-@dataclass
-class Run:
-    """Collapse on one mesh; settlement: (k, 2) pressure [Pa] and settlement of the footing's centre [m]."""
+def target(a: Namespace) -> Target:
+    """The bearing capacity factor: pressure at collapse over cohesion."""
+    return Target(
+        "bearing_capacity_factor_Nc", "failed_at_factor_Nc", "prandtl_bearing_capacity_factor_Nc",
+        prandtl_factor(a.friction_angle), unit=a.cohesion,
+        title="Collapse at $N_c$ = {:.2f}", line="Nc = {:6.3f}", label="Bearing capacity factor $N_c$ [-]",
+    )  # fmt: skip
 
-    cell_size: float
-    collapse: bridge.Collapse
-    settlement: np.ndarray
 
+def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[bridge.Collapse, np.ndarray]:
+    """Raise the pressure to the last equilibrium on one mesh that reaches well beyond Prandtl's slip line.
 
-def footing(a: Namespace, cell_size: float, first_step: float) -> Run:
-    """Raise the pressure to the last equilibrium on one mesh that reaches well beyond Prandtl's slip line."""
+    Returns also the curve of pressure [Pa] and settlement of the footing's centre [m], (k, 2).
+    """
     line = prandtl_line(a.half_width, a.friction_angle)
     parameters = {"half_width": a.half_width, "width": 1.6 * line[-1, 0], "depth": -2.0 * line[:, 1].min(),
                   "edge_size": 0.2 * cell_size, "near_size": cell_size, "far_size": 6 * cell_size}  # fmt: skip
     domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
     supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
-    model = bridge.QuasiStatic(domain, soil_of(a), facet_tags, supports, degree=int(a.elements[1]))
-    show, curve = step_line(f"cells of {cell_size:g} m"), [(0.0, 0.0)]
-    centre = np.zeros((1 if comm.rank == 0 else 0, 2))
+    model = bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, degree=int(a.elements[1]))
+    show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees")
+    curve, centre = [(0.0, 0.0)], np.zeros((1, 2))
 
     def look(step: bridge.LoadStep) -> None:
         show(step)
         moved = bridge.evaluate_at(centre, displacement=model.displacement)["displacement"]
-        if step.converged and comm.rank == 0:
+        if step.converged:
             curve.append((step.value, -moved[0, 1]))
 
     load = lambda pressure: bridge.Load(pressure={FOOTING: pressure})  # noqa: E731
-    return Run(cell_size, bridge.collapse_load(model, load, first_step=first_step, progress=look), np.array(curve))
+    first_step = 0.03 * prandtl_factor(a.friction_angle) * a.cohesion
+    return bridge.collapse_load(model, load, first_step=first_step, progress=look), np.array(curve)
 
 
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(a: Namespace, runs: list[Run], folder: Path) -> None:
+def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
     """Load-settlement curves, convergence and mechanism. Collective."""
-    field = gathered(runs[-1].collapse.mechanism)
-    if field is None:
-        return
-    factor = prandtl_factor(a.friction_angle)
-    reference = (factor, f"Prandtl, {factor:.2f}")
-    curves = {f"{run.cell_size:g} m": (1e3 * run.settlement[:, 1], run.settlement[:, 0] / a.cohesion) for run in runs}
-    save_curves(folder / "load_settlement.png", curves, ("Settlement of the centre [mm]", "Pressure over cohesion [-]"),
-                reference=reference, limits=((0, 1e3 * bend([run.settlement for run in runs])), (0, None)))  # fmt: skip
-    save_convergence(folder / "convergence.png", [run.cell_size for run in runs],
-                     {f"$\\phi$ = {a.friction_angle:g}°": [run.collapse.value / a.cohesion for run in runs]},
-                     "Bearing capacity factor $N_c$ [-]", reference)  # fmt: skip
     line = prandtl_line(a.half_width, a.friction_angle)
     box = ((0.0, 1.3 * line[:, 1].min()), (1.15 * line[-1, 0], 0.0))
-    title = f"Collapse at $N_c$ = {runs[-1].collapse.value / a.cohesion:.2f}, $\\phi$ = {a.friction_angle:g}°"
-    save_mechanism(folder / "mechanism.png", field, title, line=line, line_name="slip line of Prandtl", box=box)
+    found.draw_mechanisms(folder, lambda: line, "slip line of Prandtl", box=box)
+    if comm.rank == 0:
+        found.draw_curves(folder, "load_settlement", ("Settlement of the centre [mm]", "Pressure over cohesion [-]"))
 
 
 # --- 5. All together -------------------------------------------------------------------------------------------------
@@ -147,36 +141,25 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
     folder = results_folder("footing", a.output, comm)
-    expected = prandtl_factor(a.friction_angle)
     sizes = [
         a.cell_size * 2**k for k in reversed(range(a.meshes)) if a.cell_size * 2**k <= a.half_width * (1 + 1e-9)
     ]
-    runs = [footing(a, size, 0.03 * expected * a.cohesion) for size in sizes]
-    draw(a, runs, folder)
+    both = {angle: [footing(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
+    runs, curves = ({angle: [pair[k] for pair in pairs] for angle, pairs in both.items()} for k in (0, 1))
+    found = CollapseRuns(target(a), a.friction_angle, sizes, runs, curves)
+    draw(a, found, folder)
 
-    factors = [run.collapse.value / a.cohesion for run in runs]
+    curve = found.finest_curve()
     summary = {
-        "bearing_capacity_factor_Nc": factors[-1],
-        "prandtl_bearing_capacity_factor_Nc": expected,
-        "relative_difference_to_prandtl": factors[-1] / expected - 1,
-        "collapse_pressure_Pa": runs[-1].collapse.value,
-        "failed_at_pressure_Pa": runs[-1].collapse.failed_at,
-        "meshes": [
-            {"cell_size_m": run.cell_size, "bearing_capacity_factor_Nc": factor,
-             "relative_difference_to_prandtl": factor / expected - 1, "steps": len(run.collapse.steps)}
-            for run, factor in zip(runs, factors)
-        ],
-        "curve_pressure_Pa": runs[-1].settlement[:, 0],
-        "curve_settlement_m": runs[-1].settlement[:, 1],
+        **found.summary(),
+        "collapse_pressure_Pa": curve[-1, 0],
+        "curve_pressure_Pa": curve[:, 0],
+        "curve_settlement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
-    }  # fmt: skip
+    }
     write_summary(folder, a, summary, comm)
     if comm.rank == 0:
-        print(f"Prandtl: Nc = {expected:.3f}")
-        for row in summary["meshes"]:
-            print("cells of {cell_size_m:<6g} m: Nc = {bearing_capacity_factor_Nc:.3f} "
-                  "({relative_difference_to_prandtl:+.1%})".format(**row))  # fmt: skip
-        print(f"results in {folder}")
+        print(f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}\nresults in {folder}")
     return 0
 
 

@@ -12,13 +12,12 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
-from common.options import add_number, add_switch, study_parser
+from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.options import add_number, study_parser
 from common.ranks import run_study
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
-    flow_name,
     mesh_sizes,
     slope_fem,
     step_line,
@@ -42,7 +41,7 @@ def parser() -> ArgumentParser:
     add_fem_slope_options(p)
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
     add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
-    add_switch(p, "--without-dilation", True, "flow without dilation as well, to compare with")
+    add_flow_options(p)
     return p
 
 
@@ -54,6 +53,14 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 # --- 2. Strength reduction on each mesh ------------------------------------------------------------------------------
+
+
+def target(factor: float) -> Target:
+    """The factor of safety; `factor` is that of limit analysis."""
+    return Target(
+        "factor_of_safety", "failed_at_factor", "limit_analysis_factor_of_safety", factor,
+        title="Factor of safety {:.3f}", line="{:.3f}", label="Factor of safety [-]",
+    )  # fmt: skip
 
 
 def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
@@ -74,25 +81,12 @@ def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(a: Namespace, sizes: list[float], results: dict, factor: float, folder: Path) -> None:
+def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
     """Displacement over the factor, convergence and mechanism. Collective."""
-    fields = {angle: gathered(runs[-1].mechanism) for angle, runs in results.items()}
-    if comm.rank != 0:
-        return
-    reference = (factor, "limit analysis, associated flow")
-    every = [run.curve for runs in results.values() for run in runs]
-    curves = {f"{size:g} m, {flow_name(a, angle)}": (1e3 * runs[k].curve[:, 1], runs[k].curve[:, 0])
-              for k, size in enumerate(sizes) for angle, runs in results.items()}  # fmt: skip
-    save_curves(folder / "factor_displacement.png", curves,
-                ("Largest displacement [mm]", "Factor that divides the strength [-]"), reference=reference,
-                limits=((0, 1e3 * bend(every)), (0.98 * a.start, None)), per_colour=len(results))  # fmt: skip
-    factors = {flow_name(a, angle): [run.value for run in runs] for angle, runs in results.items()}
-    save_convergence(folder / "convergence.png", sizes, factors, "Factor of safety [-]", reference)
-    line = slip_line(a, factor)
-    for angle, field in fields.items():
-        name = "mechanism" if angle == a.dilation_angle else "mechanism_without_dilation"
-        title = f"Factor of safety {results[angle][-1].value:.3f}, {flow_name(a, angle)}"
-        save_mechanism(folder / f"{name}.png", field, title, line=line, line_name="log-spiral, limit analysis")
+    found.draw_mechanisms(folder, lambda: slip_line(a, found.target.reference), "log-spiral, limit analysis")
+    if comm.rank == 0:
+        labels = "Largest displacement [mm]", "Factor that divides the strength [-]"
+        found.draw_curves(folder, "factor_displacement", labels, lowest=0.98 * a.start)
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -104,34 +98,20 @@ def main(arguments: list[str] | None = None) -> int:
     folder = results_folder("safety", a.output, comm)
     limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight)
     sizes = mesh_sizes(a)
-    angles = list(dict.fromkeys([a.dilation_angle, *([0.0] if a.without_dilation else [])]))
-    results = {angle: [safety(a, size, angle) for size in sizes] for angle in angles}
-    draw(a, sizes, results, limit, folder)
+    runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
+    found = CollapseRuns(target(limit), a.friction_angle, sizes, runs)
+    draw(a, found, folder)
 
-    chosen = results[a.dilation_angle]
+    curve = found.finest_curve()
     summary = {
-        "factor_of_safety": chosen[-1].value,
-        "failed_at_factor": chosen[-1].failed_at,
-        "limit_analysis_factor_of_safety": limit,
-        "relative_difference_to_limit_analysis": chosen[-1].value / limit - 1,
-        "factor_of_safety_without_dilation": results[0.0][-1].value if 0.0 in results else None,
-        "meshes": [
-            {"cell_size_m": size, "dilation_angle_degrees": angle, "factor_of_safety": run.value,
-             "failed_at_factor": run.failed_at, "relative_difference_to_limit_analysis": run.value / limit - 1,
-             "largest_displacement_m": run.curve[-1, 1], "steps": len(run.steps)}
-            for angle, runs in results.items() for size, run in zip(sizes, runs)
-        ],
-        "curve_factor": chosen[-1].curve[:, 0],
-        "curve_largest_displacement_m": chosen[-1].curve[:, 1],
+        **found.summary(),
+        "curve_factor": curve[:, 0],
+        "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
-    }  # fmt: skip
+    }
     write_summary(folder, a, summary, comm)
     if comm.rank == 0:
-        print(f"limit analysis, associated flow: {limit:.3f}")
-        for row in summary["meshes"]:
-            print("cells of {cell_size_m:<7g} m, dilation angle {dilation_angle_degrees:4g} degrees: {factor_of_safety:.3f} "
-                  "({relative_difference_to_limit_analysis:+.1%})".format(**row))  # fmt: skip
-        print(f"results in {folder}")
+        print(f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}\nresults in {folder}")
     return 0
 
 

@@ -64,11 +64,6 @@ def weight(unit_weight: float) -> bridge.Load:
     return bridge.Load(unit_weight=unit_weight)
 
 
-def flow_name(options: argparse.Namespace, dilation_angle: float) -> str:
-    """What flow with a dilation angle is called in pictures."""
-    return "associated" if dilation_angle == options.friction_angle else rf"$\psi$ = {dilation_angle:g}°"
-
-
 def step_line(title: str) -> Callable[[bridge.LoadStep], None]:
     """A `progress` for load steps that tells, on the first rank, what is running."""
 

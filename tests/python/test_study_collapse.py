@@ -63,6 +63,9 @@ def test_bearing_capacity(tmp_path, friction_angle, tolerance):
     expected = {0: 2 + np.pi, 20: 14.83}[friction_angle]
     assert summary["prandtl_bearing_capacity_factor_Nc"] == pytest.approx(expected, rel=1e-3)
     assert expected < summary["bearing_capacity_factor_Nc"] < (1 + tolerance) * expected
+    assert summary["collapse_pressure_Pa"] == pytest.approx(1e3 * summary["bearing_capacity_factor_Nc"])
+    without = summary["bearing_capacity_factor_Nc_without_dilation"]
+    assert 0.8 * expected < without <= summary["bearing_capacity_factor_Nc"]
     assert all((tmp_path / f"{name}.png").exists() for name in ("load_settlement", "convergence", "mechanism"))
 
 
