@@ -56,7 +56,7 @@ def parser() -> ArgumentParser:
     add_slope_options(p)
     change_defaults(
         p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=18e3,
-        material="softening", young=2e6, poisson=0.45, cohesion=18e3, friction_angle=0.0, residual_cohesion=4e3,
+        material="softening", young=2e6, poisson=0.45, cohesion=15e3, friction_angle=0.0, residual_cohesion=4e3,
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
     add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
