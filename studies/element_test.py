@@ -85,13 +85,16 @@ def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
 
 
 def draw(history: History, a: Namespace, path: Path) -> None:
-    """Stress path, stress over strain, volume (or pore pressure) over strain."""
+    """Stress path, stress over strain, and volume over strain, or pore pressure, or the mean stress where volume is kept."""
     shear = a.test == "shear"
     strain = history["shear_strain" if shear else "axial_strain"]
     strain_label = "Shear strain [-]" if shear else "Axial strain, compression [-]"
-    pore = np.any(history["excess_pore_pressure_Pa"] != 0)
-    last = ("excess_pore_pressure_Pa", 1e-3, "Excess pore pressure [kPa]") if pore else (
-        "volumetric_strain", 1.0, "Volumetric strain, compression [-]")  # fmt: skip
+    if np.any(history["excess_pore_pressure_Pa"] != 0):
+        last = ("excess_pore_pressure_Pa", 1e-3, "Excess pore pressure [kPa]")
+    elif np.abs(history["volumetric_strain"]).max() < 1e-9:
+        last = ("p_Pa", 1e-3, "$p'$ [kPa]")  # the volume is kept
+    else:
+        last = ("volumetric_strain", 1.0, "Volumetric strain, compression [-]")
     panels = [
         (history["p_Pa"] * 1e-3, history["q_Pa"] * 1e-3, "$p'$ [kPa]", "$q$ [kPa]"),
         (
@@ -106,10 +109,14 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         figure, axes = plt.subplots(1, 3, figsize=(10, 3.2), layout="constrained")
         for ax, (x, y, x_label, y_label) in zip(axes, panels, strict=True):
             ax.plot(x, y, color="#1f3b73")
-            ax.plot(x[:1], y[:1], "o", color="black", markersize=4, markerfacecolor="white")
+            ax.plot(x[:1], y[:1], "o", color="black", markersize=4, markerfacecolor="white", clip_on=False, zorder=3)
             ax.set_xlabel(x_label)
             ax.set_ylabel(y_label)
+            ax.set_ylim(min(0.0, 1.05 * y.min()), max(1.05 * y.max(), 1e-12))
             ax.grid(linewidth=0.3, color="#d0d0d0")
+        axes[0].set_xlim(
+            min(0.0, 1.05 * axes[0].dataLim.x0), 1.05 * axes[0].dataLim.x1
+        )  # nothing looks larger than it is
         figure.savefig(path, dpi=200)
         plt.close(figure)
 
