@@ -340,12 +340,21 @@ void bind_models(py::module_& m)
       .value("MODIFIED_LAST", StressUpdate::modified_last)
       .value("LAST", StressUpdate::last)
       .value("FIRST", StressUpdate::first);
+  py::enum_<Integration>(m, "Integration", R"(How the stresses of a cell become forces at its nodes.
+
+PARTICLES: the sum over its particles, the material point method as it is. MIXED: a cell whose particles have at least 90 % of its
+volume integrates their mean stress over its own volume (Al-Kafaji 2013, section 3; Anura3D). DUAL_DOMAIN: gradients of shape
+functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011); explicit scheme only.)")
+      .value("PARTICLES", Integration::particles)
+      .value("MIXED", Integration::mixed)
+      .value("DUAL_DOMAIN", Integration::dual_domain);
   py::class_<ExplicitOptions>(m, "ExplicitOptions")
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
       .def_readwrite("damping", &ExplicitOptions::damping)
       .def_readwrite("pic_share", &ExplicitOptions::pic_share)
-      .def_readwrite("mixed_discretisation", &ExplicitOptions::mixed_discretisation);
+      .def_readwrite("mixed_discretisation", &ExplicitOptions::mixed_discretisation)
+      .def_readwrite("integration", &ExplicitOptions::integration);
   py::class_<RunOptions>(m, "RunOptions")
       .def(py::init<>())
       .def_readwrite("until", &RunOptions::until)

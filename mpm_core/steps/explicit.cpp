@@ -1,5 +1,6 @@
 #include "steps/explicit.h"
 
+#include "steps/integration.h"
 #include "steps/mapping.h"
 #include "steps/particle_pass.h"
 #include "transfer/kinematics.h"
@@ -116,6 +117,8 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
 {
   Workspace<D>& work = model.work;
   const bool first = options.stress_update == StressUpdate::first;
+  model.integration = options.integration;
+  const bool dual = options.integration == Integration::dual_domain;
   map_to_nodes(model); // (11), (14), (15)
   find_start_velocity(model);
   if (first)
@@ -123,6 +126,8 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
     work.velocity = work.start_velocity;
     if (options.mixed_discretisation)
       average_strains(model, dt);
+    if (dual)
+      average_gradients(model);
     particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation});
     map_to_nodes(model); // the stresses have changed
   }
@@ -131,6 +136,8 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
   tally(model, options.damping, dt);
   if (options.mixed_discretisation && !first)
     average_strains(model, dt);
+  if (dual && !first)
+    average_gradients(model);
   particle_pass<D>(model, {dt, true, !first, options.pic_share, options.mixed_discretisation}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)

@@ -20,6 +20,7 @@ struct ExplicitOptions
   double damping = 0;   ///< local damping alpha of FLAC, in [0, 1)
   double pic_share = 0; ///< in [0, 1]
   bool mixed_discretisation = false;
+  Integration integration = Integration::particles;
 };
 
 /// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.

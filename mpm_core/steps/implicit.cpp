@@ -124,6 +124,7 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   Workspace<D>& work = model.work;
   step.options = options;
   step.dt = dt;
+  model.integration = options.integration;
   map_to_nodes(model); // (11), (15)
   find_start_velocity(model);
   find_active(model, step);

@@ -1,6 +1,7 @@
 #include "steps/implicit_trial.h"
 
 #include "steps/batches.h"
+#include "steps/integration.h"
 #include "transfer/kinematics.h"
 
 #include <algorithm>
@@ -232,6 +233,23 @@ void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialS
         stiffness[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
   }
 }
+
+/// Full cells integrate the mean of their particles over their own volume.
+template <int D>
+void integrate_cells(const Model<D>& model, ImplicitStep<D>& step)
+{
+  for (std::size_t c = 0; c < step.stress.size(); ++c)
+  {
+    const double filled = model.work.moments[c].volume;
+    const double factor = filled > 0 ? integrated_volume(model, static_cast<Index>(c)) / filled : 0;
+    for (double& component : step.stress[c])
+      component *= factor;
+    if (!step.stiffness.empty())
+      for (auto& row : step.stiffness[c])
+        for (double& component : row)
+          component *= factor;
+  }
+}
 } // namespace
 
 template <int D>
@@ -265,6 +283,8 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
         sum_stiffness(model, runs[r], runs[r].first - batch.first, scratch, step.stiffness[runs[r].cell]);
     }
   }
+  if (step.options.integration == Integration::mixed)
+    integrate_cells(model, step);
   if (tangents)
     step.tangents.resize(cells);
   for (std::size_t c = 0; tangents && c < cells; ++c)

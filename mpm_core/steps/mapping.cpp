@@ -1,5 +1,7 @@
 #include "steps/mapping.h"
 
+#include "steps/integration.h"
+
 namespace mpm
 {
 template <int D>
@@ -7,6 +9,8 @@ void map_to_nodes(Model<D>& model)
 {
   Workspace<D>& work = model.work;
   scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
+  if (model.integration != Integration::particles)
+    integrate_stress(model);
   sum_shared(model.exchange, work.nodes);
 }
 
@@ -29,7 +33,7 @@ void average_strains(Model<D>& model, double dt)
   const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
   {
-    work.cell_volume[c] = work.moments[c].volume;
+    work.cell_volume[c] = integrated_volume(model, c);
     if (work.cell_volume[c] == 0)
       continue;
     const auto gradient = affine_field<D>(model.mesh, c, velocity).gradient;

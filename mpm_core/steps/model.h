@@ -5,6 +5,7 @@
 #include "materials/law.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
+#include "transfer/dual_domain.h"
 #include "transfer/kinematics.h"
 #include "transfer/mixed_discretisation.h"
 #include "transfer/nodes.h"
@@ -16,6 +17,22 @@ namespace mpm
 {
 /// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
 inline constexpr Index batch_size = 256;
+
+/// How the stresses of a cell become forces at its nodes (14).
+enum class Integration
+{
+  particles,  ///< the sum over its particles: the material point method as it is
+  mixed,      ///< a full cell integrates the mean stress of its particles over its volume; others as above
+  dual_domain ///< gradients that are continuous over the sides of cells; see transfer/dual_domain.h
+};
+
+/// Mean of the velocity gradient over the cells that share a node; plain doubles.
+template <int D>
+struct MeanGradient
+{
+  double volume;
+  Matrix<D> gradient;
+};
 
 /// What stops a run, with its place.
 template <int D>
@@ -81,6 +98,10 @@ struct Workspace
   std::vector<double> cell_volume;       ///< filled volume, at the step's start
   std::vector<double> volumetric_strain; ///< theta_c, averaged; used with nodal mixed discretisation
   VolumetricSums volumetric_sums;
+  std::vector<DualStress<D>> dual_cells, dual_nodes; ///< used with dual domains, as are the mean gradients of nodes
+  std::vector<MeanGradient<D>> mean_gradients;
+  VolumetricSums fills;             ///< per node: volumes of particles and of cells around it
+  std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
   std::vector<Leaver> leavers;
   std::vector<Index> outflow;
   std::vector<Index> lost;       ///< particles that no cell known to this rank's neighbourhood holds
@@ -101,9 +122,10 @@ struct Model
   std::vector<Law> laws;
   std::vector<Support<D>> supports;
   std::vector<Index> outflow_tags;
-  Vector<D> gravity{};     ///< [m/s2]
-  double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
-  double time = 0;         ///< [s]
+  Integration integration = Integration::particles; ///< of the run under way
+  Vector<D> gravity{};                              ///< [m/s2]
+  double gravity_ramp = 0;                          ///< time over which gravity rises from zero [s]
+  double time = 0;                                  ///< [s]
   Totals totals;
   Inventory inventory; ///< when the particles were last changed by anything but a step
   LastStep last;

@@ -4,6 +4,7 @@
 #include "materials/substeps.h"
 #include "mesh/search.h"
 #include "steps/batches.h"
+#include "steps/integration.h"
 #include "transfer/kinematics.h"
 
 #include <algorithm>
@@ -78,10 +79,10 @@ void update_failed(Model<D>& model, const Batch& batch, const PointBatch<D>& poi
   note_trouble<D>(model, Trouble<D>::Kind::law_failed_in_parts, batch.first + report.failed.front(), increment);
 }
 
+/// Strains the particles of a batch, those of a cell alike.
 template <int D>
-void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+void strain_cells(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
-  Particles<D>& particles = model.particles;
   find_cell_strains(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
@@ -90,8 +91,37 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
     for (int k = 0; k < n_stress<D>; ++k)
       std::fill(scratch.strain[k] + (run.first - batch.first), scratch.strain[k] + (run.last - batch.first),
                 strain.increment[k]);
-    strain_particles<D>(particles, run.first, run.last, strain);
+    strain_particles<D>(model.particles, run.first, run.last, strain);
   }
+}
+
+/// Strains the particles of a batch, each by the gradient at its own place.
+template <int D>
+void strain_dual_domains(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+{
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Run& run = model.work.runs[r];
+    for (Index p = run.first; p < run.last; ++p)
+    {
+      CellStrain<D> strain = strain_increment<D>(dual_gradient(model, p, run.cell), options.dt);
+      if (options.averaged)
+        set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+      for (int k = 0; k < n_stress<D>; ++k)
+        scratch.strain[k][p - batch.first] = strain.increment[k];
+      strain_particles<D>(model.particles, p, p + 1, strain);
+    }
+  }
+}
+
+template <int D>
+void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+{
+  Particles<D>& particles = model.particles;
+  if (model.integration == Integration::dual_domain)
+    strain_dual_domains(model, options, batch, scratch);
+  else
+    strain_cells(model, options, batch, scratch);
 
   PointBatch<D> points;
   points.size = batch.last - batch.first;

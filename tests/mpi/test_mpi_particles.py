@@ -31,6 +31,14 @@ def test_a_thousand_steps_are_the_same_on_any_partition(comm, owners_of):
     assert_same(moved, all_by_id(alone))
 
 
+@pytest.mark.parametrize("integration", [mpm.Integration.MIXED, mpm.Integration.DUAL_DOMAIN])
+def test_other_integrations_are_the_same_on_any_partition(comm, integration):
+    model, alone = sliding_slope(comm, scattered), sliding_slope(MPI.COMM_SELF)
+    for each in (model, alone):
+        list(each.explicit(0.2, dt=1e-3, pic=0.01, integration=integration))
+    assert_same(all_by_id(model), all_by_id(alone))
+
+
 def test_one_partition_twice_is_the_same_to_the_last_bit(comm):
     results = []
     for _ in range(2):

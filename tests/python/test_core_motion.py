@@ -20,8 +20,15 @@ def falling_body(dim):
 @pytest.mark.parametrize("dim", DIMS)
 @pytest.mark.parametrize(
     "scheme",
-    [{}, {"nmd": True}, {"pic": 0.2}, {"stress_update": mpm.StressUpdate.FIRST}],
-    ids=["MUSL", "NMD", "PIC share", "USF"],
+    [
+        {},
+        {"nmd": True},
+        {"pic": 0.2},
+        {"stress_update": mpm.StressUpdate.FIRST},
+        {"integration": mpm.Integration.MIXED},
+        {"integration": mpm.Integration.DUAL_DOMAIN},
+    ],
+    ids=["MUSL", "NMD", "PIC share", "USF", "mixed integration", "dual domains"],
 )
 def test_free_fall_is_exact(dim, scheme):
     model = falling_body(dim)

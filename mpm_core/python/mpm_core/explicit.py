@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def explicit_options(damping: float, pic: float, nmd: bool, stress_update: Any) -> Any:
+def explicit_options(damping: float, pic: float, nmd: bool, integration: Any, stress_update: Any) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic_share = within("pic", pic, 0, 1)
     options.mixed_discretisation = bool(nmd)
+    options.integration = integration
     options.stress_update = stress_update
     return options
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from ._core import RunError
+from ._core import InputError, Integration, RunError
 from .checks import within
 from .explicit import is_report_due, require_particles
 from .ghost import GhostPenalty
@@ -31,13 +31,22 @@ FADING = 0.1
 
 
 def implicit_options(
-    model: Model, damping: float, pic: float, nmd: bool, quasi_static: bool, ghost: GhostPenalty | None
+    model: Model,
+    damping: float,
+    pic: float,
+    nmd: bool,
+    integration: Integration,
+    quasi_static: bool,
+    ghost: GhostPenalty | None,
 ) -> Any:
     """The core's options of the scheme; see `Model.implicit`."""
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic_share = within("pic", pic, 0, 1)
     options.mixed_discretisation = bool(nmd)
+    if integration == Integration.DUAL_DOMAIN:
+        raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")
+    options.integration = integration
     options.quasi_static = bool(quasi_static)
     options.ghost = (ghost or GhostPenalty()).options()
     require_particles(model)

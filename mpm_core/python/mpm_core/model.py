@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import StressUpdate
+from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .explicit import explicit_options, report_times, run_explicit, run_options, steps_between
@@ -120,6 +120,7 @@ class Model(Body):
         damping: float = 0.0,
         pic: float = 0.0,
         nmd: bool = False,
+        integration: Integration = Integration.PARTICLES,
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         allow_unstable: bool = False,
         rebalance: float | None = None,
@@ -139,6 +140,7 @@ class Model(Body):
             damping: local damping alpha, in [0, 1).
             pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: most particles on a rank over their mean, above 1, from which on the mesh is cut anew (see the method
@@ -148,7 +150,7 @@ class Model(Body):
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, a law failed; with the place.
         """
-        options = explicit_options(damping, pic, nmd, stress_update)
+        options = explicit_options(damping, pic, nmd, integration, stress_update)
         run = run_options(dt, courant, allow_unstable)
         times = report_times(self, until, every, since)
         return run_explicit(
@@ -169,6 +171,7 @@ class Model(Body):
         damping: float = 0.0,
         pic: float = 0.0,
         nmd: bool = False,
+        integration: Integration = Integration.PARTICLES,
         ghost: GhostPenalty | None = None,
         rebalance: float | None = None,
     ) -> Iterator[ImplicitReport]:
@@ -190,6 +193,7 @@ class Model(Body):
                 acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
             pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             rebalance: see ``explicit``; looked at before each step.
 
@@ -198,7 +202,7 @@ class Model(Body):
             RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
                 particles are as after the last step that converged.
         """
-        options = implicit_options(self, damping, pic, nmd, quasi_static, ghost)
+        options = implicit_options(self, damping, pic, nmd, integration, quasi_static, ghost)
         longest = positive("dt", dt, "s")
         times = report_times(self, until, every, since)
         return run_implicit(
@@ -212,6 +216,7 @@ class Model(Body):
         *,
         solver: Newton | Relaxation | None = None,
         nmd: bool = False,
+        integration: Integration = Integration.PARTICLES,
         ghost: GhostPenalty | None = None,
         tolerance: float = 1e-6,
         max_steps: int = 20,
@@ -224,6 +229,7 @@ class Model(Body):
         Args:
             solver: what solves each step; Newton's method by default.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: |f_ext - f_int| / |f_ext| to reach, at nodes and particles as they are after a step.
             max_steps: steps after which to give up.
@@ -231,5 +237,5 @@ class Model(Body):
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
-        options = implicit_options(self, 0.0, 0.0, nmd, True, ghost)
+        options = implicit_options(self, 0.0, 0.0, nmd, integration, True, ghost)
         return settle(self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps)

@@ -1,0 +1,114 @@
+"""Mixed and dual domain integration: forces that add up, exact for a uniform stress, and smooth stresses in a settling column."""
+
+import numpy as np
+import pytest
+from core_cases import DIMS, box, by_id, moduli, rollers, run
+
+import mpm_core as mpm
+from mpm_core import Integration
+
+MODES = list(Integration.__members__.values())
+REMEDIES = [Integration.MIXED, Integration.DUAL_DOMAIN]
+YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
+ELASTIC = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+
+
+def unevenly_filled(dim, **mesh):
+    """A box whose particles have been thrown about, over the sides of their cells."""
+    model = mpm.Model(box([5] * dim, shake=0.15, **mesh), ELASTIC)
+    model.seed(density=DENSITY, per_cell={2: 10, 3: 8}[dim])
+    x = model.particles.position
+    model.place(np.clip(x + np.random.default_rng(3).uniform(-0.06, 0.06, x.shape), 0.01, 0.99))
+    return model
+
+
+def internal_force(model, integration):
+    """At the nodes, of the stresses as they are."""
+    run(model, 1e-9, dt=1e-9, integration=integration)
+    return model.nodal("internal_force")
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize("integration", MODES)
+def test_internal_forces_of_any_stress_add_up_to_nothing(dim, integration):
+    model = unevenly_filled(dim)
+    model.particles.set("stress", np.random.default_rng(1).uniform(-1, 1, model.particles.stress.shape))
+    force = internal_force(model, integration)
+    assert np.abs(force).max() > 1e-4
+    assert np.abs(force.sum(axis=0)).max() < 1e-13 * np.abs(force).sum()
+    x = model.mesh.points  # no moment either
+    moment = x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]
+    assert abs(moment.sum()) < 1e-13 * np.abs(moment).sum()
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize("integration", MODES)
+def test_a_uniform_stress_leaves_inner_nodes_at_rest(dim, integration):
+    model = unevenly_filled(dim)
+    stress = np.array([-3.0, -1.0, -2.0, 0.7] if dim == 2 else [-3.0, -1.0, -2.0, 0.7, -0.2, 0.4])
+    model.particles.set("stress", np.tile(stress, (len(model.particles), 1)))
+    force = internal_force(model, integration)
+    inner = ((model.mesh.points > 0.01) & (model.mesh.points < 0.99)).all(axis=1)
+    unbalanced = np.abs(force[inner]).max() / np.abs(force[~inner]).max()
+    if integration == Integration.PARTICLES:
+        assert unbalanced > 0.05  # what the others are for
+    else:
+        assert unbalanced < 1e-12
+
+
+def settled_column(integration, settlement, rows=16, scheme="explicit"):
+    """A column under its weight whose top settles by this share of the height, at rest. Returns the root mean square error of the
+    vertical stress over w H: the weight above a particle stays above it, so it is w (H - X) wherever it moved."""
+    height, modulus = 1.0, moduli(YOUNG, POISSON)[2]
+    gravity = 2 * settlement * modulus / (DENSITY * height)
+    side = height / rows
+    mesh = box([2, rows + 1], [2 * side, height + side], diagonals="alternating", body=((-1, 0), (1, height)))
+    model = mpm.Model(mesh, ELASTIC)
+    model.seed(density=DENSITY, per_cell=6, cell_tag=1)
+    rollers(model, axes=[0])
+    model.fix(3)
+    period = 4 * height / np.sqrt(modulus / DENSITY)
+    if scheme == "explicit":
+        model.set_gravity((0, -gravity), ramp=4 * period)
+        run(model, 12 * period, damping=0.7, integration=integration)
+    else:
+        model.set_gravity((0, -gravity), ramp=1.0)
+        list(model.implicit(1.0, dt=0.05, quasi_static=True, integration=integration))
+    expected = -DENSITY * gravity * (height - by_id(model, "initial_position")[:, 1])
+    error = by_id(model, "stress")[:, 1] - expected
+    return np.sqrt(np.mean(error**2)) / (DENSITY * gravity * height)
+
+
+def test_dual_domains_give_stresses_inside_of_cells():
+    # One stress in a cell of height h misses a linear one by h / sqrt(12) in the mean, here of two triangles in a square
+    plain = settled_column(Integration.PARTICLES, 1e-4)
+    assert plain == pytest.approx(1 / 16 / np.sqrt(12), rel=0.3)
+    assert settled_column(Integration.MIXED, 1e-4) == pytest.approx(plain, rel=0.01)
+    assert settled_column(Integration.DUAL_DOMAIN, 1e-4) < 0.4 * plain
+
+
+@pytest.mark.parametrize("settlement", [0.05, 0.15])
+def test_stresses_stay_smooth_when_particles_cross_into_other_cells(settlement):
+    # The standard method does not converge here: its error is that of the forces of single particles.
+    errors = {mode: settled_column(mode, settlement) for mode in MODES}
+    assert errors[Integration.PARTICLES] > 0.08
+    assert errors[Integration.MIXED] < 0.012
+    assert errors[Integration.DUAL_DOMAIN] < 0.01
+
+
+@pytest.mark.parametrize("integration", REMEDIES)
+def test_they_converge_where_the_standard_method_does_not(integration):
+    coarse, fine = (settled_column(integration, 0.05, rows) for rows in (8, 32))
+    assert fine < 0.5 * coarse
+    plain = [settled_column(Integration.PARTICLES, 0.05, rows) for rows in (8, 32)]
+    assert plain[1] > 0.8 * plain[0]
+
+
+def test_mixed_integration_of_the_implicit_scheme():
+    assert settled_column(Integration.PARTICLES, 0.05, scheme="implicit") > 0.03
+    assert settled_column(Integration.MIXED, 0.05, scheme="implicit") < 0.02
+
+
+def test_dual_domains_are_explicit_only():
+    with pytest.raises(mpm.InputError, match="integration is DUAL_DOMAIN"):
+        unevenly_filled(2).implicit(1.0, dt=1.0, integration=Integration.DUAL_DOMAIN)
