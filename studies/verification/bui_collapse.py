@@ -1,0 +1,67 @@
+"""Collapse of a column of aluminium bars: the experiment of Bui et al. (2008).
+
+A block of 200 x 100 mm of bars, which behave as cohesionless soil in the plane, is let go on one side on a rough
+ground. Expected are points of the final surface and the run-out, digitised from the paper. The soil is that of the
+paper's own simulation. A share of the grid's velocity, in proportion to the length of the steps, keeps single
+particles from being thrown ahead (FLIP alone lets some land far beyond the toe).
+"""
+
+import numpy as np
+from _case import Check, Result, run_alone
+from _plots import save_comparison
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+LENGTH, HEIGHT, END = 0.2, 0.1, 0.8  # m: block, and the end of the background mesh
+SURFACE = np.array([(0, 99.2), (100, 77.6), (200, 47.4), (302, 21.5), (402, 3.7), (442, 0.0)]) / 1e3
+"""Final surface, Bui et al. 2008, figure of the experiment [m]; the last point is the toe."""
+RUN_OUT = SURFACE[-1, 0]
+SIDE, GROUND = 1, 3
+TIME = 1.0  # s
+PIC_SHARE = 0.3
+"""Per metre of cell size: 0.3 % for cells of 10 mm."""
+
+
+def run(quick: bool, folder) -> Result:
+    comm, cell = MPI.COMM_WORLD, 0.01 if quick else 0.005
+
+    # --- 1. The block on rough ground, against a smooth wall --------------------------------------------------------
+    counts = [round(END / cell), round(1.1 * HEIGHT / cell)]
+    body = ((-1, -1), (LENGTH, HEIGHT))
+    domain, cell_tags, facet_tags = bridge.box_mesh(comm, [cell * n for n in counts], counts, body=body)
+    bars = mpm.MohrCoulomb(young=0.84e6, poisson=0.3, cohesion=0.0, friction_angle=19.8)
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), bars)
+    model.seed(density=2650.0, per_cell=6, cell_tag=bridge.BODY)
+    model.roller(SIDE, (1, 0))
+    model.fix(GROUND)
+
+    # --- 2. Let go at once ------------------------------------------------------------------------------------------
+    model.set_gravity((0.0, -9.81))
+    *_, report = model.explicit(TIME, pic=PIC_SHARE * cell)
+
+    # --- 3. The final surface: the highest particle in each strip of a cell's width ---------------------------------
+    x = np.concatenate(comm.allgather(model.particles.position))
+    strip = np.floor(x[:, 0] / cell).astype(int)
+    end = np.argmax(np.append(np.bincount(strip), 0) < 2)  # single particles thrown ahead do not count
+    top = np.array([x[strip == k, 1].max() for k in range(end)])
+    middle, toe = (np.arange(end) + 0.5) * cell, end * cell
+
+    # --- 4. Against the experiment ----------------------------------------------------------------------------------
+    source = "experiment, Bui et al. 2008; over the height of 100 mm"
+    checks = [Check("run-out", 1e3 * RUN_OUT, "experiment, Bui et al. 2008", 1e3 * toe, 0.08, "mm")]
+    for at, height in SURFACE[:-1]:
+        found = np.interp(at, middle, top)
+        checks.append(Check(f"height of the surface at {1e3 * at:.0f} mm", 1e3 * height, source, 1e3 * found, 0.08, "mm",
+                            scale=1e3 * HEIGHT))  # fmt: skip
+    checks.append(Check("kinetic energy at the end", 0.0, "at rest; over the energy set free", report.kinetic_energy, 0.001,
+                        "J/m", scale=report.external_work))  # fmt: skip
+    if comm.rank == 0:
+        save_comparison(folder / "surface.png", {"particles": (1e3 * x[:, 0], 1e3 * x[:, 1])},
+                        {"experiment": tuple(1e3 * SURFACE.T)}, ("$x$ [mm]", "$y$ [mm]"), equal=True)  # fmt: skip
+    return Result(checks, {"surface.png": "The column of bars after its collapse, and the surface of the experiment"})
+
+
+if __name__ == "__main__":
+    run_alone(run)

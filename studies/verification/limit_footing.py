@@ -1,0 +1,65 @@
+"""Strip footing: the bearing capacity factors Nc and Nq of weightless ground.
+
+Half of a smooth, flexible strip; associated flow. Nc: the pressure that ground with cohesion carries, over the
+cohesion. Nq: the pressure that ground without cohesion carries beside a surcharge, over the surcharge. Finite
+elements come from above.
+"""
+
+import numpy as np
+from _case import Check, Result, run_alone
+from common.summary import ROOT
+from footing import AXIS, BASE, FAR, FOOTING, footing, parse, prandtl_factor, prandtl_line
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+SURFACE, SURCHARGE = 4, 1e3  # facet tag beside the footing, Pa
+QUICK, FULL = "0.1", "0.05"
+"""Cell sizes below the footing [m]; a fifth of them at its edge."""
+
+
+def surcharge_factor(friction: float) -> float:
+    """Nq = exp(π tan φ) tan²(45° + φ/2) (Reissner 1924)."""
+    phi = np.radians(friction)
+    return float(np.exp(np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2) ** 2)
+
+
+def nc(friction: float, size: str) -> float:
+    """By the study footing, on one mesh."""
+    a = parse(["--friction-angle", str(friction), "--cell-size", size, "--meshes", "1"])
+    run = footing(a, a.cell_size, 0.2 * prandtl_factor(friction) * a.cohesion)
+    return run.collapse.value / a.cohesion
+
+
+def nq(friction: float, size: float) -> float:
+    # --- 1. The ground, which reaches beyond Prandtl's slip line -----------------------------------------------------
+    half = 0.5
+    line = prandtl_line(half, friction)
+    parameters = {"half_width": half, "width": 1.6 * line[-1, 0], "depth": -2.0 * line[:, 1].min(),
+                  "edge_size": 0.2 * size, "near_size": size, "far_size": 6 * size}  # fmt: skip
+    domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", MPI.COMM_WORLD, parameters=parameters)
+    soil = mpm.MohrCoulomb(young=100e3, poisson=0.4, cohesion=0.0, friction_angle=friction, dilation_angle=friction)
+    supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
+    model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2)
+
+    # --- 2. The surcharge everywhere, then more and more on the footing ---------------------------------------------
+    load = lambda pressure: bridge.Load(pressure={FOOTING: pressure, SURFACE: SURCHARGE})  # noqa: E731
+    model.solve(load(SURCHARGE))
+    last = bridge.collapse_load(model, load, first_step=0.1 * surcharge_factor(friction) * SURCHARGE, start=SURCHARGE)
+    return last.value / SURCHARGE
+
+
+def run(quick: bool, folder) -> Result:
+    checks, size = [], QUICK if quick else FULL
+    for friction in (0.0, 20.0) if quick else (0.0, 20.0, 30.0):
+        checks.append(Check(f"Nc, φ {friction:g}°", prandtl_factor(friction), "Prandtl 1921",
+                            nc(friction, size), 0.05))  # fmt: skip
+    for friction in (20.0,) if quick else (20.0, 30.0):
+        checks.append(Check(f"Nq, φ {friction:g}°", surcharge_factor(friction), "Reissner 1924",
+                            nq(friction, float(size)), 0.05))  # fmt: skip
+    return Result(checks)
+
+
+if __name__ == "__main__":
+    run_alone(run)

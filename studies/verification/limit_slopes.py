@@ -1,0 +1,85 @@
+"""Slopes at collapse, over angles and friction angles, against the stability factors of limit analysis.
+
+The stability factor is γH/c at collapse. Limit analysis minimises it over all rotations about a logarithmic spiral
+through the toe, with associated flow (Chen 1975), here anew for each slope. Quadratic finite elements on the same
+rigid ground raise the weight to the last equilibrium. Both are upper bounds: finite elements come from above and
+may end lower than the spiral where another mechanism is better. A slope of 30° with a friction angle of 30° carries
+any weight.
+"""
+
+import matplotlib.pyplot as plt
+from _case import Check, Result, run_alone
+from common.plots import CURVES, paper_style
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+HEIGHT, COHESION = 1.0, 1e3  # m, Pa
+ANGLES, FRICTION = (30.0, 45.0, 60.0, 75.0, 90.0), (10.0, 20.0, 30.0)  # degrees
+QUICK = ((90.0, 30.0), (45.0, 20.0))
+KNOWN = {(90.0, 30.0): (6.69, "Chen 1975, vertical cut"), (45.0, 25.0): (22.9, "limit analysis of the paper's slope")}
+
+
+def by_finite_elements(angle, friction, spiral, cell):
+    """Stability factor of the last equilibrium."""
+    # --- 1. The slope, with as much ground behind its shoulder as the spiral needs -----------------------------------
+    behind = -spiral.curve[0, 0]
+    crest = cell * max(4, round((1.5 * behind + 0.5 * HEIGHT) / cell))
+    background = bridge.slope_mesh(
+        MPI.COMM_WORLD, height=HEIGHT, angle=angle, crest=crest, cell_size=cell, kind="fitted", runout=cell
+    )
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=COHESION, friction_angle=friction, dilation_angle=friction)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2)
+
+    # --- 2. Its unit weight, raised to the last equilibrium ---------------------------------------------------------
+    first = 0.3 * spiral.unit_weight
+    load = lambda unit_weight: bridge.Load(unit_weight=unit_weight)  # noqa: E731
+    return bridge.collapse_load(model, load, first_step=first, tolerance=5e-3).value * HEIGHT / COHESION
+
+
+def run(quick: bool, folder) -> Result:
+    cell = HEIGHT / (5 if quick else 10)
+    checks, found = [], {}
+
+    # --- 3. The mechanism itself against known factors --------------------------------------------------------------
+    for (angle, friction), (expected, source) in KNOWN.items():
+        factor = bridge.log_spiral(HEIGHT, angle, COHESION, friction).unit_weight * HEIGHT / COHESION
+        checks.append(Check(f"spiral, slope {angle:g}°, φ {friction:g}°", expected, source, factor, 0.003))
+
+    # --- 4. The grid of slopes --------------------------------------------------------------------------------------
+    for angle, friction in QUICK if quick else [(a, f) for f in FRICTION for a in ANGLES if a > f]:
+        spiral = bridge.log_spiral(HEIGHT, angle, COHESION, friction)
+        expected = spiral.unit_weight * HEIGHT / COHESION
+        found[angle, friction] = by_finite_elements(angle, friction, spiral, cell), expected
+        checks.append(Check(f"stability factor, slope {angle:g}°, φ {friction:g}°", expected, "log-spiral, minimised here",
+                            found[angle, friction][0], 0.1 if quick else 0.05))  # fmt: skip
+
+    # --- 5. Picture -------------------------------------------------------------------------------------------------
+    if MPI.COMM_WORLD.rank == 0:
+        save_factors(folder / "factors.png", found)
+    return Result(checks, {"factors.png": "Stability factors γH/c: finite elements (marks) and limit analysis (lines)"})
+
+
+def save_factors(path, found):
+    """Stability factors over the angle of the slope."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.4), layout="constrained")
+        for k, friction in enumerate(sorted({f for _, f in found})):
+            angles = sorted(a for a, f in found if f == friction)
+            computed, expected = zip(*(found[a, friction] for a in angles))
+            axes.semilogy(angles, expected, "-", color=CURVES[k], label=f"$\\phi$ = {friction:g}°")
+            axes.semilogy(angles, computed, "os^"[k % 3], color=CURVES[k], markersize=4)
+        axes.set(xlabel="Angle of the slope [degrees]", ylabel=r"Stability factor $\gamma H / c$ [-]", xticks=ANGLES)
+        axes.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
+        axes.minorticks_off()
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend()
+        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    run_alone(run)
