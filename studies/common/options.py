@@ -17,6 +17,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NoReturn
 
@@ -60,6 +61,9 @@ class _Parser(argparse.ArgumentParser):
             super()._print_message(message, file)
 
     def error(self, message: str) -> NoReturn:
+        wrong = re.search(r"unrecognized arguments: (--[\w-]+)", message)
+        near = get_close_matches(wrong.group(1), self._option_string_actions) if wrong else []
+        message += f"; did you mean {' or '.join(near)}?" if near else ""
         self.exit(2, f"{self.prog}: {message}\n(--help lists the options)\n")
 
 

@@ -77,3 +77,9 @@ def test_a_file_that_is_not_there(tmp_path, capsys):
     with pytest.raises(SystemExit):
         parser().parse_args(["--parameters", str(tmp_path / "none.toml")])
     assert "cannot read --parameters" in capsys.readouterr().err
+
+
+def test_an_option_that_is_not_there_names_its_neighbour(capsys):
+    with pytest.raises(SystemExit):
+        parser().parse_args(["--cell-siez", "1"])
+    assert "unrecognized arguments: --cell-siez 1; did you mean --cell-size?" in capsys.readouterr().err
