@@ -24,6 +24,11 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica"),
+    "Limit analysis": ("limit_slopes", "limit_footing"),
+    "Experiments": ("bui_collapse", "lube_runout"),
+    "Locking": ("volumetric_locking",),
+    "Integration": ("stress_integration",),
+    "The paper": ("paper_slope",),
 }
 CASES = tuple(name for names in GROUPS.values() for name in names)
 

@@ -28,8 +28,8 @@ def surcharge_factor(friction: float) -> float:
 def nc(friction: float, size: str) -> float:
     """By the study footing, on one mesh."""
     a = parse(["--friction-angle", str(friction), "--cell-size", size, "--meshes", "1"])
-    run = footing(a, a.cell_size, 0.2 * prandtl_factor(friction) * a.cohesion)
-    return run.collapse.value / a.cohesion
+    collapse, _ = footing(a, a.cell_size, friction)
+    return collapse.value / a.cohesion
 
 
 def nq(friction: float, size: float) -> float:

@@ -1,0 +1,47 @@
+"""Volumetric locking: Cook's membrane, footing and slope on soil that keeps its volume.
+
+Linear triangles with all diagonals one way lock; with nodal mixed discretisation (NMD) they do not. Particles fill
+every cell and come to rest in quasi-static implicit steps. The reference is Prandtl's pressure for the footing, and
+Taylor-Hood elements on the finest mesh for the others. The bodies and their meshes are those of the study
+`locking`.
+"""
+
+from argparse import Namespace
+
+from _case import Check, Kind, Result, run_alone
+from locking import compare
+from locking_cases import CASES
+from locking_cases.pictures import save_errors
+from mpi4py import MPI
+
+LOCKED, FREE = 0.5, 0.1
+"""Errors that plain triangles stay above, and that those with NMD fall below on the finest mesh."""
+
+
+def run(quick: bool, folder) -> Result:
+    checks, figures, meshes = [], {}, 3 if quick else 4
+    for case in [CASES["cook"]] if quick else CASES.values():
+        # --- 1. Each element on each mesh ----------------------------------------------------------------------------
+        rows, _ = compare(Namespace(meshes=meshes, reference_mesh=meshes), case, "implicit")
+        poisson = max(row["poisson"] for row in rows)
+        rows = [row for row in rows if row["poisson"] == poisson]
+
+        # --- 2. Plain triangles lock, those with NMD do not, and converge -------------------------------------------
+        errors = {name: [row["error"] for row in rows if row["elements"] == name] for name in ("plain", "NMD")}
+        name = f"{case.TITLE.lower()}, ν = {poisson:.9g}"
+        source = "Prandtl 1921" if case.EXACT else "Taylor-Hood elements"
+        checks += [
+            Check(f"error of plain triangles, {name}", LOCKED, f"{source}; they lock", errors["plain"][-1], 0.0,
+                  kind=Kind.AT_LEAST),
+            Check(f"error with NMD, {name}", 0.0, source, errors["NMD"][-1], FREE, scale=1.0),
+            Check(f"the same over that on the mesh before, {name}", 0.6, "convergence", errors["NMD"][-1] / errors["NMD"][-2],
+                  0.0, kind=Kind.AT_MOST),
+        ]  # fmt: skip
+        if MPI.COMM_WORLD.rank == 0:
+            save_errors(folder / f"{case.NAME}.png", rows, case.TITLE)
+        figures[f"{case.NAME}.png"] = f"{case.TITLE}: error of the {case.QUANTITY}"
+    return Result(checks, figures)
+
+
+if __name__ == "__main__":
+    run_alone(run)
