@@ -1,0 +1,59 @@
+"""Studies of the finite elements on several ranks: `mpirun -n N python3 -m pytest tests/mpi`."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "tests" / "python")]
+import compare_fem  # noqa: E402
+import handover  # noqa: E402
+import safety  # noqa: E402
+from bridge_cases import slope_particles  # noqa: E402
+from common.slope_fem import slope_fem, weight  # noqa: E402
+
+import fenics_bridge as bridge  # noqa: E402
+
+
+def summary_of(study, folder, *options):
+    assert study.main(["--output", str(folder), *options]) == 0
+    MPI.COMM_WORLD.barrier()
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_factor_of_safety_is_that_of_one_rank(shared_path):
+    options = ["--cell-size", "0.2", "--meshes", "1", "--no-without-dilation"]
+    found = summary_of(safety, shared_path, *options)["factor_of_safety"]
+    alone = bridge.factor_of_safety(slope_fem(safety.parse(options), MPI.COMM_SELF, 0.2), weight(20e3))
+    assert found == pytest.approx(alone.value, rel=1e-2)  # rounding decides which of the last steps fails
+    assert (shared_path / "mechanism.png").exists()
+
+
+@pytest.mark.parametrize("move", [False, True])
+def test_hand_overs_of_the_study(shared_path, monkeypatch, move):
+    monkeypatch.setattr(handover, "SHARES", (0.9,))
+    options = ["--cell-size", "0.1", "--time", "0.02", *(["--move"] if move else [])]
+    (row,) = summary_of(handover, shared_path, *options)["handovers"]
+    assert row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_share"] < 0.01
+    assert move or row["out_of_balance_ratio_before"] < 1e-8
+    assert 0.01 < row["crest_displacement_m"] < 0.2
+
+
+def test_particles_differ_from_quadratic_elements_as_linear_ones_do(shared_path, monkeypatch):
+    """At rest, in the cells in which they began, particles are linear finite elements."""
+    monkeypatch.setattr(compare_fem, "UNIT_WEIGHTS", (10e3,))
+    options = ["--cell-size", "0.2", "--meshes", "1"]
+    (row,) = summary_of(compare_fem, shared_path, *options)["comparisons"]
+    a = compare_fem.parse(options)
+    bodies = []
+    for a.elements in ("P1", "P2"):
+        bodies.append(slope_fem(a, MPI.COMM_SELF, 0.2))
+        bodies[-1].solve(weight(10e3))
+    points = slope_particles(10e3, cell_size=0.2, kind="fitted", comm=MPI.COMM_SELF).particles.position
+    linear, quadratic = (body.evaluate_at(points)["displacement"] for body in bodies)
+    expected = np.linalg.norm(linear - quadratic) / np.linalg.norm(quadratic)
+    assert row["displacement_difference_l2"] == pytest.approx(expected, rel=0.05)
