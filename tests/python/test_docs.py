@@ -114,6 +114,15 @@ def test_files_that_pages_link_to_exist():
             assert (page.parent / target).exists(), f"{name(page)} links to {target}"
 
 
+def test_files_that_pages_name_are_there():
+    sources = ("h", "cpp", "py", "toml", "md", "geo", "yaml", "cff")
+    for page in (*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "meshes/README.md"):
+        for path in re.findall(rf"`([\w/*.]+/[\w*.]+\.(?:{'|'.join(sources)}))`", page.read_text()):
+            if not path.startswith("results/") and "NAME" not in path:
+                found = [hit for folder in (ROOT, ROOT / "mpm_core") for hit in folder.glob(path)]
+                assert found, f"{name(page)} names {path}"
+
+
 def test_every_equation_has_a_number_and_those_that_the_code_cites_are_there():
     text = (ROOT / "docs/guide/theory.md").read_text()
     numbers = [re.findall(r"\\tag\{(.*?)\}", equation) for equation in re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL)]
