@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import mpm_core
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -133,3 +135,9 @@ def test_every_equation_has_a_number_and_those_that_the_code_cites_are_there():
     sources = [path.read_text() for path in (ROOT / "mpm_core").rglob("*.h")]
     cited = {number for source in sources for number in re.findall(r"\((1[1-9]|2\d)\)", source)}
     assert {"11", "18", "24"} <= cited <= there
+
+
+def test_every_public_name_of_the_core_is_in_the_reference():
+    reference = (ROOT / "docs/api/mpm_core.md").read_text()
+    missing = [one for one in mpm_core.__all__ if one != "__version__" and f"mpm_core.{one}" not in reference]
+    assert missing == []
