@@ -3,7 +3,8 @@
 Particles are loaded by their weight, slowly and with damping, until they are at rest; quadratic finite elements on the finest
 mesh are the reference, and the difference of the displacements shrinks with the size of the particles' cells. The soil is a
 hundred times as stiff as in the study slope, so that strains are small, as the finite elements assume; with soft soil
-(--young 200e3) a difference of some percent remains, because particles follow the body as it deforms and cross into other cells.
+(--young 200e3) a difference of some percent remains: particles follow the body as it deforms, and they cross into other cells,
+which makes them settle more, the less the more particles there are (--particles-per-cell).
 """
 
 from __future__ import annotations
@@ -93,6 +94,10 @@ def finite_elements(a: Namespace) -> dict[float, bridge.QuasiStatic]:
         fem.solve(weight(unit_weight), progress=step_line(f"FEM, {unit_weight / 1e3:g} kN/m3"))
         if fem.converged:
             solved[unit_weight] = fem
+    if not solved:
+        raise mpm.InputError(
+            f"the slope carries none of the unit weights {UNIT_WEIGHTS} N/m3; make it stronger or flatter"
+        )
     return solved
 
 

@@ -15,7 +15,7 @@ from time import perf_counter
 import numpy as np
 from common.field_plots import save_curves
 from common.movie import Movie, fem_frame, particle_frame
-from common.options import add_number, add_switch, study_parser
+from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
 from common.plots import save_history
 from common.ranks import run_study
@@ -51,6 +51,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_slope_options(p, options)
+    check(p, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without it no slope stands")
     return options
 
 

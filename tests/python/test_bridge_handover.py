@@ -120,6 +120,14 @@ def test_cells_hold_what_has_moved_into_them():
     assert np.sum(inside > 0.1) > 300 and held.max() <= full.max() * 1.03
 
 
+def test_body_that_shrinks_in_three_dimensions_keeps_its_share_of_the_cells():
+    domain, _, _, _ = column(3)
+    displacement = fem.Function(compat.function_space(domain, "Lagrange", 2, 3))
+    displacement.interpolate(lambda x: -0.1 * x)
+    held, full = held_volumes(domain, displacement), cell_volumes(domain)
+    assert held.sum() == pytest.approx(0.9**3 * full.sum(), rel=5e-3) and np.all(held <= full * 1.05)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_samples_of_a_simplex_are_even(dim):
     """Half of the volume is where a coordinate is below 1 - 0.5^(1/D); the mean is the centroid."""

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 STUDIES = Path(__file__).parents[2] / "studies"
 
 
@@ -36,6 +38,30 @@ def test_particles_converge_to_the_finite_elements(tmp_path):
     assert rows[5e3, 0.1]["displacement_difference_l2"] < 0.3 * rows[5e3, 0.2]["displacement_difference_l2"]
     assert summary["crest_displacement_difference_on_finest_mesh"]["10000"] < 0.03
     assert (tmp_path / "convergence.png").exists() and (tmp_path / "side_by_side_10kN.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("handover", ["--cohesion", "0"], ["--cohesion", "no slope stands"]),
+        (
+            "compare_fem",
+            ["--cohesion", "1", "--cell-size", "0.2", "--meshes", "1"],
+            ["carries none of the unit weights"],
+        ),
+    ],
+)
+def test_slopes_that_do_not_stand_are_refused(tmp_path, name, options, words):
+    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(tmp_path), *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 2 and "Traceback" not in result.stderr
+    assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_hand_over_of_particles_that_move(tmp_path):
+    summary = summary_of("handover", tmp_path, "--time", "0.1", "--move")
+    rows = [row for row in summary["handovers"] if row["share_of_collapse"] > 0]
+    assert all(row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_share"] < 0.01 for row in rows)
 
 
 def test_soft_soil_too_within_the_effect_of_its_deformed_shape(tmp_path):
