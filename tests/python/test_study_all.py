@@ -8,7 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from browser import NEEDED, move_slider, open_page, picture, started
 
 STUDIES = Path(__file__).parents[2] / "studies"
 sys.path.insert(0, str(STUDIES))
@@ -122,3 +124,27 @@ def test_the_page_has_everything_in_it(name, first_run):
         assert movie["count"] > 0 and {"x", "y", "radius"} < set(movie["fields"])
     options = re.findall(r"^([a-z0-9-]+) = ", (folder / "parameters.toml").read_text(), re.MULTILINE)
     assert options and all(f'<td class="name">{option}</td>' in page for option in options)
+
+
+PLACES = "return page.player.views.map((v) => Array.from({ length: v.movie.count }, (_, i) => v.screenOf(i)))"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with started() as driver:
+        yield driver
+
+
+@NEEDED
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_opens_and_its_slider_moves_the_particles(name, first_run, browser):
+    open_page(browser, first_run(name)[0] / "report.html")
+    assert browser.get_log("browser") == []
+    shown = picture(browser)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 50  # not blank
+    if name in WITH_PARTICLES:
+        places = []
+        for frame in (0, int(browser.execute_script("return document.getElementById('time').max"))):
+            move_slider(browser, frame)
+            places.append(browser.execute_script(PLACES))
+        assert places[0] != places[1]

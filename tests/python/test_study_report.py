@@ -1,13 +1,11 @@
 """The page of a run in a browser without a window: it loads, the slider moves the particles, the mouse finds them."""
 
-import io
-import shutil
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import NEEDED, move_slider, open_page, picture, started
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -17,11 +15,7 @@ from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene
 from studies.common.report import Report, save_report
 
-webdriver = pytest.importorskip("selenium.webdriver")
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("chromedriver") and shutil.which("chromium")), reason="needs chromium and chromium-driver"
-)
-
+pytestmark = NEEDED
 SIDE, TIMES = 40, np.linspace(0.0, 2.0, 11)
 
 
@@ -57,33 +51,9 @@ def page(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser(page):
-    options = webdriver.ChromeOptions()
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        "--disable-gpu",
-        "--window-size=1300,1000",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.chrome.service.Service(shutil.which("chromedriver")))
-    open_page(driver, page)
-    yield driver
-    driver.quit()
-
-
-def open_page(browser, page):
-    browser.get(page.as_uri())
-    end = time.monotonic() + 20
-    while not browser.execute_script("return Boolean(window.page)") and time.monotonic() < end:
-        time.sleep(0.05)
-
-
-def move_slider(browser, frame):
-    browser.execute_script(
-        "const s = document.getElementById('time'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))", frame
-    )
+    with started() as driver:
+        open_page(driver, page)
+        yield driver
 
 
 def position(browser, particle, frame):
@@ -92,10 +62,6 @@ def position(browser, particle, frame):
         "const m = page.player.views[0].movie;"
         "return ['x', 'y'].map((f) => valueAt(m.fields[f], m.count, arguments[0], arguments[1], 0))", particle, frame
     )  # fmt: skip
-
-
-def picture(browser):
-    return np.asarray(Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB"))
 
 
 def test_it_loads_without_errors_and_without_a_network(browser, page):
