@@ -76,21 +76,54 @@ void remove(Particles<D>& particles, std::span<const Index> numbers)
   resize(particles, static_cast<Index>(last));
 }
 
+namespace
+{
+/// Appends particles of one cell and material; they join the run before as far as it may grow.
+void append(std::vector<Run>& runs, Run piece, Index longest)
+{
+  if (!runs.empty() && runs.back().cell == piece.cell && runs.back().material == piece.material)
+  {
+    const Index joining = std::min(piece.last - piece.first, longest - (runs.back().last - runs.back().first));
+    runs.back().last += joining;
+    piece.first += joining;
+  }
+  for (; piece.first < piece.last; piece.first += longest)
+    runs.push_back({piece.first, std::min(piece.last, piece.first + longest), piece.cell, piece.material});
+}
+
+template <int D>
+void append_one_by_one(const Particles<D>& particles, Index first, Index last, Index longest, std::vector<Run>& runs)
+{
+  for (Index p = first; p < last;)
+  {
+    const Index cell = particles.cell[p], material = particles.material[p];
+    Index q = p + 1;
+    while (q < last && particles.cell[q] == cell && particles.material[q] == material)
+      ++q;
+    append(runs, {p, q, cell, material}, longest);
+    p = q;
+  }
+}
+} // namespace
+
 template <int D>
 void find_runs(const Particles<D>& particles, Index longest, std::vector<Run>& runs)
 {
   runs.clear();
-  const Index n = particles.size();
-  for (Index p = 0; p < n;)
-  {
-    const Index cell = particles.cell[p], material = particles.material[p];
-    const Index limit = std::min(n, p + longest);
-    Index q = p + 1;
-    while (q < limit && particles.cell[q] == cell && particles.material[q] == material)
-      ++q;
-    runs.push_back({p, q, cell, material});
-    p = q;
-  }
+  append_one_by_one(particles, 0, particles.size(), longest, runs);
+}
+
+template <int D>
+void find_runs_again(const Particles<D>& particles, Index longest, std::vector<Run>& runs)
+{
+  std::vector<Run> found;
+  found.reserve(runs.size() + runs.size() / 8);
+  for (const Run& run : runs)
+    if (run.scattered)
+      append_one_by_one(particles, run.first, run.last, longest, found);
+    else
+      append(found, run, longest);
+  runs.swap(found);
 }
 
 template <int D>
@@ -109,6 +142,7 @@ double bytes_per_particle(const Particles<D>& particles)
   template void sort_by_cell(Particles<D>&, Index, Index);                                                             \
   template void remove(Particles<D>&, std::span<const Index>);                                                         \
   template void find_runs(const Particles<D>&, Index, std::vector<Run>&);                                              \
+  template void find_runs_again(const Particles<D>&, Index, std::vector<Run>&);                                        \
   template double bytes_per_particle(const Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

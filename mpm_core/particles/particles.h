@@ -15,6 +15,8 @@ struct Run
   Index last;
   Index cell;
   Index material;
+  bool first_in_cell = false; ///< whether it is the first one in its cell
+  bool scattered = false;     ///< whether some of its particles are in another cell by now
 };
 
 /// All columns have one entry per particle, but for `traction`, which is empty unless `loaded`.
@@ -92,9 +94,14 @@ void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials);
 template <int D>
 void remove(Particles<D>& particles, std::span<const Index> numbers);
 
-/// The runs in which the particles lie, none longer than `longest`. Fewest when the particles are in cell order.
+/// The runs in which the particles lie, none longer than `longest`. Fewest when the particles are in cell order. Marks
+/// of runs are false.
 template <int D>
 void find_runs(const Particles<D>& particles, Index longest, std::vector<Run>& runs);
+
+/// The same after no particles have changed cells but some of runs that are marked as scattered.
+template <int D>
+void find_runs_again(const Particles<D>& particles, Index longest, std::vector<Run>& runs);
 
 /// Bytes that the columns hold per particle
 template <int D>

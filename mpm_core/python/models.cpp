@@ -330,6 +330,14 @@ void bind_model(py::module_& m, const std::string& suffix)
              model.work.ready = false;
            })
       .def("nodal", &nodal<D>)
+      .def("phase_seconds",
+           [](const M& model)
+           {
+             py::dict seconds;
+             for (std::size_t k = 0; k < phase_names.size(); ++k)
+               seconds[phase_names[k]] = model.phase_seconds[k];
+             return seconds;
+           })
       .def("bytes_per_particle", [](const M& model) { return bytes_per_particle(model.particles); });
 }
 } // namespace

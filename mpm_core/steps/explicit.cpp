@@ -17,16 +17,18 @@ namespace
 template <int D>
 void solve_momentum(Model<D>& model, double damping, double dt)
 {
+  const PhaseTimer timer(model.phase_seconds, Phase::momentum);
   Workspace<D>& work = model.work;
   const Vector<D> gravity = current_gravity(model);
-  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  for (Index i : work.soil.nodes)
   {
     const NodeSums<D>& node = work.nodes[i];
+    const double per_mass = node.mass > work.least_mass ? 1 / node.mass : 0;
     for (int a = 0; a < D; ++a)
     {
       const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double drag = local_damping(damping, residual, work.start_velocity[i][a], residual * dt / node.mass);
-      work.acceleration[i][a] = node.mass > work.least_mass ? (residual - drag) / node.mass : 0;
+      const double drag = local_damping(damping, residual, work.start_velocity[i][a], residual * dt * per_mass);
+      work.acceleration[i][a] = (residual - drag) * per_mass;
     }
   }
   for (const Support<D>& support : model.supports)
@@ -46,37 +48,19 @@ void solve_momentum(Model<D>& model, double damping, double dt)
 template <int D>
 void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double dt)
 {
+  const PhaseTimer timer(model.phase_seconds, Phase::mapping);
   Workspace<D>& work = model.work;
+  find_velocity_change(model, options.pic_share, dt);
   if (options.stress_update != StressUpdate::modified_last)
   {
-    for (std::size_t i = 0; i < work.nodes.size(); ++i)
+    for (Index i : work.soil.nodes)
       for (int a = 0; a < D; ++a)
         work.velocity[i][a] = work.start_velocity[i][a] + dt * work.acceleration[i][a];
     return;
   }
-  const double pic = options.pic_share;
-  const auto acceleration = [&](Index i) -> const Vector<D>& { return work.acceleration[i]; };
-  const auto start_velocity = [&](Index i) -> const Vector<D>& { return work.start_velocity[i]; };
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
-  {
-    CellMoments<D>& moments = work.moments[c];
-    if (moments.mass == 0)
-      continue;
-    if (pic > 0)
-    {
-      for (int a = 0; a < D; ++a)
-      {
-        moments.momentum[a] *= 1 - pic;
-        for (int b = 0; b < D; ++b)
-          moments.momentum_xi[a][b] *= 1 - pic;
-      }
-      add_momentum<D>(moments, affine_field<D>(model.mesh, c, start_velocity), pic);
-    }
-    add_momentum<D>(moments, affine_field<D>(model.mesh, c, acceleration), dt);
-  }
-  scatter_momentum<D>(model.mesh, work.moments, work.velocity);
+  scatter_momentum<D>(model.mesh, work.soil, work.moments, 1 - options.pic_share, work.velocity_change, work.velocity);
   sum_shared(model.exchange, work.velocity);
-  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  for (Index i : work.soil.nodes)
     for (int a = 0; a < D; ++a)
       work.velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.velocity[i][a] / work.nodes[i].mass : 0;
   for (const Support<D>& support : model.supports)
@@ -88,10 +72,12 @@ void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double d
 template <int D>
 void tally(Model<D>& model, double damping, double dt)
 {
-  Workspace<D>& work = model.work;
+  const PhaseTimer timer(model.phase_seconds, Phase::momentum);
+  const Workspace<D>& work = model.work;
   const Vector<D> gravity = current_gravity(model);
   model.last.dt = dt;
-  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  Totals sums; // beside the model's: a sum kept in a register need not wait for memory
+  for (Index i : work.soil.nodes)
   {
     const NodeSums<D>& node = work.nodes[i];
     if (!model.exchange.owned[i] || !(node.mass > work.least_mass))
@@ -103,12 +89,16 @@ void tally(Model<D>& model, double damping, double dt)
       const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
       const double residual = external - node.internal[a];
       const double drag = local_damping(damping, residual, start[a], residual * dt / node.mass);
-      model.totals.external_work += external * u;
-      model.totals.internal_work += node.internal[a] * u;
-      model.totals.damping_work += drag * u;
-      model.totals.support_work += (node.mass * work.acceleration[i][a] - residual + drag) * u;
+      sums.external_work += external * u;
+      sums.internal_work += node.internal[a] * u;
+      sums.damping_work += drag * u;
+      sums.support_work += (node.mass * work.acceleration[i][a] - residual + drag) * u;
     }
   }
+  model.totals.external_work += sums.external_work;
+  model.totals.internal_work += sums.internal_work;
+  model.totals.damping_work += sums.damping_work;
+  model.totals.support_work += sums.support_work;
 }
 } // namespace
 

@@ -206,6 +206,7 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   const Particles<D> start = model.particles;
   // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
   const double pic = options.quasi_static ? 1 : options.pic_share;
+  find_velocity_change(model, pic, step.dt);
   particle_pass<D>(model,
                    {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation}); // (18), (20), stresses
   agree_on_trouble(model);

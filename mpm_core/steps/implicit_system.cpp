@@ -240,7 +240,7 @@ void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& s
     for (int k = 0; k <= D; ++k)
     {
       const Index node = model.mesh.cells[c][k];
-      const double weight = integrated_volume(model, c) / model.work.volumetric_sums[node][1];
+      const double weight = integrated_volume(model, c) / model.work.volumetric_strain[node].volume;
       for (int l = 0; l <= D; ++l)
       {
         const Index other = model.mesh.cells[c][l];

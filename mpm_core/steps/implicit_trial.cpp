@@ -146,7 +146,7 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
   const Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   if (step.options.mixed_discretisation)
-    set_volumetric(strain, model.work.volumetric_strain[cell]);
+    set_volumetric(strain, mean_volumetric_strain<D>(model.mesh.cells[cell], model.work.volumetric_strain));
   return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 

@@ -7,8 +7,10 @@ namespace mpm
 template <int D>
 void map_to_nodes(Model<D>& model)
 {
+  const PhaseTimer timer(model.phase_seconds, Phase::node_sums);
   Workspace<D>& work = model.work;
-  scatter<D>(model.mesh, work.moments, work.tractions, work.nodes);
+  shrink_soil(model);
+  scatter<D>(model.mesh, work.soil, work.moments, work.tractions, work.nodes);
   if (model.integration != Integration::particles)
     integrate_stress(model);
   sum_shared(model.exchange, work.nodes);
@@ -18,7 +20,7 @@ template <int D>
 void find_start_velocity(Model<D>& model)
 {
   Workspace<D>& work = model.work;
-  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  for (Index i : work.soil.nodes)
     for (int a = 0; a < D; ++a)
       work.start_velocity[i][a] =
           work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
@@ -27,27 +29,33 @@ void find_start_velocity(Model<D>& model)
 }
 
 template <int D>
-void average_strains(Model<D>& model, double dt)
+void find_velocity_change(Model<D>& model, double pic_share, double dt)
 {
   Workspace<D>& work = model.work;
-  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
-  {
-    work.cell_volume[c] = integrated_volume(model, c);
-    if (work.cell_volume[c] == 0)
-      continue;
-    const auto gradient = affine_field<D>(model.mesh, c, velocity).gradient;
-    work.volumetric_strain[c] = 0;
+  for (Index i : work.soil.nodes)
     for (int a = 0; a < D; ++a)
-      work.volumetric_strain[c] += dt * gradient[a][a];
-  }
-  average_volumetric_strain<D>(model.mesh, work.cell_volume, model.exchange, work.volumetric_sums,
-                               work.volumetric_strain);
+      work.velocity_change[i][a] = dt * work.acceleration[i][a] + pic_share * work.start_velocity[i][a];
+}
+
+template <int D>
+void average_strains(Model<D>& model, double dt)
+{
+  const PhaseTimer timer(model.phase_seconds, Phase::averaging);
+  Workspace<D>& work = model.work;
+  const auto of_cell = [&](Index c) -> VolumetricStrain
+  {
+    double divergence = 0;
+    for (int k = 0; k <= D; ++k)
+      divergence += dot<D>(work.velocity[model.mesh.cells[c][k]], model.mesh.shapes[c].gradient[k]);
+    return {dt * divergence, integrated_volume(model, c)};
+  };
+  average_volumetric_strain(model.mesh, work.soil, of_cell, model.exchange, work.volumetric_strain);
 }
 
 #define INSTANTIATE(D)                                                                                                 \
   template void map_to_nodes(Model<D>&);                                                                               \
   template void find_start_velocity(Model<D>&);                                                                        \
+  template void find_velocity_change(Model<D>&, double, double);                                                       \
   template void average_strains(Model<D>&, double);
 INSTANTIATE(2)
 INSTANTIATE(3)

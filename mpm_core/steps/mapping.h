@@ -18,11 +18,17 @@ void map_to_nodes(Model<D>& model);
 template <int D>
 void find_start_velocity(Model<D>& model);
 
-/// Volumetric strains of the cells over dt [s] from the nodes' `velocity`, averaged over nodes (nodal mixed
-/// discretisation).
+/// What the nodes add to the velocities of particles over dt [s]: dt a_i, and with a PIC share that much of the grid's
+/// velocity, which takes the place of the particles' own.
+template <int D>
+void find_velocity_change(Model<D>& model, double pic_share, double dt);
+
+/// Volumetric strains of the nodes over dt [s] from the nodes' `velocity`, averages over the cells around them
+/// (nodal mixed discretisation).
 /// @note Collective
 template <int D>
 void average_strains(Model<D>& model, double dt);
+
 /// Local damping of FLAC for one component: alpha |R| sign(v).
 ///
 /// Where v is less than a tenth of the change that R makes of it in a step, the damping passes linearly through zero

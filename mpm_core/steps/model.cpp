@@ -32,10 +32,57 @@ template <int D>
 void sort_particles(Model<D>& model)
 {
   sort_by_cell<D>(model.particles, model.mesh.owned_cells, static_cast<Index>(model.laws.size()));
-  find_runs<D>(model.particles, batch_size, model.work.runs);
+  find_cell_runs(model, false);
+  model.work.soil_shrinks = true;
   model.work.last_sort = model.totals.steps;
   model.work.strays = 0;
   ++model.totals.sorts;
+}
+
+template <int D>
+void find_cell_runs(Model<D>& model, bool again)
+{
+  Workspace<D>& work = model.work;
+  if (again)
+    find_runs_again<D>(model.particles, batch_size, work.runs);
+  else
+    find_runs<D>(model.particles, batch_size, work.runs);
+  work.cell_marks.resize(model.mesh.cells.size(), 0);
+  for (Run& run : work.runs)
+  {
+    run.first_in_cell = !work.cell_marks[run.cell];
+    work.cell_marks[run.cell] = 1;
+  }
+  for (Index c : work.left)
+    if (!work.cell_marks[c])
+    {
+      work.moments[c] = {};
+      if (!work.tractions.empty())
+        work.tractions[c] = {};
+    }
+  work.left.clear();
+  for (const Run& run : work.runs)
+    work.cell_marks[run.cell] = 0;
+}
+
+template <int D>
+void shrink_soil(Model<D>& model)
+{
+  Workspace<D>& work = model.work;
+  if (!work.soil_shrinks)
+    return;
+  std::vector<Index> cells;
+  for (const Run& run : work.runs)
+    cells.push_back(run.cell);
+  const std::vector<Index> before = std::move(work.soil.nodes);
+  work.soil = make_part<D>(model.mesh, cells, model.exchange.shared_nodes);
+  for (Index node : before)
+    if (!work.soil.has_node[node])
+    {
+      work.nodes[node] = {};
+      work.start_velocity[node] = work.acceleration[node] = work.velocity_change[node] = work.velocity[node] = {};
+    }
+  work.soil_shrinks = false;
 }
 
 template <int D>
@@ -57,12 +104,11 @@ void prepare(Model<D>& model)
     return;
   collectively(model.exchange.comm, [&] { check_particles(model.particles); });
   const auto nodes = model.mesh.points.size(), cells = static_cast<std::size_t>(model.mesh.owned_cells);
-  work.nodes.resize(nodes);
-  work.start_velocity.resize(nodes);
-  work.acceleration.resize(nodes);
-  work.velocity.resize(nodes);
-  work.cell_volume.resize(cells);
-  work.volumetric_strain.resize(cells);
+  work.nodes.assign(nodes, {});
+  for (auto* values : {&work.start_velocity, &work.acceleration, &work.velocity_change, &work.velocity})
+    values->assign(nodes, {});
+  work.volumetric_strain.resize(nodes);
+  work.soil = {};
   work.owned_cells = owned_cell_numbers(model.mesh);
 
   sort_particles(model);
@@ -94,4 +140,8 @@ template Inventory taken_inventory(const Model<2>&);
 template Inventory taken_inventory(const Model<3>&);
 template void sort_particles(Model<2>&);
 template void sort_particles(Model<3>&);
+template void find_cell_runs(Model<2>&, bool);
+template void find_cell_runs(Model<3>&, bool);
+template void shrink_soil(Model<2>&);
+template void shrink_soil(Model<3>&);
 } // namespace mpm

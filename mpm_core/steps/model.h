@@ -2,6 +2,7 @@
 /// @file
 /// All that a run consists of, as plain data: mesh, particles, laws, loads, supports, and the room that steps work in.
 
+#include "base/phases.h"
 #include "materials/law.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
@@ -88,20 +89,23 @@ struct Workspace
 {
   bool ready = false;                        ///< runs and moments agree with the particles
   std::vector<Run> runs;                     ///< of the particles as they are now
-  std::vector<CellMoments<D>> moments;       ///< of the particles as they are now
+  std::vector<unsigned char> cell_marks;     ///< room, one per cell; all zero
+  std::vector<CellMoments<D>> moments;       ///< of the particles as they are now; zero outside of `soil`
   std::vector<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
+  MeshPart soil;                             ///< where particles are, or have been since the last sort
+  bool soil_shrinks = false;                 ///< cells that have become empty are to be left out
   std::vector<NodeSums<D>> nodes;
-  std::vector<Vector<D>> start_velocity; ///< v_i at the start of the step
-  std::vector<Vector<D>> acceleration;   ///< a_i
-  std::vector<Vector<D>> velocity;       ///< v_i that moves and strains the particles
-  std::vector<NodalMotion<D>> motion;    ///< of the nodes, as the particles take it
-  std::vector<double> cell_volume;       ///< filled volume, at the step's start
-  std::vector<double> volumetric_strain; ///< theta_c, averaged; used with nodal mixed discretisation
-  VolumetricSums volumetric_sums;
+  std::vector<Vector<D>> start_velocity;             ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;               ///< a_i
+  std::vector<Vector<D>> velocity_change;            ///< of the nodes, as the particles take it
+  std::vector<Vector<D>> velocity;                   ///< v_i that moves and strains the particles
+  std::vector<VolumetricStrain> volumetric_strain;   ///< of the nodes; used with nodal mixed discretisation
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< used with dual domains, as are the mean gradients of nodes
   std::vector<MeanGradient<D>> mean_gradients;
-  VolumetricSums fills;             ///< per node: volumes of particles and of cells around it
-  std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
+  std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it
+  std::vector<unsigned char> whole;         ///< per owned cell, at the step's start: 1 where full; not with particles
+  std::vector<Index> strayed;               ///< particles that entered another cell of this rank in this pass
+  std::vector<Index> left;                  ///< cells that some particle left in this pass
   std::vector<Leaver> leavers;
   std::vector<Index> outflow;
   std::vector<Index> lost;       ///< particles that no cell known to this rank's neighbourhood holds
@@ -127,7 +131,8 @@ struct Model
   double gravity_ramp = 0;                          ///< time over which gravity rises from zero [s]
   double time = 0;                                  ///< [s]
   Totals totals;
-  Inventory inventory; ///< when the particles were last changed by anything but a step
+  PhaseSeconds phase_seconds{}; ///< of the explicit steps on this rank since the model was made
+  Inventory inventory;          ///< when the particles were last changed by anything but a step
   LastStep last;
   Workspace<D> work;
 };
@@ -187,4 +192,14 @@ Inventory taken_inventory(const Model<D>& model);
 /// Puts the particles back in cell order and finds their runs.
 template <int D>
 void sort_particles(Model<D>& model);
+
+/// Finds the runs of the particles as they are now, and which of them are the first ones in their cells. Cells that the
+/// last particle has left get moments of exactly zero.
+/// @param again  the order of the particles is as before, and only those of scattered runs have changed cells
+template <int D>
+void find_cell_runs(Model<D>& model, bool again);
+
+/// Leaves out of `work.soil` the cells that have become empty, if it is to shrink.
+template <int D>
+void shrink_soil(Model<D>& model);
 } // namespace mpm

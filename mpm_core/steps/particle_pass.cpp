@@ -1,66 +1,81 @@
 #include "steps/particle_pass.h"
 
-#include "base/work_columns.h"
 #include "materials/substeps.h"
 #include "mesh/search.h"
 #include "steps/batches.h"
 #include "steps/integration.h"
 #include "transfer/kinematics.h"
+#include "transfer/lanes.h"
 
 #include <algorithm>
+#include <bit>
+#include <numeric>
 
 namespace mpm
 {
 namespace
 {
-/// What the nodes do to the particles. A PIC share of v_p is replaced by the grid's sum N_i (v_i + dt a_i).
-template <int D>
-void find_motion(Model<D>& model, const PassOptions& options)
-{
-  Workspace<D>& work = model.work;
-  work.motion.resize(model.mesh.points.size());
-  for (std::size_t i = 0; i < work.motion.size(); ++i)
-    for (int a = 0; a < D; ++a)
-    {
-      work.motion[i][a] = options.dt * work.acceleration[i][a] + options.pic_share * work.start_velocity[i][a];
-      work.motion[i][D + a] = options.dt * work.velocity[i][a];
-    }
-}
+/// Steps after which the moments of all cells are gathered from the particles again, so that round-off does not add up.
+constexpr std::int64_t gathering_interval = 64;
 
 /// Room for a batch, in the first-level cache.
 template <int D>
 struct BatchScratch
 {
-  WorkColumns<Matrix<D>> gradient;                    ///< of the velocity, per run
-  WorkColumn<double> theta;                           ///< averaged volumetric strain, per run
-  WorkColumns<CellStrain<D>> cells;                   ///< per run
-  alignas(64) double strain[n_stress<D>][batch_size]; ///< per particle, one column per component
+  std::array<CellMotion<D>, batch_size> motion;               ///< per run
+  std::array<CellStrain<D, Lanes>, batch_size / lanes> cells; ///< per run, `lanes` of them together
+  /// Per particle, one column per component; that out of plane stays zero
+  alignas(64) double strain[n_stress<D>][batch_size + lanes];
+
+  CellStrain<D> cell_strain(std::size_t run) const
+  {
+    constexpr std::size_t members = sizeof(CellStrain<D>) / sizeof(double);
+    const auto& together = reinterpret_cast<const std::array<double[lanes], members>&>(cells[run / lanes]);
+    std::array<double, members> numbers;
+    for (std::size_t k = 0; k < members; ++k)
+      numbers[k] = together[k][run % lanes];
+    return std::bit_cast<CellStrain<D>>(numbers);
+  }
 };
 
-/// Strains of the cells of a batch, from the nodes' velocities.
+/// What the nodes do to the particles of each run.
+template <int D>
+void find_motions(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+{
+  const Workspace<D>& work = model.work;
+  const auto change = [&](Index i) -> const Vector<D>& { return work.velocity_change[i]; };
+  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Index cell = work.runs[r].cell;
+    const AffineField<D> fields[]{affine_field<D>(model.mesh, cell, change),
+                                  affine_field<D>(model.mesh, cell, velocity)};
+    scratch.motion[r - batch.first_run] = {1 - options.pic_share, fields[0], scaled<D>(fields[1], options.dt)};
+  }
+}
+
+/// Strains of the cells of a batch, from the displacements. Beyond the last run the lanes hold what was there before.
 template <int D>
 void find_cell_strains(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
   const std::size_t n = batch.last_run - batch.first_run;
-  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
-  for (std::size_t r = 0; r < n; ++r)
+  for (std::size_t first = 0; first < n; first += lanes)
   {
-    const Index cell = model.work.runs[batch.first_run + r].cell;
-    scratch.gradient.set(r, affine_field<D>(model.mesh, cell, velocity).gradient);
-    scratch.theta[r] = options.averaged ? model.work.volumetric_strain[cell] : 0;
+    std::array<std::array<std::array<double, lanes>, D>, D> gradient;
+    for (int l = 0; l < lanes; ++l)
+      for (int a = 0; a < D; ++a)
+        for (int b = 0; b < D; ++b)
+          gradient[a][b][l] = scratch.motion[first + l].displacement.gradient[a][b];
+    CellStrain<D, Lanes>& strain = scratch.cells[first / lanes];
+    strain = strain_increment<D>(std::bit_cast<std::array<std::array<Lanes, D>, D>>(gradient), 1);
+    if (!options.averaged)
+      continue;
+    Lanes theta{};
+    for (std::size_t r = first; r < std::min(n, first + lanes); ++r)
+      theta[r - first] = mean_volumetric_strain<D>(model.mesh.cells[model.work.runs[batch.first_run + r].cell],
+                                                   model.work.volumetric_strain);
+    set_volumetric<D>(strain, theta);
   }
-  const double dt = options.dt;
-#pragma GCC ivdep
-  for (std::size_t r = 0; r < n; ++r)
-    scratch.cells.set(r, strain_increment<D>(scratch.gradient.at(r), dt));
-  if (options.averaged)
-#pragma GCC ivdep
-    for (std::size_t r = 0; r < n; ++r)
-    {
-      CellStrain<D> strain = scratch.cells.at(r);
-      set_volumetric(strain, scratch.theta[r]);
-      scratch.cells.set(r, strain);
-    }
 }
 
 /// A second chance for the particles whose law failed, unless the step is lost anyway.
@@ -87,10 +102,11 @@ void strain_cells(Model<D>& model, const PassOptions& options, const Batch& batc
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const Run& run = model.work.runs[r];
-    const CellStrain<D> strain = scratch.cells.at(r - batch.first_run);
-    for (int k = 0; k < n_stress<D>; ++k)
-      std::fill(scratch.strain[k] + (run.first - batch.first), scratch.strain[k] + (run.last - batch.first),
-                strain.increment[k]);
+    const CellStrain<D> strain = scratch.cell_strain(r - batch.first_run);
+    for (Index i = run.first - batch.first; i < run.last - batch.first;
+         i += lanes) // the next run overwrites the excess
+      for (int k : stress_component<D>)
+        std::fill_n(scratch.strain[k] + i, lanes, strain.increment[k]);
     strain_particles<D>(model.particles, run.first, run.last, strain);
   }
 }
@@ -106,7 +122,7 @@ void strain_dual_domains(Model<D>& model, const PassOptions& options, const Batc
     {
       CellStrain<D> strain = strain_increment<D>(dual_gradient(model, p, run.cell), options.dt);
       if (options.averaged)
-        set_volumetric(strain, model.work.volumetric_strain[run.cell]);
+        set_volumetric<D>(strain, mean_volumetric_strain<D>(model.mesh.cells[run.cell], model.work.volumetric_strain));
       for (int k = 0; k < n_stress<D>; ++k)
         scratch.strain[k][p - batch.first] = strain.increment[k];
       strain_particles<D>(model.particles, p, p + 1, strain);
@@ -158,84 +174,136 @@ Index new_cell(Model<D>& model, Index p)
 }
 
 template <int D>
-void gather_run(Model<D>& model, Index first, Index last, Index cell)
+void gather_tractions(Model<D>& model, Index first, Index last, Index cell)
 {
-  gather<D>(model.particles, first, last, model.mesh.shapes[cell], model.work.moments[cell]);
   if (!model.work.tractions.empty())
     gather<D>(model.particles, first, last, model.mesh.shapes[cell], model.work.tractions[cell]);
 }
 
-/// Finds the cells of a run in which some particle left the run's cell, and gathers them piece by piece.
+/// Takes out of a cell's moments the particles of a run that have left it, and notes where they went.
 template <int D>
-void gather_scattered(Model<D>& model, const Run& run)
+void follow_strays(Model<D>& model, const Run& run)
 {
-  Index piece = run.first, piece_cell = none;
-  auto close = [&](Index p)
-  {
-    if (piece_cell != none && p > piece)
-      gather_run<D>(model, piece, p, piece_cell);
-  };
+  Workspace<D>& work = model.work;
+  const CellShape<D>& shape = model.mesh.shapes[run.cell];
   for (Index p = run.first; p < run.last; ++p)
   {
     const Index cell = new_cell(model, p);
-    if (cell != none && cell != model.particles.cell[p])
+    if (cell == run.cell)
+      continue;
+    CellMoments<D> moments{};
+    gather<D>(model.particles, p, p + 1, shape, moments);
+    take_out(moments, work.moments[run.cell]);
+    if (!work.tractions.empty())
     {
-      model.particles.cell[p] = cell;
-      ++model.work.strays;
+      TractionMoments<D> tractions{};
+      gather<D>(model.particles, p, p + 1, shape, tractions);
+      take_out(tractions, work.tractions[run.cell]);
     }
-    if (cell != piece_cell)
-    {
-      close(p);
-      piece = p;
-      piece_cell = cell;
-    }
+    work.left.push_back(run.cell);
+    if (cell == none)
+      continue;
+    model.particles.cell[p] = cell;
+    work.strayed.push_back(p);
   }
-  close(run.last);
+}
+
+/// What the moments of a cell become when its particles move along with the nodes, whoever they are: only stresses are
+/// summed over particles, run by run, and tractions, which are rare.
+template <int D>
+void update_moments(Model<D>& model, const PassOptions& options, const Run& run, const CellMotion<D>& motion,
+                    double volumetric)
+{
+  CellMoments<D>& moments = model.work.moments[run.cell];
+  if (run.first_in_cell && options.move)
+    move<D>(moments, motion);
+  if (run.first_in_cell && options.stress)
+  {
+    moments.volume *= 1 + volumetric;
+    moments.stress = {};
+  }
+  if (options.stress)
+  {
+    const auto sum = stress_sum<D>(model.particles, run.first, run.last);
+    for (int k = 0; k < n_symmetric<D>; ++k)
+      moments.stress[k] += sum[k];
+  }
+}
+
+/// Gathers particles that came into cells of this rank, from its own cells or from other ranks.
+template <int D>
+void gather_entered(Model<D>& model, std::span<const Index> particles)
+{
+  std::vector<Index> cells;
+  for (Index p : particles)
+  {
+    const Index cell = model.particles.cell[p];
+    gather<D>(model.particles, p, p + 1, model.mesh.shapes[cell], model.work.moments[cell]);
+    gather_tractions<D>(model, p, p + 1, cell);
+    cells.push_back(cell);
+  }
+  add_cells<D>(model.mesh, cells, model.work.soil);
 }
 } // namespace
 
 template <int D>
 void particle_pass(Model<D>& model, const PassOptions& options)
 {
+  const PhaseTimer timer(model.phase_seconds, Phase::particles);
   Workspace<D>& work = model.work;
-  std::fill(work.moments.begin(), work.moments.end(), CellMoments<D>{});
-  std::fill(work.tractions.begin(), work.tractions.end(), TractionMoments<D>{});
+  // The particles of a dual domain grow each in its own way, so that their volumes do not follow from the cell's
+  // strain.
+  const bool anew = model.integration == Integration::dual_domain || model.totals.steps % gathering_interval == 0;
+  for (Index c : work.soil.cells)
+  {
+    if (anew)
+      work.moments[c] = {};
+    if (!work.tractions.empty())
+      work.tractions[c] = {};
+  }
   if (options.stress)
     model.last.plastic = 0;
-  const Index strays_before = work.strays;
-  if (options.move)
-    find_motion(model, options);
-  std::array<bool, batch_size> scattered;
-  BatchScratch<D> scratch;
+  BatchScratch<D> scratch{};
 
   for (std::size_t r = 0; r < work.runs.size();)
   {
     const Batch batch = next_batch(work.runs, r);
+    find_motions(model, options, batch, scratch);
     if (options.move)
       for (r = batch.first_run; r < batch.last_run; ++r)
       {
-        const Run& run = work.runs[r];
-        scattered[r - batch.first_run] =
-            move_particles<D>(model.particles, run, model.mesh, work.motion, 1 - options.pic_share) > 0;
+        Run& run = work.runs[r];
+        run.scattered = !move_particles<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell],
+                                           scratch.motion[r - batch.first_run]);
       }
     if (options.stress)
       update_stress<D>(model, options, batch, scratch);
     for (r = batch.first_run; r < batch.last_run; ++r)
     {
       const Run& run = work.runs[r];
-      if (options.move && scattered[r - batch.first_run])
-        gather_scattered<D>(model, run);
+      const std::size_t i = r - batch.first_run;
+      if (anew)
+        gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.moments[run.cell]);
       else
-        gather_run<D>(model, run.first, run.last, run.cell);
+        update_moments<D>(model, options, run, scratch.motion[i], scratch.cells[i / lanes].volumetric[i % lanes]);
+      gather_tractions<D>(model, run.first, run.last, run.cell);
+      if (run.scattered)
+        follow_strays<D>(model, run);
     }
   }
-  if (work.strays != strays_before && work.leavers.empty() && work.lost.empty())
-    find_runs<D>(model.particles, batch_size, work.runs);
+  if (work.strayed.empty())
+    return;
+  gather_entered<D>(model, work.strayed);
+  work.strays += static_cast<Index>(work.strayed.size());
+  work.strayed.clear();
+  if (work.leavers.empty() && work.lost.empty())
+    find_cell_runs(model, true);
 }
 
 template <int D>
 void settle_particles(Model<D>& model)
 {
+  const PhaseTimer timer(model.phase_seconds, Phase::settling);
   Workspace<D>& work = model.work;
   const bool gone = !work.leavers.empty() || !work.outflow.empty();
   for (Index p : work.outflow)
@@ -246,8 +314,9 @@ void settle_particles(Model<D>& model)
   work.leavers.clear();
   work.outflow.clear();
   work.far_partners.clear();
-  for (Index p = model.particles.size() - arrived; p < model.particles.size(); ++p)
-    gather_run<D>(model, p, p + 1, model.particles.cell[p]);
+  std::vector<Index> arrivals(static_cast<std::size_t>(arrived));
+  std::iota(arrivals.begin(), arrivals.end(), model.particles.size() - arrived);
+  gather_entered<D>(model, arrivals);
   work.strays += arrived;
 
   // Strays cut the runs of two cells; sorting costs about two steps, so it waits until a tenth of the particles
@@ -255,7 +324,7 @@ void settle_particles(Model<D>& model)
   if (work.strays > model.particles.size() / 10 && model.totals.steps - work.last_sort > 50)
     sort_particles(model);
   else if (gone || arrived > 0)
-    find_runs<D>(model.particles, batch_size, work.runs);
+    find_cell_runs(model, false);
 }
 
 #define INSTANTIATE(D)                                                                                                 \

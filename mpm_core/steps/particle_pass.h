@@ -17,9 +17,9 @@ struct PassOptions
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal
-/// `acceleration` and `velocity` of the workspace, updates their stresses, finds their cells, and gathers the moments
-/// of the particles as they are then. Particles in ghost cells are put on the list of leavers, those that are in no
-/// local cell on the list of lost ones, and neither is gathered.
+/// `velocity_change` and `velocity` of the workspace, updates their stresses, finds their cells, and gathers the
+/// moments of the particles as they are then. Particles in ghost cells are put on the list of leavers, those that are
+/// in no local cell on the list of lost ones, and neither is gathered.
 template <int D>
 void particle_pass(Model<D>& model, const PassOptions& options);
 

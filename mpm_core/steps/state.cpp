@@ -118,7 +118,8 @@ void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<T
   model.work.trouble.reset();
   prepare(model); // makes room, and sorts; the order comes back below
   model.particles = std::move(particles);
-  find_runs<D>(model.particles, batch_size, model.work.runs);
+  find_cell_runs(model, false);
+  model.work.soil_shrinks = true;
   for (const Table& table : cells)
     if (table.name == "moments")
       take<D>(model, table, model.work.moments);

@@ -1,41 +1,42 @@
 #pragma once
 /// @file
-/// The strain increment that a cell's particles share. Inline, so that a loop over cells vectorises.
+/// The strain increment that a cell's particles share; for one cell, T = double, or for several at once, T = Lanes.
 
 #include "base/tensor.h"
+#include "transfer/lanes.h"
 
 namespace mpm
 {
-/// Strain increment of one cell and the rotation that goes with it.
-template <int D>
+/// Strain increment of a cell and the rotation that goes with it.
+template <int D, class T = double>
 struct CellStrain
 {
-  SymTensor<D> increment; ///< engineering shear
-  double volumetric;      ///< trace of the increment
-  double deviatoric;      ///< sqrt(2/3 de : de)
-  Matrix<D> rotation;     ///< of the material over the step, orthogonal
+  std::array<T, n_stress<D>> increment;     ///< engineering shear
+  T volumetric;                             ///< trace of the increment
+  T deviatoric;                             ///< sqrt(2/3 de : de)
+  std::array<std::array<T, D>, D> rotation; ///< of the material over the step, orthogonal
 };
 
 /// sqrt(2/3 e : e) of the deviatoric part of a strain
-template <int D>
-inline double deviatoric_size(const SymTensor<D>& e, double volumetric)
+template <int D, class T>
+inline T deviatoric_size(const std::array<T, n_stress<D>>& e, const T& volumetric)
 {
-  double normal = 0, shear = 0;
+  T normal{}, shear{};
   for (int k = 0; k < 3; ++k)
     normal += (e[k] - volumetric / 3) * (e[k] - volumetric / 3);
   for (int k = 3; k < n_stress<D>; ++k)
     shear += e[k] * e[k];
-  return std::sqrt(2.0 / 3.0 * (normal + 0.5 * shear));
+  return root(2.0 / 3.0 * (normal + 0.5 * shear));
 }
 
 /// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980),
 /// so that stresses turn without a change of size however large the step.
-template <int D>
-inline CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double dt)
+template <int D, class T>
+inline CellStrain<D, T> strain_increment(const std::array<std::array<T, D>, D>& velocity_gradient, double dt)
 {
-  CellStrain<D> strain{};
-  Matrix<D> spin;
-  double half_angle_squared = 0;
+  CellStrain<D, T> strain{};
+  std::array<std::array<T, D>, D> spin;
+  T half_angle_squared{};
   for (int i = 0; i < D; ++i)
   {
     strain.increment[i] = dt * velocity_gradient[i][i];
@@ -53,11 +54,11 @@ inline CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double
   strain.deviatoric = deviatoric_size<D>(strain.increment, strain.volumetric);
 
   // (1 - W)^-1 (1 + W) = 1 + 2 (W + W W) / (1 + |w|^2) for the antisymmetric W of axial vector w
-  const double scale = 2 / (1 + half_angle_squared);
+  const T scale = 2 / (1 + half_angle_squared);
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
     {
-      double square = 0;
+      T square{};
       for (int k = 0; k < D; ++k)
         square += spin[i][k] * spin[k][j];
       strain.rotation[i][j] = (i == j ? 1.0 : 0.0) + scale * (spin[i][j] + square);
@@ -67,10 +68,10 @@ inline CellStrain<D> strain_increment(const Matrix<D>& velocity_gradient, double
 
 /// Replaces the volumetric part: d is 2 in plane strain, where it is spread over the in-plane components, so that
 /// the strain out of plane stays zero; 3 in three dimensions.
-template <int D>
-inline void set_volumetric(CellStrain<D>& strain, double volumetric)
+template <int D, class T>
+inline void set_volumetric(CellStrain<D, T>& strain, const T& volumetric)
 {
-  const double change = (volumetric - strain.volumetric) / D;
+  const T change = (volumetric - strain.volumetric) / D;
   for (int i = 0; i < D; ++i)
     strain.increment[i] += change;
   strain.volumetric = volumetric;

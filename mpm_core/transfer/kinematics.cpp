@@ -9,139 +9,82 @@ namespace mpm
 {
 namespace
 {
-/// The motion inside a cell, affine: value + gradient . xi. Change of velocity first, then displacement.
+/// Moves the particles of one piece: positions, then velocities, by component. Marks those not inside of the cell.
 template <int D>
-struct CellMotion
+inline void move_piece(Piece<2 * D>& piece, const CellShape<D>& shape, const CellMotion<D>& motion, LaneMask& outside)
 {
-  std::array<double, 2 * D> value{};
-  std::array<std::array<double, 2 * D>, D> gradient{}; ///< [component of xi]
-};
-
-template <int D>
-CellMotion<D> cell_motion(const Mesh<D>& mesh, Index cell, std::span<const NodalMotion<D>> motion)
-{
-  CellMotion<D> result;
+  std::array<Lanes, D> xi, moved;
+  for (int i = 0; i < D; ++i)
+    xi[i] = piece[i] - shape.centre[i];
+  for (int a = 0; a < D; ++a)
+  {
+    Lanes change = motion.change.value[a] + motion.change.gradient[a][0] * xi[0];
+    Lanes u = motion.displacement.value[a] + motion.displacement.gradient[a][0] * xi[0];
+    for (int b = 1; b < D; ++b)
+    {
+      change += motion.change.gradient[a][b] * xi[b];
+      u += motion.displacement.gradient[a][b] * xi[b];
+    }
+    moved[a] = xi[a] + u;
+    piece[a] += u;
+    piece[D + a] = motion.keep * piece[D + a] + change;
+  }
   for (int k = 0; k <= D; ++k)
   {
-    const NodalMotion<D>& node = motion[mesh.cells[cell][k]];
-    const Vector<D>& gradient = mesh.shapes[cell].gradient[k];
-    for (int w = 0; w < 2 * D; ++w)
-      result.value[w] += node[w];
-    for (int b = 0; b < D; ++b)
-      for (int w = 0; w < 2 * D; ++w)
-        result.gradient[b][w] += gradient[b] * node[w];
+    Lanes n = 1.0 / (D + 1) + shape.gradient[k][0] * moved[0];
+    for (int i = 1; i < D; ++i)
+      n += shape.gradient[k][i] * moved[i];
+    outside |= ~(n >= -inside_tolerance); // so also where a coordinate is not a number
   }
-  for (int w = 0; w < 2 * D; ++w)
-    result.value[w] *= 1.0 / (D + 1);
-  return result;
 }
 
-/// Positions and velocities, by component.
-template <int D>
-using MotionColumns = std::array<double*, 2 * D>;
-
-/// Moves the particles of one piece from lane `first` on.
-/// @returns number of those that are not inside of the cell
-template <int D>
-inline int move_lanes(const MotionColumns<D>& at, int first, const CellShape<D>& shape, const CellMotion<D>& motion,
-                      double keep)
+/// R sigma R^T for a piece whose first columns are the stresses without zz in plane strain.
+template <int D, std::size_t N>
+inline void turn(Piece<N>& piece, const Matrix<D>& r)
 {
-  const CellShape<D> cell = shape; // copies that no store can alias
-  const CellMotion<D> m = motion;
-  int outside = 0;
-#pragma GCC ivdep
-  for (int l = 0; l < lanes; ++l)
+  std::array<std::array<Lanes, D>, D> half; // R sigma
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+    {
+      half[i][j] = r[i][0] * piece[symmetric_index<D>(0, j)];
+      for (int k = 1; k < D; ++k)
+        half[i][j] += r[i][k] * piece[symmetric_index<D>(k, j)];
+    }
+  for (int s = 0; s < n_symmetric<D>; ++s)
   {
-    const bool mine = l >= first;
-    double xi[D], moved[D];
-    for (int i = 0; i < D; ++i)
-      xi[i] = at[i][l] - cell.centre[i];
-    for (int a = 0; a < D; ++a)
-    {
-      double change = m.value[a], u = m.value[D + a];
-      for (int b = 0; b < D; ++b)
-      {
-        change += m.gradient[b][a] * xi[b];
-        u += m.gradient[b][D + a] * xi[b];
-      }
-      moved[a] = xi[a] + u;
-      if (mine)
-      {
-        at[a][l] += u;
-        at[D + a][l] = keep * at[D + a][l] + change;
-      }
-    }
-    bool inside = true; // false also where a coordinate is not a number
-    for (int k = 0; k <= D; ++k)
-    {
-      double n = 1.0 / (D + 1);
-      for (int i = 0; i < D; ++i)
-        n += cell.gradient[k][i] * moved[i];
-      inside &= n >= -inside_tolerance;
-    }
-    outside += mine & !inside ? 1 : 0;
+    const auto [i, j] = symmetric_pairs<D>[s];
+    piece[s] = half[i][0] * r[j][0];
+    for (int k = 1; k < D; ++k)
+      piece[s] += half[i][k] * r[j][k];
   }
-  return outside;
 }
 } // namespace
 
 template <int D>
-int move_particles(Particles<D>& particles, const Run& run, const Mesh<D>& mesh, std::span<const NodalMotion<D>> motion,
-                   double keep)
+bool move_particles(Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                    const CellMotion<D>& motion)
 {
-  const CellShape<D>& shape = mesh.shapes[run.cell];
-  const CellMotion<D> cell = cell_motion<D>(mesh, run.cell, motion);
-  MotionColumns<D> columns;
+  std::array<double*, 2 * D> columns;
   for (int i = 0; i < D; ++i)
   {
     columns[i] = particles.position[i].data();
     columns[D + i] = particles.velocity[i].data();
   }
-  int outside = 0;
-  for_each_lanes(columns, run.first, run.last,
-                 [&](const MotionColumns<D>& at, int first)
-                 { outside += move_lanes<D>(at, first, shape, cell, keep); });
-  return outside;
+  const CellShape<D> cell = shape; // copies that no store can alias
+  const CellMotion<D> m = motion;
+  LaneMask outside{};
+  change_lanes(columns, first, last, [&](Piece<2 * D>& piece) { move_piece<D>(piece, cell, m, outside); });
+  std::int64_t any = 0;
+  for (int l = 0; l < lanes; ++l)
+    any |= outside[l];
+  return any == 0;
 }
-
-namespace
-{
-/// R sigma R^T for lane l of stress columns.
-template <int D, std::size_t N>
-inline std::array<double, n_symmetric<D>> turned(const std::array<double*, N>& stress, int l, const Matrix<D>& r)
-{
-  double half[D][D]; // R sigma
-  for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-    {
-      half[i][j] = 0;
-      for (int k = 0; k < D; ++k)
-        half[i][j] += r[i][k] * stress[symmetric_index<D>(k, j)][l];
-    }
-  std::array<double, n_symmetric<D>> result{};
-  for (int k = 0; k < n_symmetric<D>; ++k)
-    for (int j = 0; j < D; ++j)
-      result[k] += half[symmetric_pairs<D>[k][0]][j] * r[symmetric_pairs<D>[k][1]][j];
-  return result;
-}
-} // namespace
 
 template <int D>
 void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation)
 {
   const Matrix<D> r = rotation; // a copy that no store can alias
-  for_each_lanes(stress, first, last,
-                 [&r](const SymmetricColumns<D>& at, int own)
-                 {
-#pragma GCC ivdep
-                   for (int l = 0; l < lanes; ++l)
-                   {
-                     const auto result = turned<D>(at, l, r);
-                     if (l >= own)
-                       for (int k = 0; k < n_symmetric<D>; ++k)
-                         at[k][l] = result[k];
-                   }
-                 });
+  change_lanes(stress, first, last, [&r](Piece<n_symmetric<D>>& piece) { turn<D>(piece, r); });
 }
 
 template <int D>
@@ -155,26 +98,17 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
   columns[S + 1] = particles.deviatoric_strain.data();
   const double growth = 1 + strain.volumetric, increment = strain.deviatoric;
   const Matrix<D> r = strain.rotation; // a copy that no store can alias
-  for_each_lanes(columns, first, last,
-                 [&r, growth, increment](const std::array<double*, S + 2>& at, int own)
-                 {
-#pragma GCC ivdep
-                   for (int l = 0; l < lanes; ++l)
-                   {
-                     const auto stress = turned<D>(at, l, r);
-                     if (l >= own)
-                     {
-                       for (int k = 0; k < S; ++k)
-                         at[k][l] = stress[k];
-                       at[S][l] *= growth;
-                       at[S + 1][l] += increment;
-                     }
-                   }
-                 });
+  change_lanes(columns, first, last,
+               [&r, growth, increment](Piece<S + 2>& piece)
+               {
+                 turn<D>(piece, r);
+                 piece[S] *= growth;
+                 piece[S + 1] += increment;
+               });
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template int move_particles<D>(Particles<D>&, const Run&, const Mesh<D>&, std::span<const NodalMotion<D>>, double);  \
+  template bool move_particles(Particles<D>&, Index, Index, const CellShape<D>&, const CellMotion<D>&);                \
   template void rotate<D>(const SymmetricColumns<D>&, Index, Index, const Matrix<D>&);                                 \
   template void strain_particles(Particles<D>&, Index, Index, const CellStrain<D>&);
 INSTANTIATE(2)

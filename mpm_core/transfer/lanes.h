@@ -1,50 +1,121 @@
 #pragma once
 /// @file
-/// Loops over a run of particles in pieces of constant length, which the compiler turns into a few vector instructions
-/// without a scalar remainder. With some ten particles in a cell, the remainder would cost as much as all the rest.
+/// Kernels over a run of particles, a few at once, in vectors of constant length. With some ten particles in a cell,
+/// the scalar remainder of a loop that the compiler vectorises would cost as much as all the rest.
 
 #include "base/types.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
 
 namespace mpm
 {
-/// Particles that a kernel treats at once: one vector register of AVX-512, two of AVX2, four of SSE2 or NEON.
-inline constexpr int lanes = 8;
+/// Particles that a kernel treats at once: one vector register of AVX2, half of one of AVX-512, two of SSE2 or NEON.
+/// With ten particles in a cell, eight at once would leave more lanes idle than they save instructions.
+inline constexpr int lanes = 4;
 
-/// Calls `kernel(at, first)` on pieces of `lanes` entries of the columns [first, last): `at` is where the piece begins
-/// in each column, and only the lanes from `first` on are to be written or counted. The last piece reaches back over
-/// entries before it.
-template <std::size_t N, class Kernel>
-inline void for_each_lanes(const std::array<double*, N>& columns, Index first, Index last, Kernel&& kernel)
+/// One number of each of these particles. The compilers' own vectors (g++, clang++): plain arrays of constant length
+/// are unrolled into scalars.
+using Lanes [[gnu::vector_size(lanes * sizeof(double))]] = double;
+/// -1 where something holds, 0 elsewhere; what the comparison of two `Lanes` gives
+using LaneMask [[gnu::vector_size(lanes * sizeof(double))]] = std::int64_t;
+
+/// Entries of N columns
+template <std::size_t N>
+using Piece = std::array<Lanes, N>;
+
+/// The entries from `first` on.
+template <std::size_t N, class T>
+inline Piece<N> load(const std::array<T*, N>& columns, Index first)
 {
-  std::array<double*, N> at;
+  Piece<N> piece;
+  for (std::size_t k = 0; k < N; ++k)
+    std::memcpy(&piece[k], columns[k] + first, sizeof(Lanes));
+  return piece;
+}
+
+/// Fewer entries than lanes, such as those of a stray: the lanes beyond the last repeat it.
+template <std::size_t N, class T>
+inline Piece<N> load_few(const std::array<T*, N>& columns, Index first, Index last)
+{
+  Piece<N> piece;
+  for (std::size_t k = 0; k < N; ++k)
+    for (int l = 0; l < lanes; ++l)
+      piece[k][l] = columns[k][std::min(first + l, last - 1)];
+  return piece;
+}
+
+/// Calls `change(piece)` on the entries [first, last) of the columns, piece by piece, and writes them back. The last
+/// piece reaches back over entries that the piece before it changes too: it is read before that, and gives them the
+/// same values once more. (Masked stores would hold up the loads that follow them.)
+template <std::size_t N, class Change>
+inline void change_lanes(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
+{
+  if (last - first < lanes)
+  {
+    Piece<N> piece = load_few(columns, first, last);
+    change(piece);
+    for (std::size_t k = 0; k < N; ++k)
+      for (Index i = first; i < last; ++i)
+        columns[k][i] = piece[k][i - first];
+    return;
+  }
+  const auto store = [&columns](const Piece<N>& piece, Index to)
+  {
+    for (std::size_t k = 0; k < N; ++k)
+      std::memcpy(columns[k] + to, &piece[k], sizeof(Lanes));
+  };
+  Piece<N> tail = load(columns, last - lanes);
   Index i = first;
   for (; i + lanes <= last; i += lanes)
   {
-    for (std::size_t k = 0; k < N; ++k)
-      at[k] = columns[k] + i;
-    kernel(at, 0);
+    Piece<N> piece = load(columns, i);
+    change(piece);
+    store(piece, i);
   }
-  const int rest = static_cast<int>(last - i);
-  if (rest == 0)
+  if (i == last)
     return;
-  if (last >= lanes)
+  change(tail);
+  store(tail, last - lanes);
+}
+
+/// Calls `add(piece, mine)` on the entries [first, last) of the columns, piece by piece, each entry being `mine` once.
+template <std::size_t N, class Add>
+inline void add_lanes(const std::array<const double*, N>& columns, Index first, Index last, Add&& add)
+{
+  constexpr LaneMask number{0, 1, 2, 3};
+  static_assert(lanes == 4);
+  if (last - first < lanes)
+    return add(load_few(columns, first, last), number < last - first);
+  Index i = first;
+  for (; i + lanes <= last; i += lanes)
+    add(load(columns, i), number >= 0);
+  if (i < last)
+    add(load(columns, last - lanes), number >= lanes - (last - i));
+}
+
+/// Square root of a number or of each lane
+template <class T>
+inline T root(const T& a)
+{
+  if constexpr (std::is_same_v<T, double>)
+    return std::sqrt(a);
+  else
   {
-    for (std::size_t k = 0; k < N; ++k)
-      at[k] = columns[k] + (last - lanes);
-    kernel(at, lanes - rest);
-    return;
+    T roots{};
+    for (int l = 0; l < lanes; ++l)
+      roots[l] = std::sqrt(a[l]);
+    return roots;
   }
-  // The first particles of all, with too few entries before them: they are brought together elsewhere.
-  std::array<std::array<double, lanes>, N> copy{};
-  for (std::size_t k = 0; k < N; ++k)
-  {
-    std::copy_n(columns[k] + i, rest, copy[k].end() - rest);
-    at[k] = copy[k].data();
-  }
-  kernel(at, lanes - rest);
-  for (std::size_t k = 0; k < N; ++k)
-    std::copy_n(copy[k].end() - rest, rest, columns[k] + i);
+}
+
+inline double sum(const Lanes& a)
+{
+  double total = 0;
+  for (int l = 0; l < lanes; ++l)
+    total += a[l];
+  return total;
 }
 } // namespace mpm

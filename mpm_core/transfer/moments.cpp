@@ -1,61 +1,64 @@
 #include "transfer/moments.h"
 
+#include "transfer/lanes.h"
+
 namespace mpm
 {
 template <int D>
 void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<D>& moments)
 {
   constexpr int S = n_symmetric<D>;
-  const double *x[D], *v[D], *s[S];
+  std::array<const double*, 2 * D + S + 2> columns;
   for (int i = 0; i < D; ++i)
   {
-    x[i] = particles.position[i].data();
-    v[i] = particles.velocity[i].data();
+    columns[i] = particles.position[i].data();
+    columns[D + i] = particles.velocity[i].data();
   }
   for (int k = 0; k < S; ++k)
-    s[k] = particles.stress[stress_component<D>[k]].data();
-  const double* const mass = particles.mass.data();
-  const double* const volume = particles.volume.data();
+    columns[2 * D + k] = particles.stress[stress_component<D>[k]].data();
+  columns[2 * D + S] = particles.mass.data();
+  columns[2 * D + S + 1] = particles.volume.data();
 
-  CellMoments<D> sum{};
-  for (Index p = first; p < last; ++p)
+  constexpr std::size_t members = sizeof(CellMoments<D>) / sizeof(double);
+  struct Sums // as the moments, lane by lane
   {
-    const double m = mass[p], vol = volume[p];
-    double xi[D], m_xi[D];
-    sum.volume += vol;
-    sum.mass += m;
+    Lanes volume, mass;
+    std::array<Lanes, D> mass_xi;
+    std::array<Lanes, S> mass_xixi;
+    std::array<Lanes, D> momentum;
+    std::array<std::array<Lanes, D>, D> momentum_xi;
+    std::array<Lanes, S> stress;
+  } sums{};
+  const auto add = [&sums, centre = shape.centre](const Piece<2 * D + S + 2>& piece, const LaneMask& mine)
+  {
+    const Lanes mass = mine ? piece[2 * D + S] : Lanes{}, volume = mine ? piece[2 * D + S + 1] : Lanes{};
+    std::array<Lanes, D> xi, mass_xi;
+    sums.volume += volume;
+    sums.mass += mass;
     for (int i = 0; i < D; ++i)
     {
-      xi[i] = x[i][p] - shape.centre[i];
-      m_xi[i] = m * xi[i];
-      sum.mass_xi[i] += m_xi[i];
+      xi[i] = piece[i] - centre[i];
+      mass_xi[i] = mass * xi[i];
+      sums.mass_xi[i] += mass_xi[i];
     }
     for (int k = 0; k < S; ++k)
     {
-      sum.mass_xixi[k] += m_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
-      sum.stress[k] += vol * s[k][p];
+      sums.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+      sums.stress[k] += volume * piece[2 * D + k];
     }
     for (int a = 0; a < D; ++a)
     {
-      sum.momentum[a] += m * v[a][p];
+      sums.momentum[a] += mass * piece[D + a];
       for (int b = 0; b < D; ++b)
-        sum.momentum_xi[a][b] += m_xi[b] * v[a][p];
+        sums.momentum_xi[a][b] += mass_xi[b] * piece[D + a];
     }
-  }
-  moments.volume += sum.volume;
-  moments.mass += sum.mass;
-  for (int a = 0; a < D; ++a)
-  {
-    moments.mass_xi[a] += sum.mass_xi[a];
-    moments.momentum[a] += sum.momentum[a];
-    for (int b = 0; b < D; ++b)
-      moments.momentum_xi[a][b] += sum.momentum_xi[a][b];
-  }
-  for (int k = 0; k < S; ++k)
-  {
-    moments.mass_xixi[k] += sum.mass_xixi[k];
-    moments.stress[k] += sum.stress[k];
-  }
+  };
+  add_lanes(columns, first, last, add);
+  const auto by_lane = std::bit_cast<std::array<Lanes, members>>(sums);
+  auto numbers = std::bit_cast<std::array<double, members>>(moments);
+  for (std::size_t k = 0; k < members; ++k)
+    numbers[k] += sum(by_lane[k]);
+  moments = std::bit_cast<CellMoments<D>>(numbers);
 }
 
 template <int D>
@@ -72,9 +75,64 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
     }
 }
 
+template <int D>
+void move(CellMoments<D>& moments, const CellMotion<D>& motion)
+{
+  // xi becomes A xi + u with A = 1 + grad u; first the velocities at the old places, then the places.
+  const CellMomentum<D> momentum = changed_momentum<D>(moments, motion.keep, motion.change);
+  const Vector<D>& u = motion.displacement.value;
+  Matrix<D> A = motion.displacement.gradient;
+  for (int i = 0; i < D; ++i)
+    A[i][i] += 1;
+  Vector<D> turned; // A sum m_p xi
+  for (int i = 0; i < D; ++i)
+    turned[i] = dot<D>(A[i], moments.mass_xi);
+  std::array<double, n_symmetric<D>> second;
+  for (int s = 0; s < n_symmetric<D>; ++s)
+  {
+    const auto [i, j] = symmetric_pairs<D>[s];
+    second[s] = turned[i] * u[j] + u[i] * turned[j] + moments.mass * u[i] * u[j];
+    for (int k = 0; k < D; ++k)
+      for (int l = 0; l < D; ++l)
+        second[s] += A[i][k] * A[j][l] * moments.mass_xixi[symmetric_index<D>(k, l)];
+  }
+  moments.mass_xixi = second;
+  for (int a = 0; a < D; ++a)
+  {
+    moments.mass_xi[a] = turned[a] + moments.mass * u[a];
+    moments.momentum[a] = momentum.value[a];
+    for (int b = 0; b < D; ++b)
+      moments.momentum_xi[a][b] = dot<D>(A[b], momentum.first[a]) + momentum.value[a] * u[b];
+  }
+}
+
+template <int D>
+std::array<double, n_symmetric<D>> stress_sum(const Particles<D>& particles, Index first, Index last)
+{
+  constexpr int S = n_symmetric<D>;
+  std::array<const double*, S + 1> columns;
+  for (int k = 0; k < S; ++k)
+    columns[k] = particles.stress[stress_component<D>[k]].data();
+  columns[S] = particles.volume.data();
+  Piece<S> sums{};
+  add_lanes(columns, first, last,
+            [&sums](const Piece<S + 1>& piece, const LaneMask& mine)
+            {
+              const Lanes volume = mine ? piece[S] : Lanes{};
+              for (int k = 0; k < S; ++k)
+                sums[k] += volume * piece[k];
+            });
+  std::array<double, S> result;
+  for (int k = 0; k < S; ++k)
+    result[k] = sum(sums[k]);
+  return result;
+}
+
 #define INSTANTIATE(D)                                                                                                 \
   template void gather(const Particles<D>&, Index, Index, const CellShape<D>&, CellMoments<D>&);                       \
-  template void gather(const Particles<D>&, Index, Index, const CellShape<D>&, TractionMoments<D>&);
+  template void gather(const Particles<D>&, Index, Index, const CellShape<D>&, TractionMoments<D>&);                   \
+  template void move(CellMoments<D>&, const CellMotion<D>&);                                                           \
+  template std::array<double, n_symmetric<D>> stress_sum(const Particles<D>&, Index, Index);
 INSTANTIATE(2)
 INSTANTIATE(3)
 } // namespace mpm

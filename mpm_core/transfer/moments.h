@@ -10,6 +10,8 @@
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
+#include <bit>
+
 namespace mpm
 {
 /// Moments of the particles in one cell; xi is the position from the cell's centre.
@@ -52,13 +54,34 @@ inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& noda
     const Vector<D>& u = nodal(mesh.cells[cell][k]);
     for (int a = 0; a < D; ++a)
     {
-      field.value[a] += u[a] / (D + 1);
+      field.value[a] += u[a] * (1.0 / (D + 1));
       for (int b = 0; b < D; ++b)
         field.gradient[a][b] += u[a] * mesh.shapes[cell].gradient[k][b];
     }
   }
   return field;
 }
+
+template <int D>
+inline AffineField<D> scaled(AffineField<D> field, double factor)
+{
+  for (int a = 0; a < D; ++a)
+  {
+    field.value[a] *= factor;
+    for (int b = 0; b < D; ++b)
+      field.gradient[a][b] *= factor;
+  }
+  return field;
+}
+
+/// Motion of a cell's particles over a step: v_p = keep v_p + change(x_p), x_p += displacement(x_p)
+template <int D>
+struct CellMotion
+{
+  double keep; ///< 1 in FLIP
+  AffineField<D> change;
+  AffineField<D> displacement;
+};
 
 /// Adds the particles [first, last), all in this cell, to its moments.
 template <int D>
@@ -69,28 +92,59 @@ template <int D>
 void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
             TractionMoments<D>& moments);
 
-/// Adds `factor * sum m_p f(x_p)` and its first moment to the momentum, for an affine field f. This is what the
-/// momentum becomes when each particle's velocity changes by f at its place, without visiting the particles.
+/// Momentum of a cell's particles and its first moment
 template <int D>
-inline void add_momentum(CellMoments<D>& moments, const AffineField<D>& f, double factor)
+struct CellMomentum
 {
+  Vector<D> value; ///< sum m_p v_p
+  Matrix<D> first; ///< sum m_p v_p (x) xi; [component of v][component of xi]
+};
+
+/// What the momentum becomes when each particle's velocity becomes `keep` times itself plus an affine field f at its
+/// place; the particles are not visited.
+template <int D>
+inline CellMomentum<D> changed_momentum(const CellMoments<D>& moments, double keep, const AffineField<D>& f)
+{
+  CellMomentum<D> result;
   for (int a = 0; a < D; ++a)
   {
-    moments.momentum[a] += factor * (moments.mass * f.value[a] + dot<D>(f.gradient[a], moments.mass_xi));
+    result.value[a] = keep * moments.momentum[a] + moments.mass * f.value[a] + dot<D>(f.gradient[a], moments.mass_xi);
     for (int b = 0; b < D; ++b)
     {
-      double sum = f.value[a] * moments.mass_xi[b];
+      double sum = keep * moments.momentum_xi[a][b] + f.value[a] * moments.mass_xi[b];
       for (int c = 0; c < D; ++c)
         sum += f.gradient[a][c] * moments.mass_xixi[symmetric_index<D>(c, b)];
-      moments.momentum_xi[a][b] += factor * sum;
+      result.first[a][b] = sum;
     }
   }
+  return result;
 }
+
+/// Takes moments of the same cell out of others, such as those of a particle that leaves it.
+template <class Moments>
+inline void take_out(const Moments& part, Moments& moments)
+{
+  using Numbers = std::array<double, sizeof(Moments) / sizeof(double)>;
+  auto numbers = std::bit_cast<Numbers>(moments);
+  const auto out = std::bit_cast<Numbers>(part);
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    numbers[k] -= out[k];
+  moments = std::bit_cast<Moments>(numbers);
+}
+
+/// What the moments become when all particles of the cell move; stresses and volumes stay. The particles are not
+/// visited.
+template <int D>
+void move(CellMoments<D>& moments, const CellMotion<D>& motion);
+
+/// sum V_p sigma_p of the particles [first, last), as in the moments
+template <int D>
+std::array<double, n_symmetric<D>> stress_sum(const Particles<D>& particles, Index first, Index last);
 
 /// sum over particles of (scalar or vector) q_p N_k(x_p), from its zeroth and first moment
 template <int D>
 inline double at_vertex(double zeroth, const Vector<D>& first, const Vector<D>& gradient)
 {
-  return zeroth / (D + 1) + dot<D>(first, gradient);
+  return zeroth * (1.0 / (D + 1)) + dot<D>(first, gradient);
 }
 } // namespace mpm

@@ -1,15 +1,14 @@
 #include "transfer/nodes.h"
 
-#include <algorithm>
-
 namespace mpm
 {
 template <int D>
-void scatter(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<const TractionMoments<D>> tractions,
-             std::span<NodeSums<D>> nodes)
+void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
+             std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes)
 {
-  std::fill(nodes.begin(), nodes.end(), NodeSums<D>{});
-  for (Index c = 0; c < mesh.owned_cells; ++c)
+  for (Index node : part.nodes)
+    nodes[node] = {};
+  for (Index c : part.cells)
   {
     const CellMoments<D>& moments = cells[c];
     if (moments.mass == 0)
@@ -33,24 +32,28 @@ void scatter(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::sp
 }
 
 template <int D>
-void scatter_momentum(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<Vector<D>> momentum)
+void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells, double keep,
+                      std::span<const Vector<D>> change, std::span<Vector<D>> momentum)
 {
-  std::fill(momentum.begin(), momentum.end(), Vector<D>{});
-  for (Index c = 0; c < mesh.owned_cells; ++c)
+  for (Index node : part.nodes)
+    momentum[node] = {};
+  const auto nodal = [change](Index node) -> const Vector<D>& { return change[node]; };
+  for (Index c : part.cells)
   {
     if (cells[c].mass == 0)
       continue;
+    const CellMomentum<D> sum = changed_momentum<D>(cells[c], keep, affine_field<D>(mesh, c, nodal));
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
-        momentum[mesh.cells[c][k]][a] +=
-            at_vertex<D>(cells[c].momentum[a], cells[c].momentum_xi[a], mesh.shapes[c].gradient[k]);
+        momentum[mesh.cells[c][k]][a] += at_vertex<D>(sum.value[a], sum.first[a], mesh.shapes[c].gradient[k]);
   }
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template void scatter<D>(const Mesh<D>&, std::span<const CellMoments<D>>, std::span<const TractionMoments<D>>,       \
-                           std::span<NodeSums<D>>);                                                                    \
-  template void scatter_momentum<D>(const Mesh<D>&, std::span<const CellMoments<D>>, std::span<Vector<D>>);
+  template void scatter<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>,                           \
+                           std::span<const TractionMoments<D>>, std::span<NodeSums<D>>);                               \
+  template void scatter_momentum<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>, double,          \
+                                    std::span<const Vector<D>>, std::span<Vector<D>>);
 INSTANTIATE(2)
 INSTANTIATE(3)
 } // namespace mpm

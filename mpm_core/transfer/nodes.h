@@ -2,6 +2,7 @@
 /// @file
 /// From cell moments to nodal sums. Conservative: the sum over nodes equals the sum over particles.
 
+#include "mesh/part.h"
 #include "transfer/moments.h"
 
 #include <span>
@@ -33,13 +34,15 @@ inline Vector<D> internal_force(const std::array<double, n_symmetric<D>>& stress
   return force;
 }
 
-/// Sums of mass, momentum, internal force and traction over this rank's cells.
+/// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
 /// @param tractions  one per cell, or empty
 template <int D>
-void scatter(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<const TractionMoments<D>> tractions,
-             std::span<NodeSums<D>> nodes);
+void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
+             std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes);
 
-/// Only the momentum, `sum m_p N_i v_p`, which (19) needs a second time.
+/// The momentum `sum m_p N_i v_p` that (19) needs, after the velocities have become v_p = keep v_p + sum N_i change_i.
+/// The particles are not visited.
 template <int D>
-void scatter_momentum(const Mesh<D>& mesh, std::span<const CellMoments<D>> cells, std::span<Vector<D>> momentum);
+void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells, double keep,
+                      std::span<const Vector<D>> change, std::span<Vector<D>> momentum);
 } // namespace mpm

@@ -68,10 +68,10 @@ template <int D>
 void move(benchmark::State& state)
 {
   Filled<D> box(static_cast<int>(state.range(0)));
-  const std::vector<NodalMotion<D>> motion(box.mesh.points.size()); // at rest: the particles stay where they are
+  const CellMotion<D> rest{1, {}, {}}; // the particles stay where they are
   for (auto _ : state)
     for (const Run& run : box.runs)
-      benchmark::DoNotOptimize(move_particles<D>(box.particles, run, box.mesh, motion, 1.0));
+      benchmark::DoNotOptimize(move_particles<D>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], rest));
   count_particles(state, box.particles.size());
 }
 BENCHMARK(move<2>)->Arg(18)->Arg(112);
@@ -81,7 +81,7 @@ template <int D>
 void strain(benchmark::State& state)
 {
   Filled<D> box(static_cast<int>(state.range(0)));
-  const CellStrain<D> none = strain_increment<D>({}, 1.0);
+  const CellStrain<D> none = strain_increment<D>(Matrix<D>{}, 1.0);
   for (auto _ : state)
     for (const Run& run : box.runs)
       strain_particles<D>(box.particles, run.first, run.last, none);

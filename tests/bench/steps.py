@@ -9,6 +9,8 @@ import argparse
 import json
 import os
 import platform
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -20,6 +22,11 @@ MOVED_BYTES = {2: 8 * (2 * (2 + 2 + 4 + 1 + 1 + 1) + 1), 3: 8 * (2 * (3 + 3 + 6 
 """Bytes that a particle-step must move: position, velocity, stress, volume, accumulated deviatoric and plastic strain are read
 and written, mass is read."""
 
+OPERATIONS = {2: 38 + 23 + 44 + 6, 3: 73 + 77 + 75 + 12}
+"""Additions and multiplications of a particle-step that stays elastic, counted from the kernels: motion with the check of the
+cell, rotation of the stress and growth, Mohr-Coulomb's trial and check, and the sum of stresses. What cells and nodes need is
+shared by their particles and left out."""
+
 
 def triad_bandwidth(entries: int = 1 << 24, repetitions: int = 5) -> float:
     """Bytes per second of a = b + c by NumPy, one core: what a streaming pass reaches here (STREAM's count of 24 bytes)."""
@@ -30,6 +37,17 @@ def triad_bandwidth(entries: int = 1 << 24, repetitions: int = 5) -> float:
         np.add(b, c, out=a)
         best = min(best, time.process_time() - start)
     return 24 * entries / best
+
+
+def peak_operations(n: int = 1000, repetitions: int = 5) -> float:
+    """Additions and multiplications per second of one core: those of a product of matrices."""
+    a = np.random.default_rng(1).random((n, n))
+    best = np.inf
+    for _ in range(repetitions):
+        start = time.process_time()
+        a @ a
+        best = min(best, time.process_time() - start)
+    return 2 * n**3 / best
 
 
 def crossed(nx: int, ny: int, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -84,16 +102,51 @@ def block(n: int, law) -> mpm.Model:
     return model
 
 
-def rate(model: mpm.Model, particle_steps: float, repetitions: int, **options) -> tuple[float, mpm.Report]:
-    """Particle-steps per second of processor time, the best of the repetitions."""
+def rate(model: mpm.Model, particle_steps: float, repetitions: int, **options) -> tuple[float, mpm.Report, dict]:
+    """Particle-steps per second of processor time, the best of the repetitions, and the shares of the phases in the time."""
     dt = 0.5 * model.critical_time_step()
     steps = max(4, round(particle_steps / len(model.particles)))
     best = 0.0
+    before = model._core.phase_seconds()
     for _ in range(repetitions):
-        before, start = model.report().particle_steps, time.process_time()
+        steps_before, start = model.report().particle_steps, time.process_time()
         (report,) = model.explicit(model.time + dt * steps, damping=0.75, **options)
-        best = max(best, (report.particle_steps - before) / (time.process_time() - start))
-    return best, report
+        best = max(best, (report.particle_steps - steps_before) / (time.process_time() - start))
+    phases = {name: seconds - before[name] for name, seconds in model._core.phase_seconds().items()}
+    return best, report, {name: seconds / sum(phases.values()) for name, seconds in phases.items()}
+
+
+def on_ranks(rounds: int = 3, cell_size: float = 0.01, steps: int = 20) -> dict[str, float]:
+    """How much faster two ranks are than one, each the best of several rounds in turns."""
+    seconds = {1: np.inf, 2: np.inf}
+    particles = 0
+    for _ in range(rounds):
+        for ranks in seconds:
+            command = [
+                "mpirun",
+                "--oversubscribe",
+                "-n",
+                str(ranks),
+                sys.executable,
+                str(Path(__file__).with_name("ranks.py")),
+            ]
+            run = subprocess.run([*command, str(cell_size), str(steps)], capture_output=True, text=True, check=True)
+            took, particles = run.stdout.split()[-2:]
+            seconds[ranks] = min(seconds[ranks], float(took))
+    return {"particles": int(particles), "one": seconds[1], "two": seconds[2], "ratio": seconds[1] / seconds[2]}
+
+
+def machine() -> dict:
+    """What the figures belong to."""
+    cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if "model name" in line), "unknown")
+    return {
+        "processor": cpu,
+        "architecture": platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "compiler": mpm.compiler,
+        "program": mpm.__version__,
+    }
 
 
 def other_laws(soil: mpm.MohrCoulomb) -> dict[str, object]:
@@ -111,10 +164,18 @@ def other_laws(soil: mpm.MohrCoulomb) -> dict[str, object]:
     }  # fmt: skip
 
 
+def table_row(name: str, row: dict) -> str:
+    phases = " ".join(f"{share:5.0%}" for share in row["phases"].values())
+    return (
+        f"{name:32} {row['particles']:9d} {row['particle_steps_per_second'] / 1e6:9.1f} {row['share_of_bandwidth']:9.0%} "
+        f"{row['share_of_arithmetic']:10.0%} {row['plastic_share']:8.0%} {row['bytes_held']:6.0f}  {phases}"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="file for the results")
-    parser.add_argument("--small", action="store_true", help="only the small cases")
+    parser.add_argument("--small", action="store_true", help="only the small cases, on one rank")
     a = parser.parse_args()
     elastic = mpm.LinearElastic(young=200e3, poisson=0.33)
     soil = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
@@ -129,25 +190,37 @@ def main() -> None:
     cases += [(f"slope 2D, {name}", lambda law=law: slope(0.05, law), {}) for name, law in other_laws(soil).items()]
     if a.small:
         cases = [case for case in cases if case[1]().mesh.cells.shape[0] < 20000]
-    bandwidth = triad_bandwidth()
-    print(f"streaming bandwidth of one core (triad): {bandwidth / 1e9:.1f} GB/s")
-    print(f"bytes that a particle-step must move: {MOVED_BYTES[2]} in 2D, {MOVED_BYTES[3]} in 3D\n")
-    print(f"{'case':34} {'particles':>10} {'million/s':>10} {'of bandwidth':>13} {'plastic':>8} {'bytes held':>11}")
+    bandwidth, peak = triad_bandwidth(), peak_operations()
+    print(f"one core: streaming bandwidth (triad) {bandwidth / 1e9:.1f} GB/s, arithmetic {peak / 1e9:.1f} Gflop/s")
+    for dim in (2, 3):
+        print(f"a particle-step in {dim}D must move {MOVED_BYTES[dim]} bytes and needs {OPERATIONS[dim]} operations")
+    print(
+        f"\n{'case':32} {'particles':>9} {'million/s':>9} {'of memory':>9} {'of flop/s':>10} {'plastic':>8} {'bytes':>6}  phases"
+    )
     rows = []
     for name, make, options in cases:
         model = make()
-        speed, report = rate(model, 8e6, 3, **options)
-        share = speed * MOVED_BYTES[model.mesh.dim] / bandwidth
-        held = model._core.bytes_per_particle()
-        rows.append({"case": name, "particles": report.particles, "particle_steps_per_second": speed,
-                     "share_of_bandwidth": share, "plastic_share": report.plastic_share, "bytes_held": held})  # fmt: skip
-        print(
-            f"{name:34} {report.particles:10d} {speed / 1e6:10.1f} {share:13.0%} {report.plastic_share:8.0%} {held:11.0f}"
-        )
+        speed, report, phases = rate(model, 8e6, 3, **options)
+        dim = model.mesh.dim
+        row = {
+            "case": name,
+            "particles": report.particles,
+            "particle_steps_per_second": speed,
+            "share_of_bandwidth": speed * MOVED_BYTES[dim] / bandwidth,
+            "share_of_arithmetic": speed * OPERATIONS[dim] / peak,
+            "plastic_share": report.plastic_share,
+            "bytes_held": model._core.bytes_per_particle(),
+            "phases": phases,
+        }
+        rows.append(row)
+        print(table_row(name, row), flush=True)
+    print(f"phases: {', '.join(rows[0]['phases'])}")
+    ranks = None if a.small else on_ranks()
+    if ranks:
+        print(f"slope 2D, {ranks['particles']} particles: two ranks are {ranks['ratio']:.2f} times as fast as one")
     if a.json:
-        machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count(),
-                   "compiler": mpm.compiler, "program": mpm.__version__}  # fmt: skip
-        a.json.write_text(json.dumps({"machine": machine, "bandwidth": bandwidth, "cases": rows}, indent=2) + "\n")
+        results = {"machine": machine(), "bandwidth": bandwidth, "operations": peak, "cases": rows, "ranks": ranks}
+        a.json.write_text(json.dumps(results, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 #pragma once
 /// Meshes that tests share: a box cut in simplices, with its inner nodes moved about.
 
-#include "mesh/mesh.h"
+#include "mesh/part.h"
 
 #include <algorithm>
+#include <numeric>
 #include <random>
 
 namespace mpm::test
@@ -76,5 +77,14 @@ BoxArrays<D> box(int n, double shake = 0, unsigned seed = 1)
           }
     }
   return arrays;
+}
+
+/// All of a mesh.
+template <int D>
+MeshPart whole(const Mesh<D>& mesh)
+{
+  std::vector<Index> cells(mesh.cells.size());
+  std::iota(cells.begin(), cells.end(), 0);
+  return make_part<D>(mesh, cells, {});
 }
 } // namespace mpm::test

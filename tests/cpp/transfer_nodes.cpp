@@ -38,6 +38,18 @@ Particles<D> random_particles(const Mesh<D>& mesh, Index size)
 }
 
 template <int D>
+std::vector<Vector<D>> random_vectors(std::size_t n, unsigned seed, double size)
+{
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-size, size);
+  std::vector<Vector<D>> vectors(n);
+  for (auto& v : vectors)
+    for (double& component : v)
+      component = unit(random);
+  return vectors;
+}
+
+template <int D>
 std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particles)
 {
   std::vector<Run> runs;
@@ -50,7 +62,7 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
     gather<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
-  scatter<D>(mesh, moments, tractions, nodes);
+  scatter<D>(mesh, test::whole(mesh), moments, tractions, nodes);
   return nodes;
 }
 
@@ -143,9 +155,9 @@ TYPED_TEST(NodesTest, MappingConservesSums)
   }
 }
 
-TYPED_TEST(NodesTest, ChangedMomentsAreThoseOfTheChangedParticles)
+TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
 {
-  // v_p += f(x_p) for an affine f changes the momentum by sum m_p f(x_p) and its moment, from the moments alone.
+  // v_p = keep v_p + f(x_p), then x_p += u(x_p) with affine f and u: the moments follow without the particles.
   constexpr int D = TypeParam::value;
   const Mesh<D> mesh = test::box<D>(1).mesh();
   Particles<D> particles = random_particles(mesh, 60);
@@ -153,28 +165,60 @@ TYPED_TEST(NodesTest, ChangedMomentsAreThoseOfTheChangedParticles)
   Index last = 0;
   while (last < particles.size() && particles.cell[last] == cell)
     ++last;
+  const CellShape<D>& shape = mesh.shapes[cell];
   CellMoments<D> moments{}, expected{};
-  gather<D>(particles, 0, last, mesh.shapes[cell], moments);
-  std::mt19937 random(22);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  std::vector<Vector<D>> nodal(mesh.points.size());
-  for (auto& v : nodal)
-    for (double& component : v)
-      component = unit(random);
-  add_momentum<D>(moments, affine_field<D>(mesh, cell, [&](Index i) -> const Vector<D>& { return nodal[i]; }), 0.7);
+  gather<D>(particles, 0, last, shape, moments);
+  const std::vector<Vector<D>> change = random_vectors<D>(mesh.points.size(), 22, 1);
+  const std::vector<Vector<D>> displacement = random_vectors<D>(mesh.points.size(), 23, 0.1);
+  const auto field = [&](const auto& nodal)
+  {
+    return affine_field<D>(mesh, cell, [&](Index i) -> const Vector<D>& { return nodal[i]; });
+  };
+  const CellMotion<D> motion{0.7, field(change), field(displacement)};
+  move<D>(moments, motion);
   for (Index p = 0; p < last; ++p)
   {
-    const auto n = shape_functions<D>(mesh.shapes[cell], at<D>(particles.position, p));
-    for (int k = 0; k <= D; ++k)
-      for (int a = 0; a < D; ++a)
-        particles.velocity[a][p] += 0.7 * n[k] * nodal[mesh.cells[cell][k]][a];
+    const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
+    for (int a = 0; a < D; ++a)
+    {
+      particles.velocity[a][p] *= 0.7;
+      for (int k = 0; k <= D; ++k)
+      {
+        particles.velocity[a][p] += n[k] * change[mesh.cells[cell][k]][a];
+        particles.position[a][p] += n[k] * displacement[mesh.cells[cell][k]][a];
+      }
+    }
   }
-  gather<D>(particles, 0, last, mesh.shapes[cell], expected);
-  for (int a = 0; a < D; ++a)
+  gather<D>(particles, 0, last, shape, expected);
+  using Numbers = std::array<double, sizeof(moments) / sizeof(double)>;
+  const auto got = std::bit_cast<Numbers>(moments), wanted = std::bit_cast<Numbers>(expected);
+  for (std::size_t k = 0; k < got.size(); ++k)
+    EXPECT_NEAR(got[k], wanted[k], 1e-12);
+  const auto stress = stress_sum<D>(particles, 0, last);
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    EXPECT_NEAR(stress[k], wanted[got.size() - n_symmetric<D> + static_cast<std::size_t>(k)], 1e-12);
+  take_out(expected, moments);
+  for (double left : std::bit_cast<Numbers>(moments))
+    EXPECT_NEAR(left, 0, 1e-12);
+}
+
+TYPED_TEST(NodesTest, SumsOfFewAndManyParticlesAreThoseOneByOne)
+{
+  constexpr int D = TypeParam::value;
+  const Mesh<D> mesh = test::box<D>(1).mesh();
+  const Particles<D> particles = random_particles(mesh, 60);
+  using Numbers = std::array<double, sizeof(CellMoments<D>) / sizeof(double)>;
+  for (Index count = 1; count <= 13; ++count)
   {
-    EXPECT_NEAR(moments.momentum[a], expected.momentum[a], 1e-12);
-    for (int b = 0; b < D; ++b)
-      EXPECT_NEAR(moments.momentum_xi[a][b], expected.momentum_xi[a][b], 1e-12);
+    CellMoments<D> together{}, one_by_one{};
+    gather<D>(particles, 3, 3 + count, mesh.shapes[0], together);
+    for (Index p = 3; p < 3 + count; ++p)
+      gather<D>(particles, p, p + 1, mesh.shapes[0], one_by_one);
+    const auto got = std::bit_cast<Numbers>(together), wanted = std::bit_cast<Numbers>(one_by_one);
+    for (std::size_t k = 0; k < got.size(); ++k)
+      EXPECT_NEAR(got[k], wanted[k], 1e-13) << count;
+    EXPECT_NEAR(together.mass, std::accumulate(particles.mass.begin() + 3, particles.mass.begin() + 3 + count, 0.0),
+                1e-13);
   }
 }
 
@@ -201,17 +245,24 @@ TYPED_TEST(NodesTest, AffineNodalFieldsArriveExactly)
     velocity.push_back(affine(x, 3));
   }
   const double dt = 1e-3, pic = 0.25;
-  std::vector<NodalMotion<D>> motion(mesh.points.size());
-  for (std::size_t i = 0; i < motion.size(); ++i)
+  std::vector<Vector<D>> change(mesh.points.size()), displacement(mesh.points.size());
+  for (std::size_t i = 0; i < change.size(); ++i)
     for (int a = 0; a < D; ++a)
     {
-      motion[i][a] = dt * acceleration[i][a] + pic * start[i][a];
-      motion[i][D + a] = dt * velocity[i][a];
+      change[i][a] = dt * acceleration[i][a] + pic * start[i][a];
+      displacement[i][a] = dt * velocity[i][a];
     }
   std::vector<Run> runs;
   find_runs(particles, 1000, runs);
   for (const Run& run : runs)
-    move_particles<D>(particles, run, mesh, motion, 1 - pic);
+  {
+    const auto field = [&](const auto& nodal)
+    {
+      return affine_field<D>(mesh, run.cell, [&](Index i) -> const Vector<D>& { return nodal[i]; });
+    };
+    move_particles<D>(particles, run.first, run.last, mesh.shapes[run.cell],
+                      {1 - pic, field(change), field(displacement)});
+  }
   for (Index p = 0; p < particles.size(); ++p)
   {
     const Vector<D> x = at<D>(before.position, p), v = at<D>(before.velocity, p);

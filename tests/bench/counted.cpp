@@ -1,0 +1,76 @@
+/// Small explicit steps and one Newton assembly, whose instructions `tests/bench/budget.py` counts under callgrind.
+
+#include "../cpp/boxes.h"
+
+#include "particles/seed.h"
+#include "steps/explicit.h"
+#include "steps/implicit_system.h"
+
+using namespace mpm;
+
+namespace
+{
+/// A heap of soil in a box, that slides: the cells below the diagonal are filled.
+template <int D>
+Model<D> heap(int n, int per_cell)
+{
+  const auto arrays = test::box<D>(n);
+  std::vector<Index> tags;
+  for (std::size_t c = 0; c < arrays.cells.size(); c += D + 1)
+  {
+    double sum = 0; // of all coordinates of the cell's centre
+    for (std::size_t k = c; k < c + D + 1; ++k)
+      for (int i = 0; i < D; ++i)
+        sum += arrays.points[static_cast<std::size_t>(arrays.cells[k] * D + i)] / (D + 1);
+    tags.push_back(sum < 1);
+  }
+  MeshInput<D> input = arrays.input();
+  input.cell_tags = tags;
+  Model<D> model;
+  model.mesh = make_mesh<D>(input, 0);
+  model.exchange = make_node_exchange<D>(model.mesh, MPI_COMM_SELF);
+  model.laws = {MohrCoulomb{200e3, 0.33, 1e3, 25.0}};
+  model.particles.state.resize(1);
+  seed_cells<D>(model.mesh, 1, per_cell, {0, 2000.0}, 0, model.particles);
+  std::vector<SupportRequest<D>> requests;
+  for (Index axis = 0; axis < D; ++axis)
+    requests.push_back({2 * axis + 1, true, Vector<D>{}});
+  model.supports = make_supports<D>(model.mesh, model.exchange, requests);
+  model.gravity[D - 1] = -40;
+  prepare(model);
+  return model;
+}
+
+template <int D>
+void run_explicit(Model<D> model, bool mixed, int steps)
+{
+  ExplicitOptions options;
+  options.damping = 0.75;
+  options.mixed_discretisation = mixed;
+  const double dt = 0.5 * critical_time_step(model);
+  for (int step = 0; step < steps; ++step)
+    explicit_step(model, options, dt);
+}
+
+template <int D>
+void assemble(Model<D> model)
+{
+  ImplicitStep<D> step;
+  ImplicitSystem<D> system;
+  CooEntries entries;
+  start_step(model, step, ImplicitOptions{}, 20 * critical_time_step(model));
+  number_nodes(model, step, system);
+  find_residual(model, step, true);
+  stiffness_entries(model, step, system, entries);
+}
+} // namespace
+
+int main(int argc, char** argv)
+{
+  MPI_Init(&argc, &argv);
+  run_explicit(heap<2>(16, 10), false, 40);
+  run_explicit(heap<2>(16, 10), true, 40);
+  run_explicit(heap<3>(6, 8), false, 10);
+  assemble(heap<2>(16, 10));
+  MPI_Finalize();
+}
