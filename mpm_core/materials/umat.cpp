@@ -110,6 +110,8 @@ void check(const Umat& law)
   require(law.n_variables >= 0 && law.n_variables <= max_states - 9, "n_variables", law.n_variables, "from 0 to 55");
   require(law.plastic_strain_variable >= 0 && law.plastic_strain_variable <= law.n_variables, "plastic_strain_variable",
           law.plastic_strain_variable, "0, or the number of a state variable");
+  for (double property : law.properties)
+    require(std::isfinite(property), "properties", property, "finite numbers");
   require(law.wave_modulus > 0 && std::isfinite(law.wave_modulus), "p_wave_modulus", law.wave_modulus,
           "positive and finite [Pa]");
 }

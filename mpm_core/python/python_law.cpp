@@ -114,6 +114,9 @@ BatchReport called_one_by_one(const PythonObject& object, const PointBatch<D>& p
 
 ExternalLaw python_law(const py::object& law)
 {
+  for (const char* member : {"n_state", "p_wave_modulus", "update"})
+    if (!py::hasattr(law, member))
+      throw InputError("law is " + py::repr(law).cast<std::string>() + ", which has no " + member);
   const int states = law.attr("n_state").cast<int>();
   if (states < 1)
     throw InputError("law has n_state " + std::to_string(states) +

@@ -149,6 +149,10 @@ def test_bad_input_is_named(library):
         umat(library, plastic_strain_variable=2)
     with pytest.raises(mpm.InputError, match="p_wave_modulus = 0, "):
         umat(library, p_wave_modulus=0.0)
+    with pytest.raises(mpm.InputError, match="properties = nan, but it must be finite"):
+        umat(library, properties=[np.nan])
+    with pytest.raises(mpm.InputError, match="law is 3, which has no n_state"):
+        mpm.PythonLaw(3)
     broken = Broken(None)
     broken.n_state = 0
     with pytest.raises(mpm.InputError, match="n_state 0, expected at least 1"):
