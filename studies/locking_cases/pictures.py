@@ -17,6 +17,7 @@ from matplotlib.ticker import FuncFormatter
 from .runs import Field
 
 MARKERS = {"plain": ("s", CURVES[1]), "NMD": ("o", CURVES[0]), "Taylor-Hood": ("^", CURVES[2])}
+LEVELS = {1 / 3: "a third", 0.05: "5 %"}
 LINES = ("-", "--", "-.", ":")
 
 
@@ -31,11 +32,13 @@ def save_errors(path: Path, rows: Sequence[Mapping], title: str) -> None:
     with paper_style():
         width = WIDTH if len(schemes) > 1 else 4.6
         figure, panels = plt.subplots(1, len(schemes), figsize=(width, 3.6), sharey=True, squeeze=False)
-        figure.subplots_adjust(left=0.62 / width, right=1 - 0.08 / width, bottom=0.24, top=0.93, wspace=0.05)
+        figure.subplots_adjust(left=0.82 / width, right=1 - 0.45 / width, bottom=0.24, top=0.93, wspace=0.05)
         for axes, scheme in zip(panels[0], schemes):
             _errors(axes, [row for row in rows if row["scheme"] == scheme], poissons)
             axes.set_title(f"{title}, {scheme}", loc="left")
         panels[0][0].set_ylabel("Error, relative")
+        for level, name in LEVELS.items():
+            panels[0][-1].annotate(name, (1.02, level), xycoords=("axes fraction", "data"), fontsize=8, va="center")
         shown = [
             Line2D([], [], color=colour, marker=marker, markersize=4, label=name)
             for name, (marker, colour) in MARKERS.items()
@@ -43,7 +46,7 @@ def save_errors(path: Path, rows: Sequence[Mapping], title: str) -> None:
         shown += [Line2D([], [], color="black", linestyle=line, linewidth=1.1, label=f"$\\nu$ = {poisson:.9g}")
                   for poisson, line in zip(poissons, LINES)]  # fmt: skip
         figure.legend(handles=shown, loc="lower center", ncols=4, fontsize=8, columnspacing=1.5, handlelength=2.4)
-        figure.savefig(path)
+        figure.savefig(path, dpi=150)
         plt.close(figure)
 
 
@@ -53,10 +56,8 @@ def _errors(axes: Axes, rows: Sequence[Mapping], poissons: Sequence[float]) -> N
             mine = [row for row in rows if row["elements"] == elements and row["poisson"] == poisson and row["error"]]
             axes.loglog([row["cell_size_m"] for row in mine], [row["error"] for row in mine], marker + line, color=colour,
                         markersize=4, linewidth=1.1)  # fmt: skip
-    for level, name in ((1 / 3, "a third"), (0.05, "5 %")):
+    for level in LEVELS:
         axes.axhline(level, color="#707070", linewidth=0.7)
-        axes.annotate(name, (0.02, level), xycoords=("axes fraction", "data"), xytext=(0, 2), textcoords="offset points",
-                      fontsize=8, color="#707070")  # fmt: skip
     sizes = sorted({row["cell_size_m"] for row in rows})
     axes.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
     axes.minorticks_off()
@@ -100,5 +101,5 @@ def save_pressures(path: Path, fields: Mapping[str, Field], unit: tuple[float, s
         bar = figure.add_axes((0.25, 0.5 / total, 0.5, 0.11 / total))
         draw_bar(figure, bar, quantity, limits)
         bar.set_xlabel(f"{quantity.label}; {title}", labelpad=2)
-        figure.savefig(path)
+        figure.savefig(path, dpi=150)
         plt.close(figure)

@@ -14,7 +14,7 @@ from .runs import Found, damped, displacement_at, found, mesh_of, particles_in, 
 NAME = "slope"
 TITLE = "Undrained slope"
 QUANTITY = "settlement of the shoulder times Young's modulus over cohesion [m]"
-POISSON = {"implicit": (0.4999,), "explicit": (0.499,)}
+POISSON = {"implicit": (0.4999,), "explicit": (0.4995,)}
 DIVISIONS = {"implicit": 4, "explicit": 4}
 """Over the height on the coarsest mesh, by scheme."""
 MIXED_FINEST = 32
@@ -26,6 +26,10 @@ COHESION, STIFFNESS = 1e3, 1e5
 UNIT_WEIGHT = 5e3
 """[N/m3]; limit analysis (`bridge.log_spiral`) gives collapse at 5.87 cohesion over height."""
 GRAVITY = 9.81
+RISE = 40.0
+"""Time in which the weight rises in explicit runs, in times a shear wave takes over the height. The faster it rises, the
+more soil yields on the way: on a mesh of 8 divisions the shoulder settles by 1.9, 1.0 and 0.1 % more than in the quasi-static
+run for 20, 40 and 80."""
 SHOULDER = (1.1, 1.0)
 PRESSURE_UNIT = COHESION, "cohesion"
 LEFT, BASE = 1, 2
@@ -68,6 +72,6 @@ def by_particles(divisions: int, poisson: float, nmd: bool, scheme: str) -> Foun
         quasi_static(model, nmd, steps=10)
     else:
         shear_wave = (STIFFNESS * COHESION / (2 * (1 + poisson)) * GRAVITY / UNIT_WEIGHT) ** 0.5
-        model.set_gravity((0.0, -GRAVITY), ramp=20 / shear_wave)
-        damped(model, nmd, time=200 / shear_wave, at_least=20 / shear_wave)
+        model.set_gravity((0.0, -GRAVITY), ramp=RISE / shear_wave)
+        damped(model, nmd, time=200 / shear_wave, at_least=RISE / shear_wave)
     return found(model, -STIFFNESS * float(displacement_at(model, SHOULDER)[1]), start)
