@@ -114,8 +114,9 @@ void add_softening(const Softener& softener, const Surface& m, const Spectral<D>
   const Principal d{trial.stress.s1 - returned.stress.s1, trial.stress.s2 - returned.stress.s2,
                     trial.stress.s3 - returned.stress.s3};
   const double mean = (d.s1 + d.s2 + d.s3) / 3;
+  const double yielded = increment > 0 ? increment : std::numeric_limits<double>::min();
   const double own = -((d.s1 - mean) * fall.s1 + (d.s2 - mean) * fall.s2 + (d.s3 - mean) * fall.s3) /
-                     (6 * m.moduli.shear * m.moduli.shear * std::max(increment, std::numeric_limits<double>::min()));
+                     (6 * m.moduli.shear * m.moduli.shear * yielded);
   const SymTensor<D> by_strain = recomposed(fall, trial.frame), by_trial = recomposed(gradient, trial.frame);
   const double volumetric = m.moduli.lambda * (by_trial[0] + by_trial[1] + by_trial[2]);
   for (std::size_t i = 0; i < n_stress<D>; ++i)

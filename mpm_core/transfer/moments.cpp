@@ -84,17 +84,20 @@ void move(CellMoments<D>& moments, const CellMotion<D>& motion)
   Matrix<D> A = motion.displacement.gradient;
   for (int i = 0; i < D; ++i)
     A[i][i] += 1;
-  Vector<D> turned; // A sum m_p xi
+  Vector<D> turned;      // A sum m_p xi
+  Matrix<D> turned_xi{}; // A sum m_p xi (x) xi
   for (int i = 0; i < D; ++i)
+  {
     turned[i] = dot<D>(A[i], moments.mass_xi);
+    for (int j = 0; j < D; ++j)
+      for (int k = 0; k < D; ++k)
+        turned_xi[i][j] += A[i][k] * moments.mass_xixi[symmetric_index<D>(k, j)];
+  }
   std::array<double, n_symmetric<D>> second;
   for (int s = 0; s < n_symmetric<D>; ++s)
   {
     const auto [i, j] = symmetric_pairs<D>[s];
-    second[s] = turned[i] * u[j] + u[i] * turned[j] + moments.mass * u[i] * u[j];
-    for (int k = 0; k < D; ++k)
-      for (int l = 0; l < D; ++l)
-        second[s] += A[i][k] * A[j][l] * moments.mass_xixi[symmetric_index<D>(k, l)];
+    second[s] = dot<D>(turned_xi[i], A[j]) + turned[i] * u[j] + u[i] * turned[j] + moments.mass * u[i] * u[j];
   }
   moments.mass_xixi = second;
   for (int a = 0; a < D; ++a)
