@@ -120,7 +120,8 @@ template <int newton_steps>
 /// direction; the other two, however close, by one rotation in the plane that is left, which is exact. Values are then
 /// those of the directions found, so that errors of directions count twice over only. The error is that of round-off:
 /// 2e-15 of the largest entry at most in 2e7 random matrices, graded and nearly repeated ones among them.
-/// Sources: Eberly (2021), A robust eigensolver for 3x3 symmetric matrices; Duff et al. (2017), JCGT 6, 1-8 (the plane).
+/// Sources: Eberly (2021), A robust eigensolver for 3x3 symmetric matrices; Duff et al. (2017), JCGT 6, 1-8 (the
+/// plane).
 [[gnu::always_inline]] inline Spectral<3> spectral(const SymTensor<3>& stress)
 {
   const double mean = (stress[0] + stress[1] + stress[2]) / 3;
