@@ -15,7 +15,9 @@ from common.parameters import Parameter
 from common.report import Report, save_report
 from common.report_sections import Section
 from common.summary import versions
+from PIL import Image
 
+DOCS_WIDTH = 900
 COLUMNS = ("Quantity", "Expected", "Computed", "Error", "Tolerance", "Result", "Source of the expected value")
 
 
@@ -182,9 +184,16 @@ def save_docs(docs: Path, folder: Path, table: Table) -> None:
     images.mkdir(parents=True)
     for case in table.cases:
         for name in case.figures:
-            shutil.copyfile(folder / case.name / name, images / f"{case.name}_{name}")
+            save_small(folder / case.name / name, images / f"{case.name}_{name}")
     save_table(docs / "verification.json", table)
     (docs / "verification.md").write_text(docs_page(table), "utf-8")
+
+
+def save_small(picture: Path, path: Path) -> None:
+    """A copy of a PNG file for the repository: at most `DOCS_WIDTH` pixels wide, with a palette."""
+    image = Image.open(picture).convert("RGB")
+    image.thumbnail((DOCS_WIDTH, 2 * DOCS_WIDTH), Image.Resampling.LANCZOS)
+    image.quantize(128).save(path, optimize=True)
 
 
 def docs_page(table: Table) -> str:

@@ -41,7 +41,7 @@ def by_finite_elements(angle, friction, spiral, cell):
 
 
 def run(quick: bool, folder) -> Result:
-    cell = HEIGHT / (5 if quick else 10)
+    cell = HEIGHT / (5 if quick else 20)
     checks, found = [], {}
 
     # --- 3. The mechanism itself against known factors --------------------------------------------------------------

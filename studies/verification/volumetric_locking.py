@@ -19,7 +19,7 @@ LOCKED, FREE = 0.5, 0.1
 
 
 def run(quick: bool, folder) -> Result:
-    checks, figures, meshes = [], {}, 3 if quick else 4
+    checks, figures, meshes = [], {}, 3
     for case in [CASES["cook"]] if quick else CASES.values():
         # --- 1. Each element on each mesh ----------------------------------------------------------------------------
         rows, _ = compare(Namespace(meshes=meshes, reference_mesh=meshes), case, "implicit")

@@ -45,6 +45,15 @@ def test_page_and_exit_code(results):
     assert all(case.title in page for case in read_table(folder / "verification.json").cases)
 
 
+def test_the_page_in_docs_is_made_from_its_table():
+    docs = ROOT / "docs"
+    table = read_table(docs / "verification.json")
+    assert {case.name for case in table.cases} == set(CASES) and not table.quick
+    assert (docs / "verification.md").read_text("utf-8") == docs_page(table)
+    for case in table.cases:
+        assert all((docs / "images" / "verification" / f"{case.name}_{name}").exists() for name in case.figures)
+
+
 def check(computed, **options):
     return Check("a number", 10.0, "by hand", computed, 0.1, **options)
 
