@@ -1,9 +1,10 @@
 """The paper: its slope, Figures 2 to 6, by both schemes, with and without mixed discretisation, on finer meshes.
 
 A slope 1 m high under 80 kN/m3, 3.5 times the unit weight at which it collapses, zero initial stress, local damping
-0.75. Expected are the displacements of the particle at the crest that the paper's Figure 6 shows. Local damping
-acts on elastic oscillations, too; the explicit run, which has these, creeps where the implicit one is at rest
-early. So the two are compared with each other, and with the paper, where both have come to rest.
+0.75. Expected are the displacements of the particle at the crest that the paper's Figure 6 shows. The slow creep
+comes from local damping, which holds back elastic oscillations too. How fast it is depends on what feeds these, so
+on locking, on the size of cells and on the noise of particles that cross them (see the case on integration): it
+does not converge on finer meshes.
 """
 
 import numpy as np
@@ -17,7 +18,10 @@ from mpi4py import MPI
 
 PAPER = {0.9: 0.11, 8.7: 0.28, 17.0: 0.36, 34.8: 0.413}
 """Displacement of the crest [m] by time [s]: an independent explicit code, which agrees with the paper's Figure 6."""
-END, REST = 34.8, 20.0  # s: of the paper, and of implicit runs, which are at rest by then
+END = 34.8  # s
+CREEP = (
+    "creep under local damping depends on the mesh and on locking; the paper's curve is that of its mesh and elements."
+)
 FIGURES = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN, "vertical_stress": VERTICAL_STRESS}
 
 
@@ -46,7 +50,7 @@ def run(quick: bool, folder) -> Result:
     end = 0.9 if quick else END
 
     # --- 3. The explicit run as published, at the times of Figure 6 -------------------------------------------------
-    case, watch, curves["explicit"] = slide("explicit", end, end / 120)
+    case, watch, curves["explicit"] = slide("explicit", end, 0.1)
     for time, expected in PAPER.items():
         if time <= end:
             found = np.interp(time, *curves["explicit"].T)
@@ -58,22 +62,22 @@ def run(quick: bool, folder) -> Result:
 
     # --- 4. The other scheme, NMD, finer cells, other numbers of particles ------------------------------------------
     variants = {
-        "explicit, NMD": dict(scheme="explicit", until=END, every=0.29, nmd=True),
-        "implicit": dict(scheme="implicit", until=REST, every=0.2),
-        "implicit, NMD": dict(scheme="implicit", until=REST, every=0.2, nmd=True),
-        "explicit, cells of 0.05 m": dict(scheme="explicit", until=END, every=0.29, cell=0.05),
-        "explicit, 6 particles": dict(scheme="explicit", until=END, every=0.29, per_cell=6),
-        "explicit, 24 particles": dict(scheme="explicit", until=END, every=0.29, per_cell=24),
+        "implicit": (dict(scheme="implicit", until=17.0, every=0.2), ""),
+        "explicit, 6 particles a cell": (dict(scheme="explicit", until=END, every=0.2, per_cell=6), ""),
+        "explicit, 24 particles a cell": (dict(scheme="explicit", until=END, every=0.2, per_cell=24), ""),
+        "explicit, NMD": (dict(scheme="explicit", until=END, every=0.2, nmd=True), CREEP),
+        "implicit, NMD": (dict(scheme="implicit", until=17.0, every=0.2, nmd=True), CREEP),
+        "explicit, cells of 0.05 m": (dict(scheme="explicit", until=END, every=0.2, cell=0.05), CREEP),
     }
-    for name, options in variants.items():
+    for name, (options, limit) in variants.items():
         *_, curves[name] = slide(**options)
-        checks.append(
-            Check(f"crest at the end, {name}", PAPER[END], "the run as published", curves[name][-1, 1], 0.15, "m")
-        )
+        time = curves[name][-1, 0]
+        checks.append(Check(f"crest after {time:g} s, {name}", PAPER[time], "the paper's Figure 6, independent code",
+                            curves[name][-1, 1], 0.05, "m", limit=limit))  # fmt: skip
     if MPI.COMM_WORLD.rank == 0:
         shown = {name: tuple(curve.T) for name, curve in curves.items()}
         paper = {"paper, Figure 6": (np.array(list(PAPER)), np.array(list(PAPER.values())))}
-        save_comparison(folder / "crest.png", shown, paper, ("Time [s]", "Displacement of the crest [m]"), joined=True)
+        save_comparison(folder / "crest.png", shown, paper, ("Time [s]", "Displacement of the crest [m]"))
     return Result(
         checks, {**figures, "crest.png": "Figure 6: displacement of the particle at the crest, and all variants"}
     )
