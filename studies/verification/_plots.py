@@ -11,6 +11,7 @@ from common.plots import CURVES, WIDTH, paper_style
 from matplotlib.ticker import FuncFormatter
 
 Curve = tuple[np.ndarray, np.ndarray]
+COLOURS = (*CURVES, "#1a9c9c", "#c04f9e")
 LINES = ("-", "--", ":", "-.")
 
 
@@ -43,7 +44,7 @@ def save_comparison(
                 "linestyle": "-" if joined else "none",
                 "linewidth": 1.0,
             }
-            axes.plot(x, y, color=CURVES[k % len(CURVES)], label=name, **look)
+            axes.plot(x, y, color=COLOURS[k % len(COLOURS)], label=name, **look)
         for k, (name, (x, y)) in enumerate(expected.items()):
             axes.plot(x, y, LINES[k % 4], color="black", linewidth=0.9, label=name)
         axes.set(xlabel=labels[0], ylabel=labels[1], xlim=limits[0], ylim=limits[1])

@@ -19,6 +19,7 @@ from mpi4py import MPI
 PAPER = {0.9: 0.11, 8.7: 0.28, 17.0: 0.36, 34.8: 0.413}
 """Displacement of the crest [m] by time [s]: an independent explicit code, which agrees with the paper's Figure 6."""
 END = 34.8  # s
+READING = 0.005  # m: half of the last digit of the expected numbers
 CREEP = (
     "creep under local damping depends on the mesh and on locking; the paper's curve is that of its mesh and elements."
 )
@@ -55,7 +56,7 @@ def run(quick: bool, folder) -> Result:
         if time <= end:
             found = np.interp(time, *curves["explicit"].T)
             checks.append(Check(f"crest after {time:g} s, explicit", expected, "the paper's Figure 6, independent code", found,
-                                0.05, "m"))  # fmt: skip
+                                0.05 + READING / expected, "m"))  # fmt: skip
     figures = draw(case, watch, folder)
     if quick:
         return Result(checks, figures)
@@ -72,8 +73,9 @@ def run(quick: bool, folder) -> Result:
     for name, (options, limit) in variants.items():
         *_, curves[name] = slide(**options)
         time = curves[name][-1, 0]
-        checks.append(Check(f"crest after {time:g} s, {name}", PAPER[time], "the paper's Figure 6, independent code",
-                            curves[name][-1, 1], 0.05, "m", limit=limit))  # fmt: skip
+        expected = PAPER[time]
+        checks.append(Check(f"crest after {time:g} s, {name}", expected, "the paper's Figure 6, independent code",
+                            curves[name][-1, 1], 0.05 + READING / expected, "m", limit=limit))  # fmt: skip
     if MPI.COMM_WORLD.rank == 0:
         shown = {name: tuple(curve.T) for name, curve in curves.items()}
         paper = {"paper, Figure 6": (np.array(list(PAPER)), np.array(list(PAPER.values())))}
