@@ -42,7 +42,7 @@ def by_finite_elements(angle, friction, spiral, cell):
 
 
 def run(quick: bool, folder) -> Result:
-    cell = HEIGHT / (5 if quick else 20)
+    cell = HEIGHT / (7 if quick else 20)
     checks, found = [], {}
 
     # --- 3. The mechanism itself against known factors --------------------------------------------------------------
