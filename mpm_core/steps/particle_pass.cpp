@@ -2,13 +2,9 @@
 
 #include "materials/substeps.h"
 #include "mesh/search.h"
-#include "steps/batches.h"
-#include "steps/integration.h"
-#include "transfer/kinematics.h"
-#include "transfer/lanes.h"
+#include "steps/batch_strain.h"
 
 #include <algorithm>
-#include <bit>
 #include <numeric>
 
 namespace mpm
@@ -17,66 +13,6 @@ namespace
 {
 /// Steps after which the moments of all cells are gathered from the particles again, so that round-off does not add up.
 constexpr std::int64_t gathering_interval = 64;
-
-/// Room for a batch, in the first-level cache.
-template <int D>
-struct BatchScratch
-{
-  std::array<CellMotion<D>, batch_size> motion;               ///< per run
-  std::array<CellStrain<D, Lanes>, batch_size / lanes> cells; ///< per run, `lanes` of them together
-  /// Per particle, one column per component; that out of plane stays zero
-  alignas(64) double strain[n_stress<D>][batch_size + lanes];
-
-  CellStrain<D> cell_strain(std::size_t run) const
-  {
-    constexpr std::size_t members = sizeof(CellStrain<D>) / sizeof(double);
-    const auto& together = reinterpret_cast<const std::array<double[lanes], members>&>(cells[run / lanes]);
-    std::array<double, members> numbers;
-    for (std::size_t k = 0; k < members; ++k)
-      numbers[k] = together[k][run % lanes];
-    return std::bit_cast<CellStrain<D>>(numbers);
-  }
-};
-
-/// What the nodes do to the particles of each run.
-template <int D>
-void find_motions(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
-{
-  const Workspace<D>& work = model.work;
-  const auto change = [&](Index i) -> const Vector<D>& { return work.velocity_change[i]; };
-  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
-  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-  {
-    const Index cell = work.runs[r].cell;
-    const AffineField<D> fields[]{affine_field<D>(model.mesh, cell, change),
-                                  affine_field<D>(model.mesh, cell, velocity)};
-    scratch.motion[r - batch.first_run] = {1 - options.pic_share, fields[0], scaled<D>(fields[1], options.dt)};
-  }
-}
-
-/// Strains of the cells of a batch, from the displacements. Beyond the last run the lanes hold what was there before.
-template <int D>
-void find_cell_strains(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
-{
-  const std::size_t n = batch.last_run - batch.first_run;
-  for (std::size_t first = 0; first < n; first += lanes)
-  {
-    std::array<std::array<std::array<double, lanes>, D>, D> gradient;
-    for (int l = 0; l < lanes; ++l)
-      for (int a = 0; a < D; ++a)
-        for (int b = 0; b < D; ++b)
-          gradient[a][b][l] = scratch.motion[first + l].displacement.gradient[a][b];
-    CellStrain<D, Lanes>& strain = scratch.cells[first / lanes];
-    strain = strain_increment<D>(std::bit_cast<std::array<std::array<Lanes, D>, D>>(gradient), 1);
-    if (!options.averaged)
-      continue;
-    Lanes theta{};
-    for (std::size_t r = first; r < std::min(n, first + lanes); ++r)
-      theta[r - first] = mean_volumetric_strain<D>(model.mesh.cells[model.work.runs[batch.first_run + r].cell],
-                                                   model.work.volumetric_strain);
-    set_volumetric<D>(strain, theta);
-  }
-}
 
 /// A second chance for the particles whose law failed, unless the step is lost anyway.
 template <int D>
@@ -94,50 +30,11 @@ void update_failed(Model<D>& model, const Batch& batch, const PointBatch<D>& poi
   note_trouble<D>(model, Trouble<D>::Kind::law_failed_in_parts, batch.first + report.failed.front(), increment);
 }
 
-/// Strains the particles of a batch, those of a cell alike.
-template <int D>
-void strain_cells(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
-{
-  find_cell_strains(model, options, batch, scratch);
-  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-  {
-    const Run& run = model.work.runs[r];
-    const CellStrain<D> strain = scratch.cell_strain(r - batch.first_run);
-    for (Index i = run.first - batch.first; i < run.last - batch.first;
-         i += lanes) // the next run overwrites the excess
-      for (int k : stress_component<D>)
-        std::fill_n(scratch.strain[k] + i, lanes, strain.increment[k]);
-    strain_particles<D>(model.particles, run.first, run.last, strain);
-  }
-}
-
-/// Strains the particles of a batch, each by the gradient at its own place.
-template <int D>
-void strain_dual_domains(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
-{
-  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-  {
-    const Run& run = model.work.runs[r];
-    for (Index p = run.first; p < run.last; ++p)
-    {
-      CellStrain<D> strain = strain_increment<D>(dual_gradient(model, p, run.cell), options.dt);
-      if (options.averaged)
-        set_volumetric<D>(strain, mean_volumetric_strain<D>(model.mesh.cells[run.cell], model.work.volumetric_strain));
-      for (int k = 0; k < n_stress<D>; ++k)
-        scratch.strain[k][p - batch.first] = strain.increment[k];
-      strain_particles<D>(model.particles, p, p + 1, strain);
-    }
-  }
-}
-
 template <int D>
 void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
   Particles<D>& particles = model.particles;
-  if (model.integration == Integration::dual_domain)
-    strain_dual_domains(model, options, batch, scratch);
-  else
-    strain_cells(model, options, batch, scratch);
+  strain_batch(model, options, batch, scratch);
 
   PointBatch<D> points;
   points.size = batch.last - batch.first;
