@@ -108,7 +108,7 @@ template <int D>
 void add_softening(const Softener& softener, const Surface& m, const Spectral<D>& trial, const Returned& returned,
                    double increment, double* tangent)
 {
-  const Matrix3& map = region_maps(m).of[static_cast<std::size_t>(returned.region)];
+  const Matrix3 map = region_maps(m).of[static_cast<std::size_t>(returned.region)];
   const Principal fall = softener.derivative(increment);
   const Principal gradient = strain_gradient(m, map, trial.stress, returned.stress, increment);
   const Principal d{trial.stress.s1 - returned.stress.s1, trial.stress.s2 - returned.stress.s2,

@@ -111,7 +111,7 @@ def test_cells_hold_what_has_moved_into_them():
     domain, _, _ = bridge.slope_mesh(MPI.COMM_WORLD, cell_size=0.1, headroom=1.0)
     held = held_volumes(domain, stretched(0.1, 0.013))
     assert held.sum() == pytest.approx(1.1 * 1.6, rel=2e-3)
-    middle = domain.geometry.x[domain.geometry.dofmap.array.reshape(-1, 3)].mean(axis=1)
+    middle = domain.geometry.x[compat.cell_nodes(domain)].mean(axis=1)
     start = np.column_stack([(middle[:, 0] - 0.013) / 1.1, middle[:, 1]])
     start[:, 1] -= 0.2 * start[:, 0]
     inside = np.minimum.reduce([*start.T, 1 - start[:, 1], (2.1 - start.sum(axis=1)) / 2])

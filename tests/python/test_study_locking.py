@@ -13,9 +13,12 @@ STUDY = Path(__file__).parents[2] / "studies" / "locking.py"
 PRANDTL = 2 + np.pi
 
 
+ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+
+
 def run(folder, *options, launch=()):
     result = subprocess.run([*launch, sys.executable, str(STUDY), "--output", str(folder), *options], capture_output=True,
-                            text=True, timeout=300, env={**os.environ, "OMP_NUM_THREADS": "1"})  # fmt: skip
+                            text=True, timeout=300, env={**os.environ, **ENVIRONMENT})  # fmt: skip
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "summary.json").read_text())
 

@@ -144,6 +144,7 @@ class Tangent:
         try:
             self._ksp.solve(b, x)
         except PETSc.Error:  # MUMPS could not factorise: the matrix is singular, or not finite
+            self._ksp.reset()  # it cannot be used again
             return None
         self.iterations = self._ksp.getIterationNumber()
         good = self._ksp.getConvergedReason() > 0 and np.isfinite(x.norm())
