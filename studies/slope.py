@@ -39,6 +39,7 @@ from common.summary import OutputError, results_folder, write_summary
 from common.watch import Watch
 from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
+from mpm_core.probes import ParticleProbe, ProbeFile, SectionProbe, TotalsProbe
 
 import mpm_core as mpm
 
@@ -92,7 +93,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 class Files:
-    """Particles and background mesh over time, for ParaView."""
+    """Particles and background mesh over time, for ParaView, and probes: the particle at the crest, the force across the vertical
+    section under its edge, and totals.
+    """
 
     def __init__(self, case: SlopeCase, folder: Path) -> None:
         self.model = case.model
@@ -106,6 +109,11 @@ class Files:
             background, comm, mesh.points, mesh.cells[: mesh.owned_cells], not a.float64, a.compression
         )
         self.tags = mesh.cell_tags[: mesh.owned_cells]
+        probes = {
+            "crest": ParticleProbe(self.model, [(a.crest, a.height)]), "totals": TotalsProbe(self.model),
+            "section_crest": SectionProbe(self.model, point=(a.crest, 0.0), normal=(1.0, 0.0)),
+        }  # fmt: skip
+        self.probes = [ProbeFile(folder / f"{name}.csv", probe, keep=restarted) for name, probe in probes.items()]
 
     def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
         """Add a frame. Collective."""
@@ -115,13 +123,15 @@ class Files:
             for name in ("mass", "velocity", "internal_force")
         }
         self.mesh.write(time, nodes, {"tag": self.tags})
+        for probe in self.probes:
+            probe.record()
 
     def __enter__(self) -> Files:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.particles.close()
-        self.mesh.close()
+        for file in (self.particles, self.mesh, *self.probes):
+            file.close()
 
 
 def slide(

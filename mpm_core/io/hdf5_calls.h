@@ -37,6 +37,8 @@ inline hid_t native_type()
     return H5T_NATIVE_FLOAT;
   else if constexpr (std::is_same_v<T, double>)
     return H5T_NATIVE_DOUBLE;
+  else if constexpr (std::is_same_v<T, std::int32_t>)
+    return H5T_NATIVE_INT32;
   else
     return H5T_NATIVE_INT64;
 }

@@ -3,11 +3,13 @@
 #include "io/hdf5_calls.h"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 namespace mpm
 {
@@ -18,22 +20,37 @@ constexpr std::int64_t table_size = 4096;
 /// Room that is always kept for tables that HDF5 has not written yet, in bytes.
 constexpr std::int64_t table_room = 1 << 18;
 
-/// Reserves space on the disk for the first `size` bytes of a file, which is created if it is not there. A disk that
-/// fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that was written stays.
-/// File systems that cannot reserve are taken at their word.
+/// What is reserved at once beyond what is needed: a quarter of it, between these, in bytes. Each call costs some time.
+constexpr std::int64_t least_ahead = 1 << 20, most_ahead = 1 << 26;
+
+/// Reserves space on the disk for bytes [first, last) of a file, which is created if it is not there; its size stays. A
+/// disk that fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that was
+/// written stays. File systems that cannot reserve are taken at their word.
 /// @return why it cannot be had; empty if it can
-std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t size)
+std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t first, std::int64_t last)
 {
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
   if (file < 0)
     return std::strerror(errno);
   int error = 0;
 #ifdef __linux__
-  if (::fallocate(file, 0, 0, size) != 0 && errno != EOPNOTSUPP)
+  // Room beyond the end of a file does not count as its size yet.
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_FSIZE, &limit) == 0 && static_cast<rlim_t>(last) > limit.rlim_cur)
+    error = EFBIG;
+  else if (::fallocate(file, FALLOC_FL_KEEP_SIZE, first, last - first) != 0 && errno != EOPNOTSUPP)
     error = errno;
 #endif
   ::close(file);
   return error == 0 ? "" : std::strerror(error);
+}
+
+/// Gives back what was reserved beyond the end of a file.
+void release_rest(const std::filesystem::path& path)
+{
+  std::error_code error;
+  if (const auto size = std::filesystem::file_size(path, error); !error)
+    std::filesystem::resize_file(path, size, error); // of no consequence where it fails
 }
 } // namespace
 
@@ -54,11 +71,17 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block) : 
     check();
   const Quiet quiet;
   const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-  H5Pset_fapl_mpio(access, _comm, MPI_INFO_NULL);
+  int size = 1;
+  MPI_Comm_size(_comm, &size);
+  _parallel = size > 1;
+  if (_parallel) // alone, a rank writes four times as fast without MPI in between
+    H5Pset_fapl_mpio(access, _comm, MPI_INFO_NULL);
+  H5Pset_file_locking(access, false, true); // others may read while the run goes on
   const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
   H5Pset_userblock(creation, static_cast<hsize_t>(user_block));
   _file = H5Fcreate(_path.c_str(), H5F_ACC_TRUNC, creation, access);
   note(_file >= 0, "create");
+  _reserved = 0; // what an older file had, HDF5 has given back
   H5Pclose(creation);
   H5Pclose(access);
   check();
@@ -82,11 +105,25 @@ void Hdf5File::note(bool succeeded, const char* doing)
 
 bool Hdf5File::has_room(std::int64_t bytes)
 {
-  _reserved += bytes + table_size;
+  _needed += bytes + table_size;
+  const std::int64_t needed = _needed + table_room;
+  if (needed <= _reserved)
+    return true;
   int rank = 0;
   MPI_Comm_rank(_comm, &rank);
-  const std::string obstacle =
-      shared_failure(_comm, rank == 0 ? reservation_obstacle(_path, _reserved + table_room) : "");
+  std::string obstacle;
+  if (rank == 0)
+  {
+    const std::int64_t ahead = needed + std::clamp(needed / 4, least_ahead, most_ahead);
+    const std::int64_t first = std::exchange(_reserved, ahead);
+    if (!reservation_obstacle(_path, first, ahead).empty())
+    {
+      _reserved = needed;
+      obstacle = reservation_obstacle(_path, first, needed);
+    }
+  }
+  MPI_Bcast(&_reserved, 1, MPI_INT64_T, 0, _comm);
+  obstacle = shared_failure(_comm, obstacle);
   if (!obstacle.empty() && _failure.empty())
     _failure = "cannot write " + _path.string() + ": " + obstacle;
   return obstacle.empty();
@@ -133,7 +170,8 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
   H5Pclose(creation);
   note(dataset >= 0, "write");
   const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
-  H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
+  if (_parallel)
+    H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
   if (dataset >= 0 && rows.total > 0)
     note(H5Dwrite(dataset, native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0, "write");
   if (dataset >= 0)
@@ -164,6 +202,7 @@ void Hdf5File::flush()
 {
   const Quiet quiet;
   note(H5Fflush(_file, H5F_SCOPE_GLOBAL) >= 0, "write");
+  _reserved = 0;
 }
 
 void Hdf5File::check()
@@ -181,10 +220,15 @@ void Hdf5File::close()
     note(H5Fclose(_file) >= 0, "close");
   }
   _file = -1;
+  int rank = 0;
+  MPI_Comm_rank(_comm, &rank);
+  if (rank == 0)
+    release_rest(_path);
   check();
 }
 
 template void Hdf5File::write<float>(const std::string&, const RowSlice&, int, std::span<const float>);
 template void Hdf5File::write<double>(const std::string&, const RowSlice&, int, std::span<const double>);
+template void Hdf5File::write<std::int32_t>(const std::string&, const RowSlice&, int, std::span<const std::int32_t>);
 template void Hdf5File::write<std::int64_t>(const std::string&, const RowSlice&, int, std::span<const std::int64_t>);
 } // namespace mpm

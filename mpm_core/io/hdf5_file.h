@@ -46,7 +46,7 @@ public:
   /// @param name    of the dataset, from the root: "/frames/0/position"
   /// @param rows    this rank's share, from `row_slice`
   /// @param width   values per row; the dataset has the shape (rows.total, width), or (rows.total,) if the width is 1
-  /// @param values  (rows.local, width) row-major; T is float, double or std::int64_t
+  /// @param values  (rows.local, width) row-major; T is float, double, std::int32_t or std::int64_t
   template <class T>
   void write(const std::string& name, const RowSlice& rows, int width, std::span<const T> values);
 
@@ -75,6 +75,8 @@ private:
   std::int64_t _file = -1; ///< hid_t, which is not named here so that only sources of this folder see HDF5
   std::string _failure;    ///< what failed first on this rank; empty if nothing did
   int _compression = 0;
-  std::int64_t _reserved = 0; ///< bytes that the file may have come to need
+  bool _parallel = false;     ///< several ranks write by MPI; one by itself does without
+  std::int64_t _needed = 0;   ///< bytes that the file may have come to need
+  std::int64_t _reserved = 0; ///< bytes that are certain to be had; HDF5 gives the rest back when it flushes
 };
 } // namespace mpm

@@ -20,17 +20,6 @@ std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix
 
 bool is_symmetric_tensor(int components) { return components == 4 || components == 6; }
 
-/// Copies columns [first, first + count) of an (n, width) array into an (n, padded_width) one, zeros after them.
-void copy_columns(std::span<const double> values, int width, int first, int count, int padded_width,
-                  std::vector<double>& columns)
-{
-  const auto n = values.size() / static_cast<std::size_t>(width);
-  columns.assign(n * static_cast<std::size_t>(padded_width), 0.0);
-  for (std::size_t row = 0; row < n; ++row)
-    std::copy_n(&values[row * static_cast<std::size_t>(width) + static_cast<std::size_t>(first)], count,
-                &columns[row * static_cast<std::size_t>(padded_width)]);
-}
-
 /// What is wrong with a field's name or length; empty if nothing is.
 std::string field_error(const std::string& name, int components, std::size_t n_values, std::size_t n_rows)
 {
@@ -104,19 +93,40 @@ void SeriesFile::begin_frame()
   _file.create_group(_group);
 }
 
-XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, int width,
-                                 std::span<const double> values)
+template <class T>
+void SeriesFile::copy_columns(std::span<const double> values, const Columns& from, std::vector<T>& columns)
+{
+  const auto width = static_cast<std::size_t>(from.width), padded = static_cast<std::size_t>(from.padded_width);
+  const std::size_t n = values.size() / width;
+  columns.resize(n * padded);
+  for (std::size_t row = 0; row < n; ++row)
+  {
+    const double* in = &values[row * width + static_cast<std::size_t>(from.first)];
+    T* out = &columns[row * padded];
+    for (std::size_t k = 0; k < padded; ++k)
+      out[k] = k < static_cast<std::size_t>(from.count) ? static_cast<T>(in[k]) : T(0);
+  }
+}
+
+XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
+                                 const Columns& columns)
 {
   const std::string dataset = _group + "/" + name;
   const bool single = _storage.precision == Precision::float32;
+  const int width = columns.padded_width;
   if (single)
   {
     // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
-    _single.assign(values.begin(), values.end());
+    copy_columns(values, columns, _single);
     _file.write<float>(dataset, rows, width, _single);
   }
-  else
+  else if (width == columns.width)
     _file.write<double>(dataset, rows, width, values);
+  else
+  {
+    copy_columns(values, columns, _columns);
+    _file.write<double>(dataset, rows, width, _columns);
+  }
   return {_file.path().filename().string() + ":" + dataset, rows.total, width, false, single ? 4 : 8};
 }
 
@@ -124,17 +134,23 @@ XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& row
                                     std::span<const std::int64_t> values)
 {
   const std::string dataset = _group + "/" + name;
-  _file.write<std::int64_t>(dataset, rows, width, values);
-  return {_file.path().filename().string() + ":" + dataset, rows.total, width, true, 8};
+  int small =
+      std::all_of(values.begin(), values.end(), [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
+  MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
+  if (small)
+  {
+    _integers.assign(values.begin(), values.end());
+    _file.write<std::int32_t>(dataset, rows, width, _integers);
+  }
+  else
+    _file.write<std::int64_t>(dataset, rows, width, values);
+  return {_file.path().filename().string() + ":" + dataset, rows.total, width, true, small ? 4 : 8};
 }
 
 XdmfData SeriesFile::write_points(const std::string& name, const RowSlice& rows, int dimension,
                                   std::span<const double> values)
 {
-  if (dimension == 3)
-    return write_reals(name, rows, 3, values);
-  copy_columns(values, dimension, 0, dimension, 3, _columns);
-  return write_reals(name, rows, 3, _columns);
+  return write_reals(name, rows, values, {dimension, 0, dimension, 3});
 }
 
 std::string SeriesFile::write_fields(const std::string& center, const RowSlice& rows,
@@ -142,17 +158,18 @@ std::string SeriesFile::write_fields(const std::string& center, const RowSlice& 
 {
   std::string text;
   for (const OutputField& field : fields)
-    if (is_symmetric_tensor(field.components))
-      for (int k = 0; k < field.components; ++k)
+  {
+    const int n = field.components;
+    if (is_symmetric_tensor(n))
+      for (int k = 0; k < n; ++k)
       {
         const std::string name = field.name + "_" + component_names[static_cast<std::size_t>(k)];
-        copy_columns(field.values, field.components, k, 1, 1, _columns);
-        text += xdmf_attribute(name, center, write_reals(name, rows, 1, _columns));
+        text += xdmf_attribute(name, center, write_reals(name, rows, field.values, {n, k, 1, 1}));
       }
     else
-      text += xdmf_attribute(field.name, center,
-                             field.components == 2 ? write_points(field.name, rows, 2, field.values)
-                                                   : write_reals(field.name, rows, field.components, field.values));
+      text +=
+          xdmf_attribute(field.name, center, write_reals(field.name, rows, field.values, {n, 0, n, n == 2 ? 3 : n}));
+  }
   return text;
 }
 

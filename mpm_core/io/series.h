@@ -58,6 +58,7 @@ public:
   /// Writes points of 2 or 3 coordinates, padded to 3, into the present group.
   XdmfData write_points(const std::string& name, const RowSlice& rows, int dimension, std::span<const double> values);
 
+  /// Numbers that all fit into 32 bits are stored so.
   XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
                           std::span<const std::int64_t> values);
 
@@ -77,7 +78,17 @@ public:
   MPI_Comm comm() const { return _file.comm(); }
 
 private:
-  XdmfData write_reals(const std::string& name, const RowSlice& rows, int width, std::span<const double> values);
+  /// Which columns of an array go into a dataset, with zeros after them.
+  struct Columns
+  {
+    int width;        ///< of the array
+    int first, count; ///< columns taken
+    int padded_width; ///< of the dataset
+  };
+  template <class T>
+  static void copy_columns(std::span<const double> values, const Columns& from, std::vector<T>& columns);
+  XdmfData write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
+                       const Columns& columns);
   void replace_xdmf(const std::string& text);
 
   Hdf5File _file;
@@ -86,9 +97,10 @@ private:
   Storage _storage;
   std::string _group; ///< group that datasets go into, without trailing slash
   int _n_frames = 0;
-  std::string _frames;          ///< XDMF of the frames so far
-  std::vector<float> _single;   ///< room for a field in single precision
-  std::vector<double> _columns; ///< room for padded vectors and single components
+  std::string _frames;                 ///< XDMF of the frames so far
+  std::vector<std::int32_t> _integers; ///< room for numbers that need no more
+  std::vector<float> _single;          ///< room for a field in single precision
+  std::vector<double> _columns;        ///< the same in double precision, where columns are chosen or padded
 };
 
 /// Particles over time. Their number may change, and ranks may have none.

@@ -56,7 +56,8 @@ class ParticleOutput:
         Args:
             time: s.
             fields: arrays of this rank's particles by name, the same names on all ranks. ``position``, shape (n, 2) or
-                (n, 3) in m, must be among them; whole numbers keep their type as int64. n may differ from rank to rank
+                (n, 3) in m, must be among them; whole numbers are stored
+                as int32 where all of a field fit, else as int64. n may differ from rank to rank
                 and from frame to frame, and may be zero.
 
         Raises:

@@ -1,0 +1,289 @@
+"""Probes: histories of some particles, of points in space, of section forces and of totals, as CSV files.
+
+A probe looks at a model; a `ProbeFile` adds a row for each look to a file that pandas, spreadsheets and gnuplot read. Names of
+columns end in their unit. All is collective, and the same on any number of ranks.
+
+Example:
+    >>> crest = ParticleProbe(model, [(1.1, 1.0)])
+    >>> section = SectionProbe(model, point=(2.1, 0.0), normal=(1, 0))
+    >>> with ProbeFile("crest.csv", crest) as crests, ProbeFile("section.csv", section) as sections:
+    ...     for report in model.explicit(until=10.0, every=0.1):
+    ...         crests.record()
+    ...         sections.record()
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from types import TracebackType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import InputError
+from .collective import collectively
+from .mesh import floats
+from .model import Model
+
+AXES = ("x", "y", "z")
+STRESSES = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "yz", "xz")}
+
+
+class Probe(Protocol):
+    """What a `ProbeFile` can record."""
+
+    @property
+    def model(self) -> Model:
+        """What it looks at."""
+
+    def values(self) -> dict[str, float]:
+        """Numbers by name of column, the same on all ranks; the first is ``time_s``. Collective."""
+
+
+def _components(name: str, unit: str, parts: tuple[str, ...]) -> list[str]:
+    return [f"{name}_{part}_{unit}" for part in parts]
+
+
+def _vectors(dim: int, *names: tuple[str, str]) -> list[str]:
+    return [column for name, unit in names for column in _components(name, unit, AXES[:dim])]
+
+
+def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
+    """A number for each row and column; the columns of row k end in ``_k`` before their unit when there are several rows."""
+    found = {}
+    for k, row in enumerate(rows):
+        for column, value in zip(columns, row, strict=True):
+            name, unit = column.rsplit("_", 1)
+            found[column if len(rows) == 1 else f"{name}_{k}_{unit}"] = float(value)
+    return found
+
+
+class ParticleProbe:
+    """Follows the particles that started nearest to some points: position, displacement, velocity and stress.
+
+    Args:
+        model: the model, seeded.
+        points: [m], shape (n, D).
+
+    Raises:
+        InputError: points of another shape, or a model without particles.
+    """
+
+    def __init__(self, model: Model, points: ArrayLike) -> None:
+        self.model = model
+        places = collectively(model.comm, lambda: floats("points", points, (None, model.mesh.dim)))
+        start, ids = model.particles.initial_position, model.particles.id
+        self.ids: list[int] = []
+        """Numbers of the particles."""
+        for place in places:
+            distance = np.linalg.norm(start - place, axis=1)
+            # Of several as near as each other the one with the lowest number, on any partition.
+            mine = (np.inf, -1)
+            if len(distance):
+                near = distance <= distance.min() * (1 + 1e-12)
+                mine = (float(distance.min()), int(ids[near].min()))
+            found = model.comm.allgather(mine)
+            least = min(distance for distance, _ in found)
+            if not np.isfinite(least):
+                raise InputError("the model has no particles, seed some first")
+            self.ids.append(min(number for distance, number in found if distance <= least * (1 + 1e-12)))
+        dim = model.mesh.dim
+        self._columns = _vectors(dim, ("position", "m"), ("displacement", "m"), ("velocity", "m/s"))
+        self._columns += _components("stress", "Pa", STRESSES[dim])
+
+    def values(self) -> dict[str, float]:
+        """Numbers by name; NaN for a particle that flowed out."""
+        p, comm = self.model.particles, self.model.comm
+        here = np.flatnonzero(np.isin(p.id, self.ids))
+        fields = [p.position, p.displacement, p.velocity, p.stress]
+        mine = {int(p.id[k]): np.concatenate([field[k] for field in fields]) for k in here}
+        found = {number: row for part in comm.allgather(mine) for number, row in part.items()}
+        absent = np.full(len(self._columns), np.nan)
+        rows = np.array([found.get(number, absent) for number in self.ids])
+        return {"time_s": self.model.time, **_numbered(rows, self._columns)}
+
+
+class PointProbe:
+    """Stays at points of space: how full the cell there is, and mean velocity and stress of the particles in it.
+
+    Args:
+        model: the model.
+        points: [m], shape (n, D), inside the mesh.
+
+    Raises:
+        InputError: points of another shape, or outside of the mesh.
+    """
+
+    def __init__(self, model: Model, points: ArrayLike) -> None:
+        self.model = model
+        self._points = collectively(model.comm, lambda: floats("points", points, (None, model.mesh.dim)))
+        outside = np.flatnonzero(model.comm.allreduce((self._own_cells() >= 0).astype(int)) == 0)
+        if len(outside):
+            raise InputError(f"points has {self._points[outside[0]]} at row {outside[0]}, which is outside of the mesh")
+        dim = model.mesh.dim
+        self._columns = [
+            "filled_share",
+            *_vectors(dim, ("velocity", "m/s")),
+            *_components("stress", "Pa", STRESSES[dim]),
+        ]
+
+    def _own_cells(self) -> NDArray[np.int32]:
+        mesh = self.model.mesh
+        cells = mesh.cells_of(self._points)
+        return np.where(cells < mesh.owned_cells, cells, -1)
+
+    def values(self) -> dict[str, float]:
+        """Numbers by name; velocity and stress are NaN in an empty cell."""
+        model, p = self.model, self.model.particles
+        sums = np.zeros(
+            (len(self._points), 2 + len(self._columns))
+        )  # ranks that have it, volumes of cell and soil, the rest
+        cell_of, volume = p.cell, p.volume
+        for k, cell in enumerate(self._own_cells()):
+            if cell < 0:
+                continue
+            inside = cell_of == cell
+            v = volume[inside, None]
+            moments = np.concatenate([(v * p.velocity[inside]).sum(axis=0), (v * p.stress[inside]).sum(axis=0)])
+            sums[k] = [1.0, model.mesh.cell_volumes[cell], v.sum(), *moments]
+        # A point on a side between the cells of two ranks is seen by both: the mean of the two.
+        sums = model.comm.allreduce(sums)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rows = np.column_stack([sums[:, 2] / sums[:, 1], sums[:, 3:] / sums[:, 2:3]])
+        return {"time_s": model.time, **_numbered(rows, self._columns)}
+
+
+class SectionProbe:
+    """Force that acts across a plane (a line, in two dimensions), from the particles' stresses in the cells that it cuts.
+
+    The traction sigma . n is taken over the cut cells with the weight that rises from 0 at their nodes behind the plane to 1 at
+    those before it: sum_c (sum_p V_p sigma_p) . grad w. So the force balances, to round-off, the nodal forces on either side.
+
+    Args:
+        model: the model.
+        point: [m], shape (D,), a point of the plane.
+        normal: direction of any length, shape (D,). A positive normal force is tension.
+        box: two opposite corners [m], shape (2, D); only cells whose centre lies between them count. By default all do.
+
+    Raises:
+        InputError: arguments of another shape, or a normal without length.
+    """
+
+    def __init__(self, model: Model, *, point: ArrayLike, normal: ArrayLike, box: ArrayLike | None = None) -> None:
+        self.model, dim = model, model.mesh.dim
+        self._point, self._normal = floats("point", point, (dim,)), floats("normal", normal, (dim,))
+        length = float(np.linalg.norm(self._normal))
+        if length == 0:
+            raise InputError("normal of the section has no length, expected a direction")
+        self._normal /= length
+        self._box = None if box is None else np.sort(floats("box", box, (2, dim)), axis=0)
+
+    def values(self) -> dict[str, float]:
+        """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
+        model, mesh, dim = self.model, self.model.mesh, self.model.mesh.dim
+        corners = mesh.points[mesh.cells[: mesh.owned_cells]]
+        before = (corners - self._point) @ self._normal > 0
+        cut = before.any(axis=1) & ~before.all(axis=1)
+        if self._box is not None:
+            centres = corners.mean(axis=1)
+            cut &= ((centres >= self._box[0]) & (centres <= self._box[1])).all(axis=1)
+        cells = np.flatnonzero(cut)
+        edges = corners[cells, 1:] - corners[cells, :1]
+        rising = (before[cells, 1:].astype(float) - before[cells, :1])[..., None]
+        gradient = np.linalg.solve(edges, rising)[..., 0]  # of w
+        p = model.particles
+        inside = np.flatnonzero(cut[p.cell])
+        number = np.searchsorted(cells, p.cell[inside])
+        stress = _matrices(p.stress[inside], dim) * p.volume[inside, None, None]
+        mine = np.einsum("pij,pj->i", stress, gradient[number])
+        force = np.empty(dim)
+        model.comm.Allreduce(mine, force)
+        along = {"force_normal_N": float(force @ self._normal)}
+        names = _components("force", "N", AXES[:dim])
+        return {"time_s": model.time, **dict(zip(names, force.tolist(), strict=True)), **along}
+
+
+def _matrices(stress: NDArray, dim: int) -> NDArray[np.float64]:
+    """Stresses in the plane or in space as matrices, shape (n, D, D)."""
+    places = [[0, 3], [3, 1]] if dim == 2 else [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
+    return stress[:, np.array(places)]
+
+
+class TotalsProbe:
+    """Particles, mass, momentum, energies and the out-of-balance ratio of the whole model."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    def values(self) -> dict[str, float]:
+        """Numbers by name; see `Report`."""
+        report, dim = self.model.report(), self.model.mesh.dim
+        momentum = dict(zip(_components("momentum", "N.s", AXES[:dim]), report.momentum, strict=True))
+        energies = ("kinetic_energy", "external_work", "internal_work", "damping_work", "support_work")
+        return {
+            "time_s": report.time, "steps": report.steps, "dt_s": report.dt, "particles": report.particles,
+            "mass_kg": report.mass, **momentum, **{f"{name}_J": getattr(report, name) for name in energies},
+            "unbalanced_ratio": report.unbalanced_ratio, "plastic_share": report.plastic_share,
+        }  # fmt: skip
+
+
+class ProbeFile:
+    """A CSV file with a row for each look of a probe, on disk as soon as it was taken; a context manager.
+
+    Args:
+        path: of the file; the first rank writes.
+        probe: what is recorded.
+        keep: keep the rows before the model's present time that a file of that name has, as after a restart; otherwise it is
+            replaced.
+
+    Raises:
+        InputError: on all ranks, with path and reason, when the file cannot be written, or has other columns to keep.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], probe: Probe, *, keep: bool = False) -> None:
+        self._probe, self._comm = probe, probe.model.comm
+        self._file: Any = None
+        columns = list(probe.values())
+        collectively(self._comm, lambda: self._open(os.fspath(path), columns, keep))
+
+    def _open(self, path: str, columns: list[str], keep: bool) -> None:
+        if self._comm.rank != 0:
+            return
+        try:
+            rows = _rows_before(path, columns, self._probe.model.time) if keep and os.path.exists(path) else []
+            self._file = open(path, "w", newline="", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"path: cannot write {path}: {error.strerror}") from None
+        self._writer = csv.writer(self._file)
+        self._writer.writerows([columns, *rows])
+        self._file.flush()
+
+    def record(self) -> None:
+        """Look, and add a row. Collective."""
+        values = self._probe.values()
+        if self._file is not None:
+            self._writer.writerow([f"{value:.9g}" for value in values.values()])
+            self._file.flush()
+
+    def close(self) -> None:
+        """Close the file; nothing can be recorded after that."""
+        if self._file is not None:
+            self._file.close()
+
+    def __enter__(self) -> ProbeFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _rows_before(path: str, columns: list[str], time: float) -> list[list[str]]:
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if rows and rows[0] != columns:
+        raise InputError(f"path: {path} has the columns {', '.join(rows[0])}; expected {', '.join(columns)}")
+    return [row for row in rows[1:] if len(row) == len(columns) and float(row[0]) < time * (1 - 1e-9)]
