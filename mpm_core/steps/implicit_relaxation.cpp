@@ -91,6 +91,9 @@ constexpr double mass_share(RelaxationKind kind)
     return 0.5;
   case RelaxationKind::local:
     return 0.25 * (1 + local_damping_share);
+  case RelaxationKind::kinetic: // so that half a pseudo-step from rest brings the fastest mode to its end, and not
+                                // beyond
+    return 0.5;
   default:
     return 0.25;
   }
@@ -126,6 +129,22 @@ double critical_damping(const Model<D>& model, const ImplicitStep<D>& step, cons
   return mass > 0 ? std::min(1.9, 2 * std::sqrt(std::max(0.0, stiffness / mass))) : 0;
 }
 
+/// Damping of the kind in the next iteration. Kinetic: 1 where the body has passed a peak of its kinetic energy, as the
+/// power of the residual says, else 0.
+template <int D>
+double next_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
+{
+  switch (relaxation.kind)
+  {
+  case RelaxationKind::viscous:
+    return critical_damping(model, step, relaxation);
+  case RelaxationKind::kinetic:
+    return nodal_sum(model, [&](std::size_t i) { return dot<D>(relaxation.rate[i], step.residual[i]); }) < 0 ? 1 : 0;
+  default:
+    return local_damping_share;
+  }
+}
+
 /// The next w of one node.
 template <int D>
 Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>& residual, double mass, double damping)
@@ -141,8 +160,9 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
       next[a] =
           rate[a] + (residual[a] - (rate[a] == 0 ? 0 : std::copysign(damping * std::abs(residual[a]), rate[a]))) / mass;
       break;
-    case RelaxationKind::kinetic: // where it has passed the peak of its kinetic energy, it begins anew from rest
-      next[a] = rate[a] * residual[a] < 0 ? 0.5 * residual[a] / mass : rate[a] + residual[a] / mass;
+    case RelaxationKind::kinetic:
+      next[a] =
+          damping > 0 ? 0.5 * residual[a] / mass : rate[a] + residual[a] / mass; // from rest, at half a pseudo-step
       break;
     case RelaxationKind::viscous:
       next[a] = ((2 - damping) * rate[a] + 2 * residual[a] / mass) / (2 + damping);
@@ -172,9 +192,7 @@ int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, dou
   while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale &&
          relaxation.report.failed == 0)
   {
-    double damping = local_damping_share;
-    if (relaxation.kind == RelaxationKind::viscous)
-      damping = critical_damping(model, step, relaxation);
+    const double damping = next_damping(model, step, relaxation);
     for (std::size_t i = 0; i < relaxation.rate.size(); ++i)
     {
       if (!step.active[i])

@@ -25,8 +25,8 @@ enum class RelaxationKind
 {
   richardson, ///< (21) as it is
   local,      ///< second order, local damping beta |r| sign(w); M_DR is larger by 1 + beta
-  kinetic, ///< second order, each component of w set to zero where it has passed a peak of its kinetic energy, w r < 0
-  viscous  ///< second order, viscous damping critical for the lowest mode by Rayleigh's quotient (Underwood 1983)
+  kinetic,    ///< second order, w set to zero where the body has passed a peak of its kinetic energy, sum w r < 0
+  viscous     ///< second order, viscous damping critical for the lowest mode by Rayleigh's quotient (Underwood 1983)
 };
 
 /// A relaxation under way.

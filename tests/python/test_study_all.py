@@ -19,6 +19,7 @@ SMALL = {
     "balance": "--cell-size 0.5 --mesh fitted --particles-per-cell 1 --time 0.02 --frames 2",
     "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
+    "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "element_test": "--steps 5",
     "footing": "--cell-size 0.25 --meshes 1 --elements P1",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",

@@ -1,0 +1,260 @@
+"""What equilibrium costs: explicit scheme, transient relaxation and Newton's method, in drained and in undrained soil.
+
+The slope under 20 kN/m3 is brought to an out-of-balance ratio of 1e-6 in two ways. Drained: from zero stress. Undrained: the
+slope stands drained under --initial-unit-weight, and gets the rest too quickly for the water to drain; pore water makes the
+soil so stiff that the critical time step shrinks by two orders. The explicit scheme is damped locally; the others take
+quasi-static steps. Each run has a limit of processor time; where it is used up, the table has a lower bound. A further table has
+the iterations of every solver in one implicit step from zero stress. On one rank.
+"""
+
+from __future__ import annotations
+
+import csv
+import signal
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common.options import add_count, add_number, study_parser
+from common.page import Page
+from common.plots import CURVES, WIDTH, paper_style
+from common.ranks import run_study
+from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, solved_fem
+from common.summary import OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+SOILS = ("drained", "undrained")
+SOLVERS: dict[str, Callable[[], Any]] = {
+    "Newton": mpm.Newton,
+    "viscous relaxation": lambda: mpm.Relaxation(mpm.RelaxationKind.VISCOUS),
+    "local relaxation": lambda: mpm.Relaxation(mpm.RelaxationKind.LOCAL),
+    "kinetic relaxation": lambda: mpm.Relaxation(mpm.RelaxationKind.KINETIC),
+    "Richardson (the paper's)": lambda: mpm.Relaxation(mpm.RelaxationKind.RICHARDSON),
+}
+LONGEST = 1e4
+"""[s] of soil's time that the explicit scheme may take, which no run needs"""
+MULTIPLES = (20, 200, 2000)
+"""Steps of the second table over the critical one"""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_slope_options(p)
+    p.set_defaults(unit_weight=20e3, particles_per_cell=3, water_modulus=2.2e9, porosity=0.5)
+    add_count(p, "--meshes", 3, "meshes, each with cells half as large as the one before")
+    add_number(p, "--initial-unit-weight", 19e3, "N/m3", "unit weight carried before the undrained load", above=0)
+    add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
+    add_number(p, "--tolerance", 1e-6, "-", "out-of-balance ratio to reach", above=0)
+    add_number(p, "--limit", 120.0, "s", "processor time of one run", above=0)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check_slope_options(p, options)
+    return options
+
+
+# --- 2. Runs ---------------------------------------------------------------------------------------------------------
+
+
+class TimeUp(Exception):
+    """The run has used up its processor time."""
+
+
+def limited(work: Callable[[], Any], limit: float) -> tuple[float, bool]:
+    """Processor time of some work [s], and whether it came to its end within a limit [s]."""
+
+    def end(*_: object) -> None:
+        raise TimeUp
+
+    before = signal.signal(signal.SIGPROF, end)
+    started = process_time()
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    try:
+        work()
+        return process_time() - started, True
+    except TimeUp:
+        return process_time() - started, False
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def prepared(a: Namespace, soil: str, stress: np.ndarray | None) -> SlopeCase:
+    """The slope with its stresses at the start, out of balance."""
+    case = build_slope(Namespace(**{**vars(a), "undrained": soil == "undrained"}), comm)
+    if stress is not None:
+        case.model.particles.set("stress", stress)
+    return case
+
+
+def initial_stress(a: Namespace, soil: str) -> np.ndarray | None:
+    """Stresses of drained equilibrium under the initial unit weight; none where the soil starts without stress."""
+    if soil == "drained":
+        return None
+    case = prepared(a, "drained", None)
+    return solved_fem(case, a.initial_unit_weight).evaluate_at(case.model.particles.position)["stress"]
+
+
+def settled_explicitly(a: Namespace, model: mpm.Model) -> None:
+    """Damped motion until the particles balance their weight; looks after as many steps as a wave takes through the slope."""
+    every = 100 * model.critical_time_step()
+    for report in model.explicit(LONGEST, every=every, damping=a.damping):
+        if report.unbalanced_ratio <= a.tolerance:
+            return
+
+
+def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> dict[str, object]:
+    """One row of the table: what it took one method to bring the slope to equilibrium."""
+    case = prepared(a, soil, stress)
+    model, iterations = case.model, [0]
+    if name == "explicit":
+        seconds, reached = limited(lambda: settled_explicitly(a, model), a.limit)
+        iterations[0] = model.steps
+    else:
+        solver = Counting(SOLVERS[name](), iterations)
+        work = lambda: model.equilibrate(solver=solver, tolerance=a.tolerance, max_steps=100)
+        seconds, reached = limited(work, a.limit)
+    watched = case.crest_particle()
+    particles = model.particles
+    crest = float(np.linalg.norm(particles.displacement[particles.id == watched], axis=1).max())
+    return {
+        "soil": soil, "method": name, "cell_size_m": a.cell_size, "particles": len(particles),
+        "cells": len(particles) // a.particles_per_cell, "reached": reached, "cpu_seconds": seconds,
+        "force_evaluations": iterations[0], "out_of_balance_ratio": model.out_of_balance(), "crest_displacement_m": crest,
+    }  # fmt: skip
+
+
+class Counting:
+    """A solver that counts evaluations of forces: one for each iteration and one at the start of each step."""
+
+    def __init__(self, solver: Any, count: list[int]) -> None:
+        self._solver, self._count = solver, count
+
+    def solver(self, ranks: MPI.Comm, dim: int) -> Counting:
+        """What solves the steps of a run."""
+        self._inner = self._solver.solver(ranks, dim)
+        return self
+
+    def solve(self, step: Any, dt: float, changed: bool) -> Any:
+        """As the solver does it."""
+        solution = self._inner.solve(step, dt, changed)
+        self._count[0] += solution.iterations + 1
+        return solution
+
+
+def one_step(a: Namespace, name: str, multiple: float) -> dict[str, object]:
+    """Iterations and time of one implicit step from zero stress, some multiple of the critical one long."""
+    model = prepared(a, "drained", None).model
+    dt = multiple * model.critical_time_step()
+    reports: list[Any] = []
+    seconds, reached = limited(lambda: reports.extend(model.implicit(dt, dt=dt, solver=SOLVERS[name]())), a.limit)
+    return {
+        "method": name, "cell_size_m": a.cell_size, "step_over_critical": multiple, "reached": reached,
+        "iterations": sum(report.iterations for report in reports), "steps": len(reports), "cpu_seconds": seconds,
+    }  # fmt: skip
+
+
+# --- 3. Tables and pictures ------------------------------------------------------------------------------------------
+
+
+def save_table(path: Path, rows: list[dict]) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def save_costs(path: Path, rows: list[dict]) -> None:
+    """Time and work over the number of cells; hollow markers with an arrow are lower bounds."""
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    quantities = {"Processor time [s]": lambda r: r["cpu_seconds"],
+                  "Force evaluations × particles": lambda r: max(r["force_evaluations"], 1) * r["particles"]}  # fmt: skip
+    with paper_style():
+        figure, panels = plt.subplots(2, 2, figsize=(WIDTH, 5.6), sharex=True, sharey="row")
+        figure.subplots_adjust(left=0.11, right=0.985, bottom=0.19, top=0.95, wspace=0.05, hspace=0.08)
+        for axes, (soil, (label, of)) in zip(panels.T.ravel(), [(s, q) for s in SOILS for q in quantities.items()]):
+            for method, colour in zip(methods, CURVES):
+                mine = [row for row in rows if row["soil"] == soil and row["method"] == method]
+                cells, values = [row["cells"] for row in mine], [of(row) for row in mine]
+                axes.loglog(cells, values, color=colour, linewidth=1.1, label=method)
+                for row, x, y in zip(mine, cells, values):
+                    axes.plot(x, y, "o", color=colour, markersize=4, fillstyle="full" if row["reached"] else "none")
+                    if not row["reached"]:
+                        axes.annotate("", (x, 1.8 * y), (x, y), arrowprops={"arrowstyle": "->", "color": colour})
+            axes.grid(linewidth=0.3, color="#d0d0d0")
+            if soil == SOILS[0]:
+                axes.set_ylabel(label)
+        for axes, soil in zip(panels[0], SOILS):
+            axes.set_title(soil.capitalize(), loc="left")
+        for axes in panels[1]:
+            axes.set_xlabel("Cells of soil")
+        handles, names = panels[0][0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="lower center", ncols=3)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def speed_up(rows: list[dict]) -> dict[str, float]:
+    """How many times longer the explicit scheme takes than Newton's method on the finest mesh, at least, for each soil."""
+    finest = max(row["cells"] for row in rows)
+    time = {(row["soil"], row["method"]): row["cpu_seconds"] for row in rows if row["cells"] == finest}
+    return {soil: time[soil, "explicit"] / time[soil, "Newton"] for soil in SOILS}
+
+
+def tell(rows: list[dict]) -> None:
+    """The rows as text; lower bounds are marked."""
+    for row in rows:
+        bound = "  " if row["reached"] else "> "
+        place = row.get("soil", f"{row.get('step_over_critical', 0):g} dt_cr")
+        count = row.get("force_evaluations", row.get("iterations"))
+        print(f"{place:10} {row['method']:25} h {row['cell_size_m']:<7g} {bound}{row['cpu_seconds']:9.3f} s  {count:9} evaluations  "
+              f"{row.get('out_of_balance_ratio', 0):.1e}", flush=True)  # fmt: skip
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    if comm.size > 1:
+        raise mpm.InputError(f"the study cost measures one processor, but runs on {comm.size} ranks")
+    folder = results_folder("cost", a.output, comm)
+    rows, steps = [], []
+    for level in range(a.meshes):
+        mesh = Namespace(**{**vars(a), "cell_size": a.cell_size / 2**level})
+        for soil in SOILS:
+            stress = initial_stress(mesh, soil)
+            for name in ("explicit", *SOLVERS):
+                rows.append(measured(mesh, soil, name, stress))
+                tell(rows[-1:])
+        for multiple in MULTIPLES:
+            for name in SOLVERS:
+                steps.append(one_step(mesh, name, multiple))
+                tell(steps[-1:])
+    save_table(folder / "equilibrium.csv", rows)
+    save_table(folder / "steps.csv", steps)
+    save_costs(folder / "cost.png", rows)
+    ratios = speed_up(rows)
+    results = {f"explicit_over_newton_{soil}_seconds_ratio": ratio for soil, ratio in ratios.items()}
+    captions = {"cost": "Cost of equilibrium; hollow markers with an arrow are lower bounds."}
+    write_summary(folder, a, {**results, "equilibrium": rows, "steps": steps}, comm, Page(captions=captions))
+    print(f"results in {folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)
