@@ -221,8 +221,8 @@ def tell(rows: list[dict]) -> None:
         bound = "  " if row["reached"] else "> "
         place = row.get("soil", f"{row.get('step_over_critical', 0):g} dt_cr")
         count = row.get("force_evaluations", row.get("iterations"))
-        print(f"{place:10} {row['method']:25} h {row['cell_size_m']:<7g} {bound}{row['cpu_seconds']:9.3f} s  {count:9} evaluations  "
-              f"{row.get('out_of_balance_ratio', 0):.1e}", flush=True)  # fmt: skip
+        print(f"{place:10} {row['method']:25} h {row['cell_size_m']:<7g} {bound}{row['cpu_seconds']:9.3f} s  "
+              f"{count:9} evaluations  {row.get('out_of_balance_ratio', 0):.1e}", flush=True)  # fmt: skip
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------

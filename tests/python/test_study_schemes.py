@@ -38,7 +38,7 @@ def test_quasi_static_slope_carries_what_it_can(tmp_path):
 
 
 def test_both_schemes_side_by_side(tmp_path):
-    result, summary = study("slope_schemes", tmp_path, "--time", "2", "--implicit-time", "1",
+    result, summary = study("slope_schemes", tmp_path, "--time", "1",
                             "--longer-steps", "1", "--frames", "5")  # fmt: skip
     assert result.returncode == 0, result.stderr
     assert {path.name for path in tmp_path.glob("*.png")} == {
