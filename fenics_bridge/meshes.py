@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import signal
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
-import gmsh
 import numpy as np
 
+from fenics_bridge import gmsh_reader
 from fenics_bridge.errors import InputError, agree, on_root
 from fenics_bridge.mesh_checks import check_cells_fit
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
-
-_SIMPLEX = {2: "triangles", 3: "tetrahedra"}
-_GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh
 
 
 def read_mesh(path, comm, dim=2, parameters=None):
@@ -36,39 +33,13 @@ def read_mesh(path, comm, dim=2, parameters=None):
     return distributed_mesh(comm, arrays if arrays is not None else empty_arrays(dim), dim)
 
 
-@contextlib.contextmanager
-def gmsh_session():
-    """gmsh, silent; its handling of Ctrl-C is undone."""
-    handler = signal.getsignal(signal.SIGINT)
-    gmsh.initialize(["gmsh", "-v", "0"], False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        yield gmsh.model
-    finally:
-        gmsh.finalize()
-        signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
-
-
 def arrays_from_model(dim, name):
     """MeshArrays of gmsh's current model; `name` stands for the model in error messages."""
-    cells, cell_values = _entities(dim, name)
-    check_cells_fit(cells, name)
-    facets, facet_values = _entities(dim - 1, name, only_groups=True)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    points = coordinates.reshape(-1, 3)
-    if dim == 2 and np.ptp(points[np.isin(tags, cells), 2]) > 1e-9 * np.ptp(points):
-        raise InputError(f"{name}: dim=2 expects a plane mesh, but the nodes have different z")
-    order = np.argsort(tags)
-    used = np.unique(cells)
-    rows = order[np.searchsorted(tags, used, sorter=order)]
-    inside = np.isin(facets, used).all(axis=1)
-    return MeshArrays(
-        points[rows, :dim],
-        np.searchsorted(used, cells),
-        cell_values,
-        np.searchsorted(used, facets[inside]),
-        facet_values[inside],
-    )
+    try:
+        arrays = gmsh_reader.model_arrays(dim)
+    except gmsh_reader.MeshError as error:
+        raise InputError(f"{name}: {error}") from error
+    return _mesh_arrays(arrays, name)
 
 
 def _check_arguments(comm, path, dim, parameters):
@@ -93,19 +64,30 @@ def _arrays_from_file(path, dim, parameters):
     if path.suffix.lower() == ".msh" and not text.lstrip().startswith(b"$MeshFormat"):
         raise InputError(f"path: {str(path)!r} is not a gmsh mesh (it does not begin with $MeshFormat)")
     constants = _constants(parameters, text, path)
-    with gmsh_session(), tempfile.TemporaryDirectory() as folder:
-        try:
-            gmsh.open(str(_with_constants(path, constants, folder)))
-            if path.suffix.lower() == ".geo":
-                gmsh.model.mesh.generate(dim)
-        except Exception as error:  # gmsh's Python interface raises nothing more special
-            raise InputError(f"path: gmsh cannot read {str(path)!r}: {gmsh_message(error)}") from error
-        return arrays_from_model(dim, str(path))
+    with tempfile.TemporaryDirectory() as folder:
+        arrays = _read_apart(_with_constants(path, constants, folder), dim, Path(folder) / "arrays.npz", str(path))
+    return _mesh_arrays(arrays, str(path))
 
 
-def gmsh_message(error):
-    """What gmsh says about an error, on one line."""
-    return " ".join(str(error).split()) or gmsh.logger.getLastError()
+def _read_apart(path, dim, result, name):
+    """What `gmsh_reader.read_file` gives, by a process of its own."""
+    reader = subprocess.run([sys.executable, gmsh_reader.__file__, str(path), str(dim), str(result)],
+                            stdin=subprocess.DEVNULL, capture_output=True, text=True)  # fmt: skip
+    if reader.returncode == gmsh_reader.REFUSED:
+        raise InputError(f"path: {name!r}: {reader.stderr.strip()}")
+    if reader.returncode != 0:
+        how = f"signal {-reader.returncode}" if reader.returncode < 0 else f"code {reader.returncode}"
+        last = reader.stderr.strip().rsplit("\n", 1)[-1]
+        raise InputError(
+            f"path: gmsh crashed while it read {name!r} ({how}{': ' + last if last else ''}); it is damaged"
+        )
+    with np.load(result) as arrays:
+        return dict(arrays)
+
+
+def _mesh_arrays(arrays, name):
+    check_cells_fit(arrays["cells"], name)
+    return MeshArrays(*(arrays[key] for key in ("points", "cells", "cell_values", "facets", "facet_values")))
 
 
 def _constants(parameters, text, path):
@@ -128,44 +110,3 @@ def _with_constants(path, constants, folder):
     wrapper = Path(folder) / "with_constants.geo"
     wrapper.write_text(f'{constants}Include "{path.resolve()}";\n')
     return wrapper
-
-
-def _entities(dim, name, only_groups=False):
-    """Node tags (m, dim + 1) and physical groups (m,) of the model's elements of one dimension."""
-    groups = gmsh.model.getPhysicalGroups(dim)
-    blocks = [(entity, tag) for _, tag in groups for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
-    twice = len(blocks) != len({entity for entity, _ in blocks})
-    if twice:
-        raise InputError(f"{name}: an entity of dimension {dim} is in two physical groups; a tag must be single")
-    if not groups and not only_groups:
-        blocks = [(entity, 0) for _, entity in gmsh.model.getEntities(dim)]
-    nodes, values = [np.empty((0, dim + 1), np.int64)], [np.empty(0, np.int32)]
-    for entity, tag in blocks:
-        for kind, _, element_nodes in zip(*gmsh.model.mesh.getElements(dim, entity)):
-            _check_element(kind, dim, name)
-            nodes.append(np.asarray(element_nodes, dtype=np.int64).reshape(-1, dim + 1))
-            values.append(np.full(len(nodes[-1]), tag, dtype=np.int32))
-    if not only_groups:
-        _check_cells(nodes, dim, name)
-    return np.concatenate(nodes), np.concatenate(values)
-
-
-def _check_element(kind, dim, name):
-    if kind == _GMSH_SIMPLEX[dim]:
-        return
-    text, _, order, *_ = gmsh.model.mesh.getElementProperties(kind)
-    if order > 1:
-        raise InputError(f"{name}: has elements of order {order} ({text}), expected straight ones (order 1)")
-    expected = _SIMPLEX.get(dim, "lines")
-    raise InputError(f"{name}: has elements of type {text!r}, expected only {expected}")
-
-
-def _check_cells(nodes, dim, name):
-    found = sum(len(block) for block in nodes)
-    higher = dim == 2 and len(gmsh.model.mesh.getElements(3)[0]) > 0
-    if higher:
-        raise InputError(f"{name}: has cells of dimension 3, but dim=2 was asked for")
-    if not found:
-        lower = dim == 3 and len(gmsh.model.mesh.getElements(2)[0]) > 0
-        detail = ", its cells have dimension 2" if lower else ""
-        raise InputError(f"{name}: has no cells of dimension {dim}{detail}")

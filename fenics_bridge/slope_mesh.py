@@ -8,7 +8,8 @@ import gmsh
 import numpy as np
 
 from fenics_bridge.errors import InputError, on_root
-from fenics_bridge.meshes import arrays_from_model, gmsh_message, gmsh_session
+from fenics_bridge.gmsh_reader import gmsh_message, gmsh_session
+from fenics_bridge.meshes import arrays_from_model
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 SOIL, EMPTY = 1, 2

@@ -7,7 +7,7 @@ from bridge_cases import MESHES
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-from fenics_bridge.meshes import gmsh_session
+from fenics_bridge.gmsh_reader import gmsh_session
 from fenics_bridge.tagged import owned_cells, tag_values
 
 COMM = MPI.COMM_WORLD

@@ -50,9 +50,9 @@ def damaged(data, draw):
 
 
 def test_damaged_files_end_in_a_clear_error(good_files, tmp_path):
-    # A few in a thousand such files crash gmsh itself; these seeds do not.
+    # Files of the last three seeds crash gmsh 4.8, which must not end this process.
     refused = 0
-    for seed in range(200):
+    for seed in (*range(12), 311, 375, 566):
         draw = random.Random(seed)
         path = tmp_path / "bad.msh"
         path.write_bytes(damaged(draw.choice(good_files), draw))
@@ -61,7 +61,7 @@ def test_damaged_files_end_in_a_clear_error(good_files, tmp_path):
         except mpm.InputError as error:
             refused += 1
             assert len(str(error)) > 20
-    assert refused > 100
+    assert refused > 10
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,125 @@
+"""A mesh as gmsh has it, as plain arrays; also by a process of its own, since gmsh crashes on some damaged files.
+
+Nothing of this package is imported here, so that such a process starts quickly and knows nothing of MPI.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+_SIMPLEX = {2: "triangles", 3: "tetrahedra"}
+_GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh
+REFUSED = 3
+"""Exit code of the process when the mesh cannot be used; the reason is on its standard error."""
+
+
+class MeshError(Exception):
+    """A mesh that cannot be used; says why."""
+
+
+@contextlib.contextmanager
+def gmsh_session():
+    """gmsh, silent; its handling of Ctrl-C is undone."""
+    handler = signal.getsignal(signal.SIGINT)
+    gmsh.initialize(["gmsh", "-v", "0"], False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        yield gmsh.model
+    finally:
+        gmsh.finalize()
+        signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
+
+
+def gmsh_message(error):
+    """What gmsh says about an error, on one line."""
+    return " ".join(str(error).split()) or gmsh.logger.getLastError()
+
+
+def read_file(path, dim):
+    """Arrays of a file, see `model_arrays`; a .geo file is meshed."""
+    with gmsh_session():
+        try:
+            gmsh.open(str(path))
+            if path.suffix.lower() == ".geo":
+                gmsh.model.mesh.generate(dim)
+        except Exception as error:  # gmsh's Python interface raises nothing more special
+            raise MeshError(f"gmsh cannot read it: {gmsh_message(error)}") from error
+        return model_arrays(dim)
+
+
+def model_arrays(dim):
+    """gmsh's current model: points (n, dim), cells (m, dim + 1), cell_values (m,), facets (k, dim), facet_values (k,).
+
+    Cells and facets are rows of points. Raises MeshError.
+    """
+    cells, cell_values = _entities(dim)
+    facets, facet_values = _entities(dim - 1, only_groups=True)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    points = coordinates.reshape(-1, 3)
+    if not np.isin(cells, tags).all():
+        raise MeshError("has cells with nodes that are not there")
+    if dim == 2 and np.ptp(points[np.isin(tags, cells), 2]) > 1e-9 * np.ptp(points):
+        raise MeshError("dim=2 expects a plane mesh, but the nodes have different z")
+    order = np.argsort(tags)
+    used = np.unique(cells)
+    rows = order[np.searchsorted(tags, used, sorter=order)]
+    inside = np.isin(facets, used).all(axis=1)
+    return {
+        "points": points[rows, :dim], "cells": np.searchsorted(used, cells), "cell_values": cell_values,
+        "facets": np.searchsorted(used, facets[inside]), "facet_values": facet_values[inside],
+    }  # fmt: skip
+
+
+def _entities(dim, only_groups=False):
+    """Node tags (m, dim + 1) and physical groups (m,) of the model's elements of one dimension."""
+    groups = gmsh.model.getPhysicalGroups(dim)
+    blocks = [(entity, tag) for _, tag in groups for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
+    twice = len(blocks) != len({entity for entity, _ in blocks})
+    if twice:
+        raise MeshError(f"an entity of dimension {dim} is in two physical groups; a tag must be single")
+    if not groups and not only_groups:
+        blocks = [(entity, 0) for _, entity in gmsh.model.getEntities(dim)]
+    nodes, values = [np.empty((0, dim + 1), np.int64)], [np.empty(0, np.int32)]
+    for entity, tag in blocks:
+        for kind, _, element_nodes in zip(*gmsh.model.mesh.getElements(dim, entity)):
+            _check_element(kind, dim)
+            nodes.append(np.asarray(element_nodes, dtype=np.int64).reshape(-1, dim + 1))
+            values.append(np.full(len(nodes[-1]), tag, dtype=np.int32))
+    if not only_groups:
+        _check_cells(nodes, dim)
+    return np.concatenate(nodes), np.concatenate(values)
+
+
+def _check_element(kind, dim):
+    if kind == _GMSH_SIMPLEX[dim]:
+        return
+    text, _, order, *_ = gmsh.model.mesh.getElementProperties(kind)
+    if order > 1:
+        raise MeshError(f"has elements of order {order} ({text}), expected straight ones (order 1)")
+    expected = _SIMPLEX.get(dim, "lines")
+    raise MeshError(f"has elements of type {text!r}, expected only {expected}")
+
+
+def _check_cells(nodes, dim):
+    found = sum(len(block) for block in nodes)
+    higher = dim == 2 and len(gmsh.model.mesh.getElements(3)[0]) > 0
+    if higher:
+        raise MeshError("has cells of dimension 3, but dim=2 was asked for")
+    if not found:
+        lower = dim == 3 and len(gmsh.model.mesh.getElements(2)[0]) > 0
+        detail = ", its cells have dimension 2" if lower else ""
+        raise MeshError(f"has no cells of dimension {dim}{detail}")
+
+
+if __name__ == "__main__":
+    try:
+        np.savez(sys.argv[3], **read_file(Path(sys.argv[1]), int(sys.argv[2])))
+    except MeshError as refused:
+        print(refused, file=sys.stderr)
+        sys.exit(REFUSED)
