@@ -19,7 +19,7 @@ OEDOMETER = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
 
 
 def run(quick: bool, folder) -> Result:
-    rows, checks, curves = 8 if quick else 16, [], {}
+    rows, checks, curves = 12 if quick else 16, [], {}
     for dim, nmd in ((2, False), (2, True), (3, False)):
         name = f"{dim}D" + (", NMD" if nmd else "")
 
