@@ -6,6 +6,8 @@
 
 #include <mpi.h>
 
+#include <type_traits>
+
 namespace mpm
 {
 /// Who gives whom which entries of an array; a link has the same length on both sides.
@@ -34,4 +36,12 @@ Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm);
 /// @param values  (entries, width) row-major
 /// @note Collective over neighbours
 void update(const Halo& halo, double* values, int width);
+
+/// The same for a vector with one entry per cell or node that consists of doubles only; it may be empty.
+template <class T>
+void update(const Halo& halo, std::vector<T>& values)
+{
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
+  update(halo, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
+}
 } // namespace mpm

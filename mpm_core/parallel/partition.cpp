@@ -16,7 +16,7 @@ std::vector<double> with_ghost_values(const Mesh<D>& mesh, std::span<const doubl
 {
   std::vector<double> values(owned.begin(), owned.end());
   values.resize(mesh.cells.size());
-  update(make_halos(mesh, comm).cells, values.data(), 1);
+  update(make_halos(mesh, comm).cells, values);
   return values;
 }
 

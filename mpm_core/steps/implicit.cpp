@@ -148,7 +148,7 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   if (model.exchange.size > 1 && !step.halos_ready)
     step.halos = make_halos(model.mesh, model.exchange.comm);
   step.halos_ready = true;
-  update(step.halos.nodes, work.start_velocity.data()->data(), D);
+  update(step.halos.nodes, work.start_velocity);
   step.ghosts = find_ghost_facets(model, step.halos, options.ghost);
   work.velocity = work.start_velocity;
   impose_supports(model, step);
@@ -167,7 +167,7 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
 template <int D>
 TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
 {
-  update(step.halos.nodes, model.work.velocity.data()->data(), D);
+  update(step.halos.nodes, model.work.velocity);
   if (step.options.mixed_discretisation)
     average_strains(model, step.dt);
   const TrialCount<D> count = try_stresses(model, step, tangents);

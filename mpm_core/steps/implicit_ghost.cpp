@@ -28,7 +28,7 @@ std::vector<CellContents> cell_contents(const Model<D>& model, const Halo& cells
       contents[run.cell].shear += model.particles.volume[p] * shear;
     }
   }
-  update(cells, &contents.data()->volume, 3);
+  update(cells, contents);
   return contents;
 }
 

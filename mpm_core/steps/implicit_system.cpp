@@ -201,7 +201,7 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
     }
   }
   sum_shared(exchange, sums);
-  update(step.halos.nodes, reinterpret_cast<double*>(sums.data()), 2);
+  update(step.halos.nodes, sums);
 
   system.owned = std::move(owned);
   system.cells = std::move(cells);

@@ -1,7 +1,12 @@
 """Tests under mpirun: every rank runs every test, and a failure on one rank is a failure on all."""
 
+import sys
+from pathlib import Path
+
 import pytest
 from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "python"))  # cases that tests on one rank use too
 
 
 @pytest.hookimpl(hookwrapper=True)
