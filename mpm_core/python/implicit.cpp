@@ -15,7 +15,7 @@ struct Implicit
   Model<D>& model;
   ImplicitStep<D> step;
   ImplicitSystem<D> system;
-  CooEntries stiffness, averaging;
+  CooEntries stiffness, volumetric_force, volumetric_strain;
   Relaxation<D> relaxation;
 };
 
@@ -45,7 +45,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
   using I = Implicit<D>;
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
@@ -53,7 +53,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
             start_step(i.model, i.step, options, dt);
             const bool changed = number_nodes(i.model, i.step, i.system);
             if (changed)
-              i.stiffness = i.averaging = {};
+              i.stiffness = i.volumetric_force = i.volumetric_strain = {};
             return changed;
           },
           Release())
@@ -72,8 +72,10 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           [](I& i)
           {
             stiffness_entries(i.model, i.step, i.system, i.stiffness);
-            if (i.step.options.mixed_discretisation)
-              averaging_entries(i.model, i.system, i.averaging);
+            if (!i.step.options.mixed_discretisation)
+              return;
+            volumetric_force_entries(i.model, i.step, i.system, i.volumetric_force);
+            volumetric_strain_entries(i.model, i.system, i.volumetric_strain);
           },
           Release())
       .def("start_relaxation",
@@ -116,8 +118,10 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           })
       .def("stiffness_places", [](const I& i) { return places(i.stiffness); })
       .def("stiffness_values", [](const I& i) { return copied(i.stiffness.values); })
-      .def("averaging_places", [](const I& i) { return places(i.averaging); })
-      .def("averaging_values", [](const I& i) { return copied(i.averaging.values); });
+      .def("volumetric_force_places", [](const I& i) { return places(i.volumetric_force); })
+      .def("volumetric_force_values", [](const I& i) { return copied(i.volumetric_force.values); })
+      .def("volumetric_strain_places", [](const I& i) { return places(i.volumetric_strain); })
+      .def("volumetric_strain_values", [](const I& i) { return copied(i.volumetric_strain.values); });
 }
 } // namespace
 

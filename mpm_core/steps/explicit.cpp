@@ -109,7 +109,6 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
   const bool first = options.stress_update == StressUpdate::first;
   model.integration = options.integration;
   const bool dual = options.integration == Integration::dual_domain;
-  work.averaged = options.mixed_discretisation;
   map_to_nodes(model); // (11), (14), (15)
   find_start_velocity(model);
   if (first)

@@ -49,16 +49,6 @@ void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
   }
 }
 
-/// Nodal mixed discretisation of the trial's stresses.
-template <int D>
-void average_stresses(Model<D>& model, ImplicitStep<D>& step)
-{
-  const auto change = mean_stress_change(model, [&](Index c) { return step.stress[c]; });
-  for (std::size_t j = 0; j < change.size(); ++j)
-    for (int a = 0; a < D; ++a)
-      step.stress[model.work.soil.cells[j]][a] += change[j];
-}
-
 /// Forces of the trial's stresses (14) and of the ghost penalty, at the nodes.
 template <int D>
 void find_forces(Model<D>& model, ImplicitStep<D>& step)
@@ -135,7 +125,6 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   step.options = options;
   step.dt = dt;
   model.integration = options.integration;
-  work.averaged = options.mixed_discretisation;
   map_to_nodes(model); // (11), (15)
   find_start_velocity(model);
   find_active(model, step);
@@ -171,8 +160,6 @@ TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
   if (step.options.mixed_discretisation)
     average_strains(model, step.dt);
   const TrialCount<D> count = try_stresses(model, step, tangents);
-  if (step.options.mixed_discretisation)
-    average_stresses(model, step);
   find_forces(model, step);
 
   std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
@@ -220,8 +207,8 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
   const double pic = options.quasi_static ? 1 : options.pic_share;
   find_velocity_change(model, pic, step.dt);
-  particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation,
-                           options.hold_positions}); // (18), (20), stresses
+  particle_pass<D>(model,
+                   {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)
   {

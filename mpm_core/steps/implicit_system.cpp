@@ -55,14 +55,11 @@ Vector<D> product(const Matrix<D>& a, const Vector<D>& b)
   return c;
 }
 
-/// Adds entries in order; rows and columns only the first time. `width` is the number of unknowns per node.
+/// Adds entries in order; rows and columns only the first time.
 class Writer
 {
 public:
-  Writer(CooEntries& entries, int width) : _entries(entries), _width(width), _places(entries.rows.empty())
-  {
-    entries.values.clear();
-  }
+  explicit Writer(CooEntries& entries) : _entries(entries), _places(entries.rows.empty()) { entries.values.clear(); }
 
   void add(GlobalIndex row, GlobalIndex column, double value)
   {
@@ -73,17 +70,16 @@ public:
     _entries.columns.push_back(column);
   }
 
-  template <class Block>
-  void add_block(GlobalIndex row, GlobalIndex column, const Block& block)
+  template <int D>
+  void add_block(GlobalIndex row, GlobalIndex column, const Matrix<D>& block)
   {
-    for (std::size_t i = 0; i < block.size(); ++i)
-      for (std::size_t j = 0; j < block.size(); ++j)
-        add(_width * row + static_cast<int>(i), _width * column + static_cast<int>(j), block[i][j]);
+    for (int i = 0; i < D; ++i)
+      for (int j = 0; j < D; ++j)
+        add(D * row + i, D * column + j, block[i][j]);
   }
 
 private:
   CooEntries& _entries;
-  int _width;
   bool _places;
 };
 
@@ -97,42 +93,6 @@ Matrix<D> cell_block(const CellTangent<D>& tangent, const Vector<D>& g_k, const 
       for (int j = 0; j < D; ++j)
         for (int m = 0; m < D; ++m)
           block[a][b] += g_k[j] * tangent.by_gradient[symmetric_index<D>(a, j)][b * D + m] * g_l[m];
-  return block;
-}
-
-template <int D>
-using AveragedBlock = std::array<std::array<double, D + 1>, D + 1>;
-
-/// With nodal mixed discretisation: d of what two vertices' displacements and averaged volumetric strains work against.
-/// Displacements work against the stress without its mean in the plane, the cell's averaged strain against that mean.
-template <int D>
-AveragedBlock<D> averaged_block(const CellTangent<D>& tangent, const Vector<D>& g_k, const Vector<D>& g_l,
-                                const Matrix<D>& p_k, const Matrix<D>& p_l)
-{
-  std::array<std::array<double, D + 1>, n_symmetric<D>> change{}; // of the stress, by u_l and theta_l
-  for (int k = 0; k < n_symmetric<D>; ++k)
-  {
-    Vector<D> by_u{};
-    for (int b = 0; b < D; ++b)
-      by_u[b] = dot<D>(*reinterpret_cast<const Vector<D>*>(&tangent.by_gradient[k][b * D]), g_l);
-    by_u = product<D>(p_l, by_u); // P is symmetric
-    std::copy(by_u.begin(), by_u.end(), change[k].begin());
-    change[k][D] = tangent.by_volumetric[k] / (D + 1);
-  }
-  AveragedBlock<D> block{};
-  for (int j = 0; j <= D; ++j)
-  {
-    std::array<double, n_symmetric<D>> stress;
-    double mean = 0;
-    for (int k = 0; k < D; ++k)
-      mean += change[k][j] / D;
-    for (int k = 0; k < n_symmetric<D>; ++k)
-      stress[k] = change[k][j] - (k < D ? mean : 0);
-    const Vector<D> force = product<D>(p_k, internal_force<D>(stress, g_k));
-    for (int a = 0; a < D; ++a)
-      block[a][j] = force[a];
-    block[D][j] = mean / (D + 1);
-  }
   return block;
 }
 
@@ -160,7 +120,7 @@ void add_ghost_entries(const Model<D>& model, const ImplicitStep<D>& step, const
       for (auto& row : block)
         for (double& value : row)
           value *= facet.share[k] * factor * facet.jump[k] * facet.jump[l];
-      writer.add_block(system.number[facet.nodes[k]], system.number[facet.nodes[l]], block);
+      writer.add_block<D>(system.number[facet.nodes[k]], system.number[facet.nodes[l]], block);
     }
 }
 } // namespace
@@ -223,8 +183,7 @@ template <int D>
 void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
                        CooEntries& entries)
 {
-  const bool averaged = step.options.mixed_discretisation;
-  Writer writer(entries, averaged ? D + 1 : D);
+  Writer writer(entries);
   for (Index c : system.cells)
   {
     const auto p = projectors(model, system, c);
@@ -232,13 +191,9 @@ void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const
     for (int k = 0; k <= D; ++k)
       for (int l = 0; l <= D; ++l)
       {
-        const GlobalIndex row = system.number[model.mesh.cells[c][k]], column = system.number[model.mesh.cells[c][l]];
-        if (averaged)
-          writer.add_block(row, column, averaged_block<D>(step.tangents[c], gradient[k], gradient[l], p[k], p[l]));
-        else
-          writer.add_block(
-              row, column,
-              product<D>(p[k], product<D>(cell_block<D>(step.tangents[c], gradient[k], gradient[l]), p[l])));
+        const Matrix<D> block = cell_block<D>(step.tangents[c], gradient[k], gradient[l]);
+        writer.add_block<D>(system.number[model.mesh.cells[c][k]], system.number[model.mesh.cells[c][l]],
+                            product<D>(p[k], product<D>(block, p[l])));
       }
   }
   for (const GhostFacet<D>& facet : step.ghosts)
@@ -253,17 +208,34 @@ void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
         block[i][j] += system.diagonal[node] * ((i == j ? 1.0 : 0.0) - p[i][j]);
-    writer.add_block(system.number[node], system.number[node], block);
+    writer.add_block<D>(system.number[node], system.number[node], block);
   }
 }
 
 template <int D>
-void averaging_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries)
+void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+                              CooEntries& entries)
 {
-  Writer writer(entries, 1);
-  for (Index node : system.owned)
-    for (int a = 0; a < D; ++a)
-      writer.add((D + 1) * system.number[node] + a, D * system.number[node] + a, 1);
+  Writer writer(entries);
+  for (Index c : system.cells)
+  {
+    const auto p = projectors(model, system, c);
+    for (int k = 0; k <= D; ++k)
+    {
+      Vector<D> force =
+          product<D>(p[k], internal_force<D>(step.tangents[c].by_volumetric, model.mesh.shapes[c].gradient[k]));
+      for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
+        for (int a = 0; a < D; ++a)
+          writer.add(D * system.number[model.mesh.cells[c][k]] + a, system.number[model.mesh.cells[c][l]],
+                     force[a] / (D + 1));
+    }
+  }
+}
+
+template <int D>
+void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries)
+{
+  Writer writer(entries);
   for (Index c : system.cells)
     for (int k = 0; k <= D; ++k)
     {
@@ -274,7 +246,7 @@ void averaging_entries(const Model<D>& model, const ImplicitSystem<D>& system, C
         const Index other = model.mesh.cells[c][l];
         const Vector<D> change = product<D>(projector(model, system, other), model.mesh.shapes[c].gradient[l]);
         for (int b = 0; b < D; ++b)
-          writer.add((D + 1) * system.number[node] + D, D * system.number[other] + b, weight * change[b]);
+          writer.add(system.number[node], D * system.number[other] + b, weight * change[b]);
       }
     }
 }
@@ -302,7 +274,9 @@ void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::spa
 #define INSTANTIATE(D)                                                                                                 \
   template bool number_nodes(Model<D>&, const ImplicitStep<D>&, ImplicitSystem<D>&);                                   \
   template void stiffness_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&, CooEntries&);     \
-  template void averaging_entries(const Model<D>&, const ImplicitSystem<D>&, CooEntries&);                             \
+  template void volumetric_force_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&,            \
+                                         CooEntries&);                                                                 \
+  template void volumetric_strain_entries(const Model<D>&, const ImplicitSystem<D>&, CooEntries&);                     \
   template std::vector<double> owned_values<D>(const ImplicitSystem<D>&, std::span<const Vector<D>>);                  \
   template void set_nodal<D>(NodeExchange&, const ImplicitSystem<D>&, std::span<const double>, std::span<Vector<D>>);
 INSTANTIATE(2)

@@ -35,8 +35,7 @@ struct CooEntries
 template <int D>
 bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D>& system);
 
-/// J = d (f_int + inertia) / du, D unknowns per node. With nodal mixed discretisation, M with D + 1 unknowns per node,
-/// the last one its averaged volumetric strain, where J = T^T M T.
+/// J = d (f_int + inertia) / du; with nodal mixed discretisation at constant averaged volumetric strain.
 /// @pre the step's tangents belong to the iterate
 /// @post the order of the entries is always the same for the same system; rows and columns are filled when they are
 /// empty
@@ -44,10 +43,15 @@ template <int D>
 void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
                        CooEntries& entries);
 
-/// T of nodal mixed discretisation: D + 1 rows per node, D columns: u as it is, and the averaged volumetric strain of
-/// u. The product has the two-ring stencil.
+/// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes,
+/// ...
 template <int D>
-void averaging_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries);
+void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+                              CooEntries& entries);
+
+/// ... and G = d theta / du, the nodes' averaged volumetric strain; the product has the two-ring stencil.
+template <int D>
+void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries);
 
 /// Vectors at this rank's nodes of the system, one after the other.
 template <int D>

@@ -74,14 +74,20 @@ Symmetric<D> turned_by(const Matrix<D>& omega, const Symmetric<D>& s)
   return turned;
 }
 
-/// Adds what the turn of the stress changes in the tangent of a cell.
+/// The tangent of a cell from C = sum V dsigma/dstrain and the sum of V sigma at the increment's end.
 ///
 /// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R
 /// turns by Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
 template <int D>
-void add_spin(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
-              const CellStrain<D>& strain, CellTangent<D>& tangent)
+CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
+                            const CellStrain<D>& strain, bool averaged)
 {
+  CellTangent<D> tangent{};
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    for (int b = 0; b < D; ++b)
+      for (int m = 0; m < D; ++m)
+        tangent.by_gradient[k][b * D + m] = c[k][symmetric_index<D>(b, m)];
+
   Symmetric<D> e; // as a tensor
   for (int k = 0; k < n_symmetric<D>; ++k)
     e[k] = strain.increment[stress_component<D>[k]] * (k < D ? 1.0 : 0.5);
@@ -99,22 +105,7 @@ void add_spin(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric
       tangent.by_gradient[k][m * D + b] -= change;
     }
   }
-}
-
-/// The tangent of a cell from C = sum V dsigma/dstrain and the sum of V sigma at the increment's end.
-template <int D>
-CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
-                            const CellStrain<D>& strain, const ImplicitOptions& options)
-{
-  CellTangent<D> tangent{};
-  for (int k = 0; k < n_symmetric<D>; ++k)
-    for (int b = 0; b < D; ++b)
-      for (int m = 0; m < D; ++m)
-        tangent.by_gradient[k][b * D + m] = c[k][symmetric_index<D>(b, m)];
-
-  if (!options.hold_positions)
-    add_spin(c, stress, strain, tangent);
-  if (options.mixed_discretisation)
+  if (averaged)
     for (int k = 0; k < n_symmetric<D>; ++k)
     {
       for (int j = 0; j < D; ++j)
@@ -156,11 +147,6 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   if (step.options.mixed_discretisation)
     set_volumetric(strain, mean_volumetric_strain<D>(model.mesh.cells[cell], model.work.volumetric_strain));
-  if (step.options.hold_positions)
-  {
-    make_small<D>(strain);
-    return {strain, true};
-  }
   return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
@@ -303,8 +289,9 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
     step.tangents.resize(cells);
   for (std::size_t c = 0; tangents && c < cells; ++c)
     if (model.work.moments[c].volume > 0)
-      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c],
-                                         cell_strain(model, step, static_cast<Index>(c)).strain, step.options);
+      step.tangents[c] =
+          cell_tangent<D>(step.stiffness[c], step.stress[c], cell_strain(model, step, static_cast<Index>(c)).strain,
+                          step.options.mixed_discretisation);
   return count;
 }
 

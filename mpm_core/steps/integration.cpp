@@ -50,14 +50,14 @@ void gather_dual_domains(Model<D>& model)
   }
   sum_shared(model.exchange, work.dual_nodes);
 }
-} // namespace
 
+/// What a cell integrates: volume times mean stress.
 template <int D>
 std::array<double, n_symmetric<D>> integrated_stress(const Model<D>& model, Index cell)
 {
   const Workspace<D>& work = model.work;
   std::array<double, n_symmetric<D>> stress = work.moments[cell].stress;
-  if (model.integration == Integration::particles || !work.whole[cell])
+  if (!work.whole[cell])
     return stress;
   double factor = model.mesh.shapes[cell].volume / work.moments[cell].volume;
   if (model.integration == Integration::dual_domain)
@@ -72,6 +72,7 @@ std::array<double, n_symmetric<D>> integrated_stress(const Model<D>& model, Inde
     component *= factor;
   return stress;
 }
+} // namespace
 
 template <int D>
 void integrate_stress(Model<D>& model)
@@ -142,7 +143,6 @@ Matrix<D> dual_gradient(const Model<D>& model, Index particle, Index cell)
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template std::array<double, n_symmetric<D>> integrated_stress<D>(const Model<D>&, Index);                            \
   template void integrate_stress(Model<D>&);                                                                           \
   template void average_gradients(Model<D>&);                                                                          \
   template Matrix<D> dual_gradient<D>(const Model<D>&, Index, Index);

@@ -25,10 +25,6 @@ inline double integrated_volume(const Model<D>& model, Index cell)
   return whole ? model.mesh.shapes[cell].volume : model.work.moments[cell].volume;
 }
 
-/// What a cell integrates: volume times mean stress.
-template <int D>
-std::array<double, n_symmetric<D>> integrated_stress(const Model<D>& model, Index cell);
-
 /// Puts the internal force of mixed or dual domain integration in the place of the particles' sum, on this rank.
 /// @post work.whole tells which cells are full
 /// @note Collective

@@ -1,25 +1,9 @@
 #include "steps/mapping.h"
 
+#include "steps/integration.h"
+
 namespace mpm
 {
-namespace
-{
-/// Adds the averaging of mean stresses to this rank's internal forces.
-template <int D>
-void average_mean_stress(Model<D>& model)
-{
-  Workspace<D>& work = model.work;
-  const auto change = mean_stress_change(model, [&](Index c) { return integrated_stress(model, c); });
-  for (std::size_t j = 0; j < change.size(); ++j)
-  {
-    const Index c = work.soil.cells[j];
-    for (int k = 0; k <= D; ++k)
-      for (int a = 0; a < D; ++a)
-        work.nodes[model.mesh.cells[c][k]].internal[a] += change[j] * model.mesh.shapes[c].gradient[k][a];
-  }
-}
-} // namespace
-
 template <int D>
 void map_to_nodes(Model<D>& model)
 {
@@ -29,8 +13,6 @@ void map_to_nodes(Model<D>& model)
   scatter<D>(model.mesh, work.soil, work.moments, work.tractions, work.nodes);
   if (model.integration != Integration::particles)
     integrate_stress(model);
-  if (work.averaged)
-    average_mean_stress(model);
   sum_shared(model.exchange, work.nodes);
 }
 

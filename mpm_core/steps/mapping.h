@@ -2,51 +2,17 @@
 /// @file
 /// What explicit and implicit steps take from the particles at their start, and the strains that nodes give the cells.
 
-#include "steps/integration.h"
+#include "steps/model.h"
 
 #include <cmath>
 
 namespace mpm
 {
-/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks. The internal force
-/// is that of averaged mean stresses where `work.averaged` says so.
+/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
 /// @pre prepare(model) has been called
 /// @note Collective
 template <int D>
 void map_to_nodes(Model<D>& model);
-
-/// Nodal mixed discretisation of stress: what the averaging adds to each normal component in the plane of a cell's
-/// stress times volume, one for each cell of the soil.
-///
-/// Nodal forces must do the work of the particles' stresses on the strains that these take. The strains' volumetric
-/// part is averaged, so the mean stress is, by the transpose: with volume weights, the same average.
-/// @param stress  stress times volume of a cell, a callable Index -> std::array<double, n_symmetric<D>>
-/// @note Collective
-template <int D, class Stress>
-std::vector<double> mean_stress_change(Model<D>& model, Stress&& stress)
-{
-  Workspace<D>& work = model.work;
-  const auto sum = [&](Index c)
-  {
-    const auto components = stress(c);
-    double normal = 0;
-    for (int a = 0; a < D; ++a)
-      normal += components[a] / D;
-    return normal;
-  };
-  const auto of_cell = [&](Index c) -> VolumetricStrain
-  {
-    const double volume = integrated_volume(model, c);
-    return {volume > 0 ? sum(c) / volume : 0, volume};
-  };
-  work.mean_stress.resize(model.mesh.points.size());
-  average_volumetric_strain<D>(model.mesh, work.soil, of_cell, model.exchange, work.mean_stress);
-  std::vector<double> change;
-  for (Index c : work.soil.cells)
-    change.push_back(integrated_volume(model, c) * mean_volumetric_strain<D>(model.mesh.cells[c], work.mean_stress) -
-                     sum(c));
-  return change;
-}
 
 /// v_i at the start of the step, from the sums at nodes, with supports.
 template <int D>

@@ -88,7 +88,6 @@ template <int D>
 struct Workspace
 {
   bool ready = false;                        ///< runs and moments agree with the particles
-  bool averaged = false;                     ///< nodal mixed discretisation is on in the present or last step
   std::vector<Run> runs;                     ///< of the particles as they are now
   std::vector<unsigned char> cell_marks;     ///< room, one per cell; all zero
   std::vector<CellMoments<D>> moments;       ///< of the particles as they are now; zero outside of `soil`
@@ -101,7 +100,6 @@ struct Workspace
   std::vector<Vector<D>> velocity_change;            ///< of the nodes, as the particles take it
   std::vector<Vector<D>> velocity;                   ///< v_i that moves and strains the particles
   std::vector<VolumetricStrain> volumetric_strain;   ///< of the nodes; used with nodal mixed discretisation
-  std::vector<VolumetricStrain> mean_stress;         ///< of the nodes [Pa], averages in the same way
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< used with dual domains, as are the mean gradients of nodes
   std::vector<MeanGradient<D>> mean_gradients;
   std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it

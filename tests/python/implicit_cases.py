@@ -46,17 +46,19 @@ def linear_elastic_solution(points, cells, law, weight, held):
 
 
 def tangent(step, dim):
-    """J of an assembled implicit step on one rank; with nodal mixed discretisation the product T^T M T."""
+    """J of an assembled implicit step on one rank; with nodal mixed discretisation the product is added."""
     nodes, dofs = step.total_nodes, step.total_nodes * dim
 
     def matrix(places, values, shape):
         return sp.csr_matrix((values, places), shape=shape)
 
-    if len(step.averaging_values()) == 0:
-        return matrix(step.stiffness_places(), step.stiffness_values(), (dofs, dofs))
-    m = matrix(step.stiffness_places(), step.stiffness_values(), (nodes + dofs, nodes + dofs))
-    t = matrix(step.averaging_places(), step.averaging_values(), (nodes + dofs, dofs))
-    return t.T @ m @ t
+    j = matrix(step.stiffness_places(), step.stiffness_values(), (dofs, dofs))
+    force, strain = step.volumetric_force_values(), step.volumetric_strain_values()
+    if len(force) == 0:
+        return j
+    return j + matrix(step.volumetric_force_places(), force, (dofs, nodes)) @ matrix(
+        step.volumetric_strain_places(), strain, (nodes, dofs)
+    )
 
 
 SLOPE_SOIL = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)

@@ -23,7 +23,7 @@ DT = 0.1
 def solved_step(solver, *, nmd=False, quasi_static=False):
     """Nodal velocities of a step in which soil yields, and how it was solved: a sliding slope, or one below collapse that is
     brought to equilibrium at once."""
-    model = slope(0.2, weight=14e3 if quasi_static else 80e3)
+    model = slope(0.2, weight=20e3 if quasi_static else 80e3)
     if not quasi_static:
         list(model.implicit(3 * DT, dt=DT, damping=0.75))
     options = _core.ImplicitOptions()

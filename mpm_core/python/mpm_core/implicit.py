@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 MAX_CUTS = 10
 """A step is not made shorter than dt / 2^MAX_CUTS."""
 
-SMALLEST_SHARE = 1 / 2**MAX_CUTS
-"""of the out-of-balance force, a part of which is applied where all of it at once is too much"""
+SMALLEST_PART = 1 / 2**MAX_CUTS
+"""of the out-of-balance force, which is applied in parts where all of it at once is too much"""
 
 FADING = 0.1
 """of the ghost penalty between steps that only redistribute stresses"""
@@ -175,29 +175,33 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
     each time with a jump of the nodal forces that sends it there. The penalty's forces, which are part of a step's equilibrium
     but not of the particles', fade from step to step.
     """
-    stepper, ghost, full = Stepper(model, solver, options, 1.0), options.ghost, options.ghost.stiffness
-    share, left, steps = 1.0, 1.0, 0
-    while steps < max_steps:
-        options.load_share, options.ghost = share, ghost
-        reason = _attempt_without_time(stepper, model)
-        if reason:
+    stepper = Stepper(model, solver, options, 1.0)
+    applied, part, ghost = 0.0, 1.0, options.ghost
+    for _ in range(max_steps):
+        while True:
+            part = min(part, 1.0 - applied)
+            options.load_share = part / (1.0 - applied) if applied < 1.0 else 1.0
+            reason = _attempt_without_time(stepper, model)
+            if not reason:
+                break
             stepper.control.cuts += 1
-            share, ghost.stiffness = share / 2, min(full, ghost.stiffness / FADING)
-            if share < SMALLEST_SHARE:
+            part /= 2
+            if part < SMALLEST_PART or applied == 1.0:
                 raise RunError(
-                    f"no equilibrium at t = {model.time:.9g} s with more than {1 - left:.4g} of the loads: {reason}"
+                    f"no equilibrium at t = {model.time:.9g} s with more than {applied:.4g} of the loads: {reason}"
                 )
+        applied = min(1.0, applied + part)
+        if applied < 1.0:
+            part *= 2 if stepper.last.easy else 1
             continue
-        steps, left = steps + 1, left * (1 - share)
-        if options.hold_positions and share == 1:
+        if options.hold_positions:
             ghost.stiffness *= FADING
-        share = min(1.0, 2 * share) if stepper.last.easy else share
-        options.hold_positions = left == 0
-        if left == 0 and model.report().unbalanced_ratio <= tolerance:
+        options.ghost, options.hold_positions = ghost, True
+        if model.report().unbalanced_ratio <= tolerance:
             return stepper.report()
     raise RunError(
-        f"out-of-balance ratio is {model.report().unbalanced_ratio:.3g} after {max_steps} steps, which applied "
-        f"{1 - left:.3g} of the loads, expected {tolerance:.3g}"
+        f"out-of-balance ratio is {model.report().unbalanced_ratio:.3g} after {max_steps} steps, of which the last applied "
+        f"{applied:.3g} of the loads, expected {tolerance:.3g}"
     )
 
 

@@ -33,15 +33,12 @@ _MULTIGRID: dict[str, Any] = {
     "ksp_rtol": 1e-6,
     "ksp_gmres_restart": 100,
     "pc_type": "gamg",
-    "pc_gamg_threshold": 0.01,
-    "pc_gamg_aggressive_coarsening": 0,
     "mg_levels_ksp_type": "gmres",
     "mg_levels_ksp_max_it": 4,
     "mg_levels_pc_type": "jacobi",
 }
 """PETSc options for large systems. Soil that yields has an unsymmetric tangent with weak directions, where the customary
-smoother, Chebyshev's polynomials for a positive spectrum, fails; GMRES does not. The two-ring stencil of nodal averaging
-wants weak couplings left out and coarsening that is not aggressive."""
+smoother, Chebyshev's polynomials for a positive spectrum, fails; GMRES does not."""
 
 
 def _coo_matrix(comm: MPI.Comm, sizes: tuple[int, int], blocks: tuple[int, int], places: Any) -> PETSc.Mat:
@@ -93,8 +90,8 @@ def _checked(code: int) -> None:
 class Tangent:
     """J = d (f_int + inertia) / du of an implicit step.
 
-    With nodal mixed discretisation J = T^T M T, where M has the nodes' averaged volumetric strains as unknowns beside u, and T
-    gives both from u: the product grows the stencil to two rings.
+    With nodal mixed discretisation J = K + K_p G, where G gives the nodes' averaged volumetric strain: the product grows the
+    stencil to two rings.
 
     Args:
         step: the core's implicit step, assembled.
@@ -108,12 +105,12 @@ class Tangent:
 
     def __init__(self, step: Any, comm: MPI.Comm, dim: int, prefix: str) -> None:
         nodes, dofs = step.owned_nodes, step.owned_nodes * dim
-        self._averaged = comm.allreduce(len(step.averaging_values())) > 0
-        width = dim + 1 if self._averaged else dim
-        self._stiffness = _coo_matrix(comm, (nodes * width,) * 2, (width, width), step.stiffness_places())
+        self._stiffness = _coo_matrix(comm, (dofs, dofs), (dim, dim), step.stiffness_places())
+        self._averaged = comm.allreduce(len(step.volumetric_force_values())) > 0
         self._product: PETSc.Mat | None = None
         if self._averaged:
-            self._averaging = _coo_matrix(comm, (nodes * width, dofs), (width, dim), step.averaging_places())
+            self._force = _coo_matrix(comm, (dofs, nodes), (dim, 1), step.volumetric_force_places())
+            self._strain = _coo_matrix(comm, (nodes, dofs), (1, dim), step.volumetric_strain_places())
         self._prefix = prefix
         self._options = _direct(comm.size) if step.total_nodes <= _DIRECT_LIMIT[dim] else _MULTIGRID
         self._ksp = PETSc.KSP().create(comm)
@@ -127,9 +124,10 @@ class Tangent:
         _set_values(self._stiffness, step.stiffness_values())
         self.matrix = self._stiffness
         if self._averaged:
-            _set_values(self._averaging, step.averaging_values())
-            self._product = self._stiffness.PtAP(self._averaging, self._product)
-            self._product.setBlockSize(self._averaging.getBlockSizes()[1])
+            _set_values(self._force, step.volumetric_force_values())
+            _set_values(self._strain, step.volumetric_strain_values())
+            self._product = self._force.matMult(self._strain, self._product)
+            self._product.axpy(1.0, self._stiffness, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.matrix = self._product
         self.matrix.setNearNullSpace(self._near_null_space)
         self._ksp.setOperators(self.matrix)

@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import InputError, Integration, StressUpdate
+from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .explicit import explicit_options, report_times, run_explicit, run_options, steps_between
@@ -173,7 +173,6 @@ class Model(Body):
         nmd: bool = False,
         integration: Integration = Integration.PARTICLES,
         ghost: GhostPenalty | None = None,
-        hold_positions: bool = False,
         rebalance: float | None = None,
     ) -> Iterator[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
@@ -196,8 +195,6 @@ class Model(Body):
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
-            hold_positions: change the particles' stresses but not their places and volumes, as in an analysis of small
-                displacements; for quasi-static runs.
             rebalance: see ``explicit``; looked at before each step.
 
         Raises:
@@ -206,9 +203,6 @@ class Model(Body):
                 particles are as after the last step that converged.
         """
         options = implicit_options(self, damping, pic, nmd, integration, quasi_static, ghost)
-        if hold_positions and not quasi_static:
-            raise InputError("hold_positions is True, expected False unless quasi_static is True")
-        options.hold_positions = bool(hold_positions)
         longest = positive("dt", dt, "s")
         times = report_times(self, until, every, since)
         return run_implicit(
