@@ -67,3 +67,16 @@ def print_step(step):
         file=sys.stderr,
         flush=True,
     )
+
+
+def raise_load(model, load, first_step, tolerance, progress):
+    """Raise the load of a model from its present one to the given one, by `advance` over the share of the way.
+
+    Sets `converged` of the model to whether the load was reached. Returns a list of LoadStep. Collective.
+    """
+    start = model.load
+    steps = advance(
+        lambda share: model.equilibrate(start.towards(load, share)), 0.0, 1.0, first_step, tolerance, progress
+    )
+    model.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
+    return steps

@@ -15,7 +15,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import assembled, strain
 from fenics_bridge.linear_solver import LinearSolver
-from fenics_bridge.load_steps import advance
+from fenics_bridge.load_steps import raise_load
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
 from fenics_bridge.quadrature import QuadraturePoints
@@ -76,12 +76,7 @@ class MixedQuasiStatic:
 
     def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
         """Raise the load from the present one to the given one; as `QuasiStatic.solve`. Collective."""
-        start = self.load
-        steps = advance(
-            lambda share: self.equilibrate(start.towards(load, share)), 0.0, 1.0, first_step, tolerance, progress
-        )
-        self.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
-        return steps
+        return raise_load(self, load, first_step, tolerance, progress)
 
     def reaction(self, facet_tag):
         """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in 2D). Collective."""

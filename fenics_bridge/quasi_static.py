@@ -16,7 +16,7 @@ from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import nodal_average
 from fenics_bridge.kinematics import Kinematics
 from fenics_bridge.linear_solver import LinearSolver
-from fenics_bridge.load_steps import advance
+from fenics_bridge.load_steps import raise_load
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
 from fenics_bridge.quadrature import QuadraturePoints
@@ -101,12 +101,7 @@ class QuasiStatic:
         first_step: share of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
         `converged` tells whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
         """
-        start = self.load
-        steps = advance(
-            lambda share: self.equilibrate(start.towards(load, share)), 0.0, 1.0, first_step, tolerance, progress
-        )
-        self.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
-        return steps
+        return raise_load(self, load, first_step, tolerance, progress)
 
     def reaction(self, facet_tag):
         """Force of the body on its support at the facets of a tag, summed over them: (D,) [N] ([N/m] in 2D).
