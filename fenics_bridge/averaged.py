@@ -16,9 +16,8 @@ class AveragedKinematics:
     With theta_c = div u in a cell, theta_i the mean over the cells around a node by volume, and thetabar_c the mean of
     theta_i over a cell's nodes, the in-plane normal strains (all three in 3D) are raised by (thetabar_c - theta_c) / d.
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
-    transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is. (The
-    particles average strains only, as is usual. That is nearly the same where volume is kept or elastic, but where
-    soil dilates the tangent of such forces is so unsymmetric that Newton's method fails.)
+    transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is. (Particles
+    do the same in small displacements, and average strains only in motion; see the theory.)
     """
 
     def __init__(self, increment, points, constraints):

@@ -15,7 +15,7 @@ struct Implicit
   Model<D>& model;
   ImplicitStep<D> step;
   ImplicitSystem<D> system;
-  CooEntries stiffness, volumetric_force, volumetric_strain;
+  CooEntries stiffness, volumetric_force, volumetric_strain, mean_stress, mean_stress_by_strain;
   Relaxation<D> relaxation;
 };
 
@@ -45,7 +45,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
   using I = Implicit<D>;
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
@@ -53,7 +53,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
             start_step(i.model, i.step, options, dt);
             const bool changed = number_nodes(i.model, i.step, i.system);
             if (changed)
-              i.stiffness = i.volumetric_force = i.volumetric_strain = {};
+              i.stiffness = i.volumetric_force = i.volumetric_strain = i.mean_stress = i.mean_stress_by_strain = {};
             return changed;
           },
           Release())
@@ -76,6 +76,8 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
               return;
             volumetric_force_entries(i.model, i.step, i.system, i.volumetric_force);
             volumetric_strain_entries(i.model, i.system, i.volumetric_strain);
+            if (i.step.options.average_stress)
+              mean_stress_entries(i.model, i.step, i.system, i.mean_stress, i.mean_stress_by_strain);
           },
           Release())
       .def("start_relaxation",
@@ -121,7 +123,11 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
       .def("volumetric_force_places", [](const I& i) { return places(i.volumetric_force); })
       .def("volumetric_force_values", [](const I& i) { return copied(i.volumetric_force.values); })
       .def("volumetric_strain_places", [](const I& i) { return places(i.volumetric_strain); })
-      .def("volumetric_strain_values", [](const I& i) { return copied(i.volumetric_strain.values); });
+      .def("volumetric_strain_values", [](const I& i) { return copied(i.volumetric_strain.values); })
+      .def("mean_stress_places", [](const I& i) { return places(i.mean_stress); })
+      .def("mean_stress_values", [](const I& i) { return copied(i.mean_stress.values); })
+      .def("mean_stress_by_strain_places", [](const I& i) { return places(i.mean_stress_by_strain); })
+      .def("mean_stress_by_strain_values", [](const I& i) { return copied(i.mean_stress_by_strain.values); });
 }
 } // namespace
 
@@ -142,6 +148,7 @@ void bind_implicit(py::module_& m)
       .def_readwrite("damping", &ImplicitOptions::damping)
       .def_readwrite("pic_share", &ImplicitOptions::pic_share)
       .def_readwrite("mixed_discretisation", &ImplicitOptions::mixed_discretisation)
+      .def_readwrite("average_stress", &ImplicitOptions::average_stress)
       .def_readwrite("integration", &ImplicitOptions::integration)
       .def_readwrite("ghost", &ImplicitOptions::ghost)
       .def_readwrite("hold_positions", &ImplicitOptions::hold_positions)

@@ -58,13 +58,16 @@ void find_cell_strains(const Model<D>& model, const PassOptions& options, const 
           gradient[a][b][l] = scratch.motion[first + l].displacement.gradient[a][b];
     CellStrain<D, Lanes>& strain = scratch.cells[first / lanes];
     strain = strain_increment<D>(std::bit_cast<std::array<std::array<Lanes, D>, D>>(gradient), 1);
-    if (!options.averaged)
-      continue;
-    Lanes theta{};
-    for (std::size_t r = first; r < std::min(n, first + lanes); ++r)
-      theta[r - first] = mean_volumetric_strain<D>(model.mesh.cells[model.work.runs[batch.first_run + r].cell],
-                                                   model.work.volumetric_strain);
-    set_volumetric<D>(strain, theta);
+    if (options.averaged)
+    {
+      Lanes theta{};
+      for (std::size_t r = first; r < std::min(n, first + lanes); ++r)
+        theta[r - first] = mean_volumetric_strain<D>(model.mesh.cells[model.work.runs[batch.first_run + r].cell],
+                                                     model.work.volumetric_strain);
+      set_volumetric<D>(strain, theta);
+    }
+    if (options.small)
+      make_small<D>(strain);
   }
 }
 

@@ -160,6 +160,8 @@ TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
   if (step.options.mixed_discretisation)
     average_strains(model, step.dt);
   const TrialCount<D> count = try_stresses(model, step, tangents);
+  if (step.options.average_stress)
+    average_stresses<D>(model, step.stress);
   find_forces(model, step);
 
   std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
@@ -207,8 +209,8 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
   const double pic = options.quasi_static ? 1 : options.pic_share;
   find_velocity_change(model, pic, step.dt);
-  particle_pass<D>(model,
-                   {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation}); // (18), (20), stresses
+  particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation,
+                           options.hold_positions}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)
   {
@@ -225,6 +227,8 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
   map_to_nodes(model); // so that the out-of-balance ratio is that of the particles as they are now
+  for (std::size_t i = 0; options.average_stress && i < step.forces.size(); ++i)
+    work.nodes[i].internal = step.forces[i].internal;
   return true;
 }
 

@@ -18,10 +18,11 @@ struct ImplicitOptions
   double damping = 0;   ///< local damping alpha, in [0, 1), see implicit_inertia.h; not used in quasi-static steps
   double pic_share = 0; ///< in [0, 1]
   bool mixed_discretisation = false;
+  bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
   Integration integration = Integration::particles; ///< by particles or mixed
   GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass
   bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
-  bool hold_positions = false; ///< stresses and volumes change, places do not; for quasi-static steps without new load
+  bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
   double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 
@@ -33,6 +34,10 @@ struct CellTangent
   std::array<std::array<double, D * D>, n_symmetric<D>> by_gradient;
   /// by the averaged volumetric strain; zero without nodal mixed discretisation
   std::array<double, n_symmetric<D>> by_volumetric;
+  /// Where mean stresses are averaged: of the mean of the normal components in the plane, which the above are then
+  /// without
+  std::array<double, D * D> mean_by_gradient;
+  double mean_by_volumetric;
 };
 
 /// Norms of a residual over all ranks and unsupported directions [N], and what else a trial says.

@@ -252,6 +252,33 @@ void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& s
 }
 
 template <int D>
+void mean_stress_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+                         CooEntries& by_displacement, CooEntries& by_strain)
+{
+  Writer displacement(by_displacement), strain(by_strain);
+  for (Index c : system.cells)
+  {
+    const CellTangent<D>& tangent = step.tangents[c];
+    for (int l = 0; l <= D; ++l)
+    {
+      const Index other = model.mesh.cells[c][l];
+      Vector<D> change{};
+      for (int b = 0; b < D; ++b)
+        for (int m = 0; m < D; ++m)
+          change[b] += tangent.mean_by_gradient[b * D + m] * model.mesh.shapes[c].gradient[l][m] / (D + 1);
+      change = product<D>(projector(model, system, other), change);
+      for (int k = 0; k <= D; ++k)
+      {
+        const GlobalIndex row = system.number[model.mesh.cells[c][k]];
+        for (int b = 0; b < D; ++b)
+          displacement.add(row, D * system.number[other] + b, change[b]);
+        strain.add(row, system.number[other], tangent.mean_by_volumetric / ((D + 1) * (D + 1)));
+      }
+    }
+  }
+}
+
+template <int D>
 std::vector<double> owned_values(const ImplicitSystem<D>& system, std::span<const Vector<D>> nodal)
 {
   std::vector<double> values;
@@ -277,6 +304,8 @@ void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::spa
   template void volumetric_force_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&,            \
                                          CooEntries&);                                                                 \
   template void volumetric_strain_entries(const Model<D>&, const ImplicitSystem<D>&, CooEntries&);                     \
+  template void mean_stress_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&, CooEntries&,    \
+                                    CooEntries&);                                                                      \
   template std::vector<double> owned_values<D>(const ImplicitSystem<D>&, std::span<const Vector<D>>);                  \
   template void set_nodal<D>(NodeExchange&, const ImplicitSystem<D>&, std::span<const double>, std::span<Vector<D>>);
 INSTANTIATE(2)

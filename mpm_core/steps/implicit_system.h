@@ -53,6 +53,12 @@ void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step
 template <int D>
 void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries);
 
+/// Where mean stresses are averaged as well, J gains G^T (L + H G), with these L = d q / du and H = d q / d theta: q_i
+/// is what the nodes' averaged volumetric strains work against, the cells' means of V sigma, shared among their nodes.
+template <int D>
+void mean_stress_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+                         CooEntries& by_displacement, CooEntries& by_strain);
+
 /// Vectors at this rank's nodes of the system, one after the other.
 template <int D>
 std::vector<double> owned_values(const ImplicitSystem<D>& system, std::span<const Vector<D>> nodal);

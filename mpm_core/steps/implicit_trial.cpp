@@ -1,6 +1,7 @@
 #include "steps/implicit_trial.h"
 
 #include "steps/batches.h"
+#include "steps/implicit_tangent.h"
 #include "steps/integration.h"
 #include "transfer/kinematics.h"
 
@@ -24,97 +25,7 @@ struct TrialScratch
 };
 
 template <int D>
-constexpr std::array<std::array<int, 2>, D*(D - 1) / 2> spin_pairs = []
-{
-  std::array<std::array<int, 2>, D*(D - 1) / 2> pairs{};
-  for (int b = 0, k = 0; b < D; ++b)
-    for (int m = b + 1; m < D; ++m)
-      pairs[k++] = {b, m};
-  return pairs;
-}();
-
-/// d Omega = dR R^T for each pair b < m of axes, per du_b/dx_m; its negative belongs to du_m/dx_b. The Cayley transform
-/// R of the half spin W has dR R^T = 2 Y dW Y^T with Y = (1 - W)^-1 = (1 + R) / 2.
-template <int D>
-std::array<Matrix<D>, D*(D - 1) / 2> spins(const Matrix<D>& rotation)
-{
-  Matrix<D> y = rotation;
-  for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-      y[i][j] = 0.5 * (y[i][j] + (i == j ? 1.0 : 0.0));
-  std::array<Matrix<D>, D*(D - 1) / 2> spin;
-  for (std::size_t k = 0; k < spin.size(); ++k)
-  {
-    const auto [b, m] = spin_pairs<D>[k];
-    for (int i = 0; i < D; ++i)
-      for (int j = 0; j < D; ++j)
-        spin[k][i][j] = 0.5 * (y[i][b] * y[j][m] - y[i][m] * y[j][b]);
-  }
-  return spin;
-}
-
-template <int D>
 using Symmetric = std::array<double, n_symmetric<D>>;
-
-/// Omega S - S Omega of a symmetric S.
-template <int D>
-Symmetric<D> turned_by(const Matrix<D>& omega, const Symmetric<D>& s)
-{
-  Matrix<D> product{};
-  for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-      for (int k = 0; k < D; ++k)
-        product[i][j] += omega[i][k] * s[symmetric_index<D>(k, j)];
-  Symmetric<D> turned;
-  for (int k = 0; k < n_symmetric<D>; ++k)
-  {
-    const auto [i, j] = symmetric_pairs<D>[k];
-    turned[k] = product[i][j] + product[j][i]; // -S Omega is the transpose of Omega S
-  }
-  return turned;
-}
-
-/// The tangent of a cell from C = sum V dsigma/dstrain and the sum of V sigma at the increment's end.
-///
-/// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R
-/// turns by Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
-template <int D>
-CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
-                            const CellStrain<D>& strain, bool averaged)
-{
-  CellTangent<D> tangent{};
-  for (int k = 0; k < n_symmetric<D>; ++k)
-    for (int b = 0; b < D; ++b)
-      for (int m = 0; m < D; ++m)
-        tangent.by_gradient[k][b * D + m] = c[k][symmetric_index<D>(b, m)];
-
-  Symmetric<D> e; // as a tensor
-  for (int k = 0; k < n_symmetric<D>; ++k)
-    e[k] = strain.increment[stress_component<D>[k]] * (k < D ? 1.0 : 0.5);
-  const auto spin = spins<D>(strain.rotation);
-  for (std::size_t s = 0; s < spin.size(); ++s)
-  {
-    const Symmetric<D> stress_turned = turned_by<D>(spin[s], stress), strain_turned = turned_by<D>(spin[s], e);
-    const auto [b, m] = spin_pairs<D>[s];
-    for (int k = 0; k < n_symmetric<D>; ++k)
-    {
-      double change = stress_turned[k];
-      for (int j = 0; j < n_symmetric<D>; ++j)
-        change -= c[k][j] * strain_turned[j] * (j < D ? 1.0 : 2.0);
-      tangent.by_gradient[k][b * D + m] += change;
-      tangent.by_gradient[k][m * D + b] -= change;
-    }
-  }
-  if (averaged)
-    for (int k = 0; k < n_symmetric<D>; ++k)
-    {
-      for (int j = 0; j < D; ++j)
-        tangent.by_volumetric[k] += c[k][j] / D;
-      for (int j = 0; j < D; ++j)
-        tangent.by_gradient[k][j * D + j] -= tangent.by_volumetric[k];
-    }
-  return tangent;
-}
 
 /// Volume of a cell after a displacement, relative to that before: det(1 + grad u).
 template <int D>
@@ -147,6 +58,11 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   if (step.options.mixed_discretisation)
     set_volumetric(strain, mean_volumetric_strain<D>(model.mesh.cells[cell], model.work.volumetric_strain));
+  if (step.options.hold_positions)
+  {
+    make_small<D>(strain);
+    return {strain, true};
+  }
   return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
@@ -289,9 +205,8 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
     step.tangents.resize(cells);
   for (std::size_t c = 0; tangents && c < cells; ++c)
     if (model.work.moments[c].volume > 0)
-      step.tangents[c] =
-          cell_tangent<D>(step.stiffness[c], step.stress[c], cell_strain(model, step, static_cast<Index>(c)).strain,
-                          step.options.mixed_discretisation);
+      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c],
+                                         cell_strain(model, step, static_cast<Index>(c)).strain, step.options);
   return count;
 }
 

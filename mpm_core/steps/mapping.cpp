@@ -52,11 +52,39 @@ void average_strains(Model<D>& model, double dt)
   average_volumetric_strain(model.mesh, work.soil, of_cell, model.exchange, work.volumetric_strain);
 }
 
+template <int D>
+void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress)
+{
+  Workspace<D>& work = model.work;
+  const auto mean = [&](Index c)
+  {
+    double sum = 0;
+    for (int a = 0; a < D; ++a)
+      sum += stress[c][a];
+    return sum / D;
+  };
+  const auto of_cell = [&](Index c) -> VolumetricStrain
+  {
+    const double volume = integrated_volume(model, c);
+    return {volume > 0 ? mean(c) / volume : 0, volume};
+  };
+  std::vector<VolumetricStrain> nodes(model.mesh.points.size());
+  average_volumetric_strain<D>(model.mesh, work.soil, of_cell, model.exchange, nodes);
+  for (Index c : work.soil.cells)
+  {
+    const double average = mean_volumetric_strain<D>(model.mesh.cells[c], nodes);
+    const double change = integrated_volume(model, c) * average - mean(c);
+    for (int a = 0; a < D; ++a)
+      stress[c][a] += change;
+  }
+}
+
 #define INSTANTIATE(D)                                                                                                 \
   template void map_to_nodes(Model<D>&);                                                                               \
   template void find_start_velocity(Model<D>&);                                                                        \
   template void find_velocity_change(Model<D>&, double, double);                                                       \
-  template void average_strains(Model<D>&, double);
+  template void average_strains(Model<D>&, double);                                                                    \
+  template void average_stresses<D>(Model<D>&, std::span<std::array<double, n_symmetric<D>>>);
 INSTANTIATE(2)
 INSTANTIATE(3)
 } // namespace mpm

@@ -29,6 +29,15 @@ void find_velocity_change(Model<D>& model, double pic_share, double dt);
 template <int D>
 void average_strains(Model<D>& model, double dt);
 
+/// Averages the mean of the normal components in the plane of the cells' stress times volume, as strains are averaged.
+///
+/// The forces of these stresses do the work of the particles' stresses on averaged strains: with volume weights the
+/// average is its own transpose.
+/// @param stress  of each owned cell [N m]
+/// @note Collective
+template <int D>
+void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress);
+
 /// Local damping of FLAC for one component: alpha |R| sign(v).
 ///
 /// Where v is less than a tenth of the change that R makes of it in a step, the damping passes linearly through zero

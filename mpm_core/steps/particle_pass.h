@@ -9,11 +9,12 @@ namespace mpm
 /// What the pass does.
 struct PassOptions
 {
-  double dt;        ///< [s]
-  bool move;        ///< velocities (18) and positions (20)
-  bool stress;      ///< strain increment and stress update
-  double pic_share; ///< share of the grid's velocity in the particle's, 0 is FLIP
-  bool averaged;    ///< take volumetric strains from `work.volumetric_strain` (nodal mixed discretisation)
+  double dt;          ///< [s]
+  bool move;          ///< velocities (18) and positions (20)
+  bool stress;        ///< strain increment and stress update
+  double pic_share;   ///< share of the grid's velocity in the particle's, 0 is FLIP
+  bool averaged;      ///< take volumetric strains from `work.volumetric_strain` (nodal mixed discretisation)
+  bool small = false; ///< small displacements: the strain changes stresses only, not volumes, and turns nothing
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal

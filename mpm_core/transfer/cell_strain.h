@@ -77,4 +77,14 @@ inline void set_volumetric(CellStrain<D, T>& strain, const T& volumetric)
   strain.volumetric = volumetric;
   strain.deviatoric = deviatoric_size<D>(strain.increment, volumetric);
 }
+
+/// Small displacements: the strain changes stresses, but no volume, and nothing turns.
+template <int D, class T>
+inline void make_small(CellStrain<D, T>& strain)
+{
+  strain.volumetric = T{};
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      strain.rotation[i][j] = T{} + (i == j ? 1.0 : 0.0);
+}
 } // namespace mpm

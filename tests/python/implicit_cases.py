@@ -56,9 +56,12 @@ def tangent(step, dim):
     force, strain = step.volumetric_force_values(), step.volumetric_strain_values()
     if len(force) == 0:
         return j
-    return j + matrix(step.volumetric_force_places(), force, (dofs, nodes)) @ matrix(
-        step.volumetric_strain_places(), strain, (nodes, dofs)
-    )
+    g = matrix(step.volumetric_strain_places(), strain, (nodes, dofs))
+    j = j + matrix(step.volumetric_force_places(), force, (dofs, nodes)) @ g
+    if len(step.mean_stress_values()) == 0:
+        return j
+    h = matrix(step.mean_stress_by_strain_places(), step.mean_stress_by_strain_values(), (nodes, nodes))
+    return j + g.T @ (matrix(step.mean_stress_places(), step.mean_stress_values(), (nodes, dofs)) + h @ g)
 
 
 SLOPE_SOIL = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)

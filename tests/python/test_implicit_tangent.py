@@ -12,7 +12,7 @@ ELASTIC = mpm.LinearElastic(young=1e6, poisson=0.3)
 PLASTIC = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=2e3, friction_angle=25.0, dilation_angle=5.0)
 
 
-def started_step(dim, law, *, nmd=False, quasi_static=False, damping=0.0, mixed=False):
+def started_step(dim, law, *, nmd=False, quasi_static=False, damping=0.0, mixed=False, small=False):
     """A step of a box with random velocities and stresses, half of it filled, one side on inclined rollers."""
     mesh = box([3 if dim == 2 else 2] * dim, shake=0.2)
     model = mpm.Model(mesh, law)
@@ -28,6 +28,7 @@ def started_step(dim, law, *, nmd=False, quasi_static=False, damping=0.0, mixed=
     model.set_gravity([0.0] * (dim - 1) + [-9.81])
     options = _core.ImplicitOptions()
     options.mixed_discretisation, options.quasi_static, options.damping = nmd, quasi_static, damping
+    options.hold_positions, options.average_stress = small, small and nmd
     options.integration = mpm.Integration.MIXED if mixed else mpm.Integration.PARTICLES
     step = (_core.ImplicitStep2 if dim == 2 else _core.ImplicitStep3)(model._core)
     step.start(options, 0.02)
@@ -48,7 +49,17 @@ def free(step, dim, direction):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
 @pytest.mark.parametrize(
-    "options", [{}, {"nmd": True}, {"damping": 0.75}, {"quasi_static": True}, {"mixed": True, "nmd": True}], ids=str
+    "options",
+    [
+        {},
+        {"nmd": True},
+        {"damping": 0.75},
+        {"quasi_static": True},
+        {"mixed": True, "nmd": True},
+        {"quasi_static": True, "small": True},
+        {"quasi_static": True, "small": True, "nmd": True},
+    ],
+    ids=str,
 )
 def test_tangent_is_the_derivative_of_the_residual(dim, law, options):
     dt = 0.02

@@ -91,7 +91,7 @@ class Tangent:
     """J = d (f_int + inertia) / du of an implicit step.
 
     With nodal mixed discretisation J = K + K_p G, where G gives the nodes' averaged volumetric strain: the product grows the
-    stencil to two rings.
+    stencil to two rings. Where mean stresses are averaged too, J = K + K_p G + G^T (L + H G), over three rings.
 
     Args:
         step: the core's implicit step, assembled.
@@ -111,6 +111,10 @@ class Tangent:
         if self._averaged:
             self._force = _coo_matrix(comm, (dofs, nodes), (dim, 1), step.volumetric_force_places())
             self._strain = _coo_matrix(comm, (nodes, dofs), (1, dim), step.volumetric_strain_places())
+        self._conjugate = comm.allreduce(len(step.mean_stress_values())) > 0
+        if self._conjugate:
+            self._mean_stress = _coo_matrix(comm, (nodes, dofs), (1, dim), step.mean_stress_places())
+            self._mean_stress_by_strain = _coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
         self._options = _direct(comm.size) if step.total_nodes <= _DIRECT_LIMIT[dim] else _MULTIGRID
         self._ksp = PETSc.KSP().create(comm)
@@ -129,6 +133,14 @@ class Tangent:
             self._product = self._force.matMult(self._strain, self._product)
             self._product.axpy(1.0, self._stiffness, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.matrix = self._product
+        if self._conjugate:
+            _set_values(self._mean_stress, step.mean_stress_values())
+            _set_values(self._mean_stress_by_strain, step.mean_stress_by_strain_values())
+            work = self._mean_stress_by_strain.matMult(self._strain)
+            work.axpy(1.0, self._mean_stress, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self.matrix = self._strain.transposeMatMult(work)
+            self.matrix.setBlockSize(self._stiffness.getBlockSize())
+            self.matrix.axpy(1.0, self._product, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         self.matrix.setNearNullSpace(self._near_null_space)
         self._ksp.setOperators(self.matrix)
         with _defaults(self._prefix, self._options):

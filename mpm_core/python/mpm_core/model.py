@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import Integration, StressUpdate
+from ._core import InputError, Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .explicit import explicit_options, report_times, run_explicit, run_options, steps_between
@@ -173,6 +173,7 @@ class Model(Body):
         nmd: bool = False,
         integration: Integration = Integration.PARTICLES,
         ghost: GhostPenalty | None = None,
+        small_displacements: bool = False,
         rebalance: float | None = None,
     ) -> Iterator[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
@@ -195,6 +196,9 @@ class Model(Body):
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+            small_displacements: change the particles' stresses but not their places and volumes, for quasi-static runs. With
+                ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
+                symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; looked at before each step.
 
         Raises:
@@ -203,6 +207,10 @@ class Model(Body):
                 particles are as after the last step that converged.
         """
         options = implicit_options(self, damping, pic, nmd, integration, quasi_static, ghost)
+        if small_displacements and not quasi_static:
+            raise InputError("small_displacements is True, expected False unless quasi_static is True")
+        options.hold_positions = bool(small_displacements)
+        options.average_stress = bool(small_displacements and nmd)
         longest = positive("dt", dt, "s")
         times = report_times(self, until, every, since)
         return run_implicit(
