@@ -81,6 +81,7 @@ def save_refinement(
             axes.set(xlabel=label, ylabel=what)
             axes.tick_params(top=True, right=True, which="both")
             axes.grid(linewidth=0.3, color="#d0d0d0")
-        row[0][0].legend(fontsize=8)
+        beside = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2} if len(curves) > 3 else {}
+        row[0][0].legend(fontsize=8, **beside)
         figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
         plt.close(figure)
