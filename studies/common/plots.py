@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -185,7 +186,7 @@ def draw_bar(
     """The colour bar, with arrows where values beyond its ends may occur."""
     colours = ScalarMappable(Normalize(*limits), quantity.colours)
     extend = "both" if has_less else "max"
-    bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend, ticks=ROUND_TICKS)
+    bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend, ticks=copy(ROUND_TICKS))
     bar.set_label(quantity.label, labelpad=2)
     bar.outline.set_linewidth(0.5)
 

@@ -11,8 +11,14 @@ from common.plots import CURVES, WIDTH, paper_style
 from matplotlib.ticker import FuncFormatter
 
 Curve = tuple[np.ndarray, np.ndarray]
-COLOURS = (*CURVES, "#1a9c9c", "#c04f9e")
+COLOURS = (*CURVES, "#1a9c9c", "#c04f9e", "#8c6d31")
 LINES = ("-", "--", ":", "-.")
+
+
+def _legend(axes: plt.Axes) -> None:
+    """Inside, or above when it would cover the curves."""
+    many = len(axes.get_legend_handles_labels()[0]) > 5
+    axes.legend(fontsize=8, **({"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2} if many else {}))
 
 
 def save_comparison(
@@ -32,7 +38,7 @@ def save_comparison(
         expected: likewise; black lines.
         labels: of the axes, with units.
         limits: of the axes; None to fit.
-        joined: lines through the computed points.
+        joined: lines through the computed points, of which some dozen are marked.
         equal: one scale for both axes.
     """
     with paper_style():
@@ -43,6 +49,7 @@ def save_comparison(
                 "markersize": 3,
                 "linestyle": "-" if joined else "none",
                 "linewidth": 1.0,
+                "markevery": max(1, len(x) // 12) if joined else 1,
             }
             axes.plot(x, y, color=COLOURS[k % len(COLOURS)], label=name, **look)
         for k, (name, (x, y)) in enumerate(expected.items()):
@@ -52,7 +59,7 @@ def save_comparison(
             axes.set_aspect("equal")
         axes.tick_params(top=True, right=True)
         axes.grid(linewidth=0.3, color="#d0d0d0")
-        axes.legend(fontsize=8)
+        _legend(axes)
         figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
         plt.close(figure)
 
@@ -81,7 +88,6 @@ def save_refinement(
             axes.set(xlabel=label, ylabel=what)
             axes.tick_params(top=True, right=True, which="both")
             axes.grid(linewidth=0.3, color="#d0d0d0")
-        beside = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2} if len(curves) > 3 else {}
-        row[0][0].legend(fontsize=8, **beside)
+        _legend(row[0][0])
         figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
         plt.close(figure)
