@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 from argparse import Namespace
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
@@ -57,14 +57,14 @@ def run_case(name: str, group: str, quick: bool, folder: Path) -> CaseRow:
     """Run one case; an error in it becomes part of its result."""
     module = importlib.import_module(name)
     folder = results_folder(name, folder / name, comm)
-    start, result, error = perf_counter(), Result([]), ""
+    start, result, error = process_time(), Result([]), ""
     # On several ranks only errors that all of them raise: with another one, the others would wait for this rank.
     expected = Exception if comm.size == 1 else (mpm.InputError, mpm.RunError)
     try:
         result = module.run(quick, folder)
     except expected as exception:  # whatever a case fails with, the others go on
         error = f"{type(exception).__name__}: {exception}"
-    row = case_row(name, group, module.__doc__ or name, result, error, perf_counter() - start)
+    row = case_row(name, group, module.__doc__ or name, result, error, process_time() - start)
     if comm.rank == 0:
         print(*map(line, result.checks), *([f"  ERROR {error}"] if error else []), sep="\n", flush=True)
     return row

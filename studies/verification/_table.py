@@ -52,7 +52,7 @@ class CheckRow:
 
 @dataclass
 class CaseRow:
-    """A case with its checks; ``figures`` are captions by file name."""
+    """A case with its checks; ``figures`` are captions by file name, ``seconds`` processor time of the first rank."""
 
     name: str
     group: str
@@ -162,7 +162,9 @@ def save_page(folder: Path, table: Table, parameters: Sequence[Parameter] = ()) 
         for case in table.cases
     ]  # fmt: skip
     wrong = [k for k, case in enumerate(table.cases) if not case.passed]
-    head = Section("All cases", "", ("Group", "Case", "Checks", "Pass", "Known limits", "Fail", "Took"), rows, wrong)
+    head = Section(
+        "All cases", "", ("Group", "Case", "Checks", "Pass", "Known limits", "Fail", "Processor time"), rows, wrong
+    )
     save_report(folder / "report.html", Report(
         "Verification and validation", table.summary(), {"of all checks" if table.passed else "at least one": "pass" if
         table.passed else "FAIL"}, sections=[head, *sections], parameters=parameters, footer=_made(table),
@@ -218,5 +220,5 @@ def _docs_case(case: CaseRow) -> str:
         f"![{caption}](images/verification/{case.name}_{name})\n\n*{caption}*" for name, caption in case.figures.items()
     ]
     error = [f"The case ended with an error: {case.error}"] if case.error else []
-    source = f"`studies/verification/{case.name}.py`, {case.seconds:.0f} s"
+    source = f"`studies/verification/{case.name}.py`, {case.seconds:.0f} s of processor time"
     return "\n\n".join([f"### {case.title}", case.text, source, *error, table, *case.notes(), *figures])

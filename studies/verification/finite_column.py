@@ -38,6 +38,7 @@ def settled(
     cells: int, per_cell: int, steps: int, integration: mpm.Integration, moving_mesh: bool
 ) -> tuple[float, float]:
     """Displacement of the highest particle, and what it should be [m]; on each rank alike, which computes all of it."""
+    # --- 1. A column one cell wide between rollers -------------------------------------------------------------------
     width = HEIGHT / cells
     mesh = bridge.background_mesh(*bridge.box_mesh(MPI.COMM_SELF, [width, HEIGHT], [1, cells], diagonals="one-way"))
     sides = [
@@ -61,6 +62,8 @@ def settled(
     model = build(nodes)
     model.seed(density=WEIGHT / GRAVITY, per_cell=per_cell)
     start = in_order(model, "position")
+
+    # --- 2. Its weight step by step; the mesh moves with it, or does not ---------------------------------------------
     for k in range(1, steps + 1):
         model.set_gravity((0.0, -GRAVITY * k / steps))
         for _ in model.implicit(model.time + 1.0, dt=1.0, quasi_static=True, integration=integration):
@@ -68,11 +71,14 @@ def settled(
         if moving_mesh:
             nodes = nodes + model.nodal("velocity")  # times one second
             model = on_moved_mesh(model, nodes, build)
+
+    # --- 3. The highest particle -------------------------------------------------------------------------------------
     top = np.argmax(start[:, 1])
     return float((in_order(model, "position") - start)[top, 1]), float(exact(start[top, 1]))
 
 
 def run(quick: bool, folder) -> Result:
+    # --- 4. Finer meshes: without crossings, with them mixed, and with them by the standard method -------------------
     meshes = (5, 10) if quick else (10, 20, 40)
     checks, errors = [], {}
     for name, per_cell, steps, integration, moving in (
@@ -90,6 +96,8 @@ def run(quick: bool, folder) -> Result:
             errors[name].append(abs(found / expected - 1))
             checks.append(Check(f"settlement of the top, {cells} cells, {name}", expected, "σ = E ln(stretch), integrated", found,
                                 0.005 if not quick else 0.01, "m", limit=limit))  # fmt: skip
+
+    # --- 5. Picture --------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
         save_refinement(
             folder / "error.png", meshes, "Cells over the height", {"Error of the top's settlement": errors}

@@ -7,6 +7,7 @@ elements come from above.
 
 import numpy as np
 from _case import Check, Result, run_alone
+from _plots import save_comparison
 from common.summary import ROOT
 from footing import AXIS, BASE, FAR, FOOTING, footing, parse, prandtl_factor, prandtl_line
 from mpi4py import MPI
@@ -51,14 +52,27 @@ def nq(friction: float, size: float) -> float:
 
 
 def run(quick: bool, folder) -> Result:
-    checks, size = [], QUICK if quick else FULL
-    for friction in (0.0, 20.0) if quick else (0.0, 20.0, 30.0):
-        checks.append(Check(f"Nc, φ {friction:g}°", prandtl_factor(friction), "Prandtl 1921",
-                            nc(friction, size), 0.05))  # fmt: skip
-    for friction in (20.0,) if quick else (20.0, 30.0):
-        checks.append(Check(f"Nq, φ {friction:g}°", surcharge_factor(friction), "Reissner 1924",
-                            nq(friction, float(size)), 0.05))  # fmt: skip
-    return Result(checks)
+    # --- 3. Both factors over friction angles -----------------------------------------------------------------------
+    size = QUICK if quick else FULL
+    nc_found = {friction: nc(friction, size) for friction in ((0.0, 20.0) if quick else (0.0, 20.0, 30.0))}
+    nq_found = {friction: nq(friction, float(size)) for friction in ((20.0,) if quick else (20.0, 30.0))}
+    checks = [Check(f"Nc, φ {friction:g}°", prandtl_factor(friction), "Prandtl 1921", found, 0.05)
+              for friction, found in nc_found.items()]  # fmt: skip
+    checks += [Check(f"Nq, φ {friction:g}°", surcharge_factor(friction), "Reissner 1924", found, 0.05)
+               for friction, found in nq_found.items()]  # fmt: skip
+
+    # --- 4. Picture -------------------------------------------------------------------------------------------------
+    if MPI.COMM_WORLD.rank == 0:
+        angles = np.linspace(0, 32, 65)
+        exact = {
+            "$N_c$, Prandtl": [prandtl_factor(a) for a in angles],
+            "$N_q$, Reissner": [surcharge_factor(a) for a in angles],
+        }
+        computed = {"$N_c$, finite elements": nc_found, "$N_q$, finite elements": nq_found}
+        save_comparison(folder / "factors.png", {name: (list(found), list(found.values())) for name, found in computed.items()},
+                        {name: (angles, values) for name, values in exact.items()},
+                        ("Friction angle [degrees]", "Bearing capacity factor [-]"))  # fmt: skip
+    return Result(checks, {"factors.png": "Bearing capacity factors: finite elements (marks) and closed forms (lines)"})
 
 
 if __name__ == "__main__":

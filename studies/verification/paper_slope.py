@@ -153,9 +153,9 @@ def draw_variants(path, slides):
                 if column == 0:
                     axes.set_title(name, loc="left", fontsize=8, pad=2)
             box = panels[-1, column].get_position()
-            draw_bar(
-                figure, figure.add_axes((box.x0, 0.045, box.width, 0.008)), quantity, limits, has_less=limits[0] != 0.0
-            )
+            bar = figure.add_axes((box.x0, 0.045, box.width, 0.008))
+            draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
+            bar.set_xticks(np.linspace(*limits, 3))
         figure.savefig(path, dpi=200)
         plt.close(figure)
 

@@ -123,6 +123,7 @@ def compared(name, r, radial, hoop, yields, widening, size, tolerance):
 
 
 def run(quick: bool, folder) -> Result:
+    # --- 4. The ring by finite elements ------------------------------------------------------------------------------
     rings, comm, checks = 6 if quick else 16, MPI.COMM_WORLD, []
     pressure = pressure_for(PLASTIC)
 
@@ -135,6 +136,7 @@ def run(quick: bool, folder) -> Result:
     r, radial, hoop = polar(x, stress)
     checks += compared("finite elements", r, radial, hoop, state[:, 0] > 1e-9, widening, 1 / rings, 0.01)
 
+    # --- 5. And by particles; the inner cells, over which the pressure is spread, are left out -----------------------
     model = particles(rings, pressure)
     p = model.particles
     parts = comm.allgather((p.initial_position, p.stress, p.plastic_strain, p.displacement))
@@ -151,14 +153,14 @@ def run(quick: bool, folder) -> Result:
         "particles", r_p, radial_p, hoop_p, plastic > 1e-9, widening, 1.5 / rings, 0.1 if quick else 0.03
     )
 
-    # --- 4. The largest pressure: the ring reaches the outer wall ---------------------------------------------------
+    # --- 6. The largest pressure: the ring reaches the outer wall ---------------------------------------------------
     model, load = finite_elements(rings, FRICTION)
     limit = pressure_for(OUTER)
     found = bridge.collapse_load(model, load, first_step=0.2 * limit).value
     source = "Y / (N - 1) ((b/a)^(1 - 1/N) - 1), associated flow"
     checks.append(Check("largest pressure, finite elements", limit / 1e3, source, found / 1e3, 0.01, "kPa"))
 
-    # --- 5. Picture -------------------------------------------------------------------------------------------------
+    # --- 7. Picture -------------------------------------------------------------------------------------------------
     if comm.rank == 0:
         line = np.linspace(INNER, OUTER, 200)
         some = np.argsort(r_p)[:: max(1, len(r_p) // 300)]
