@@ -34,7 +34,7 @@ def save_comparison(
     """Draw computed points over expected lines.
 
     Args:
-        computed: (horizontal, vertical) values by name, as shown; in colours.
+        computed: (horizontal, vertical) values by name, as shown; in colours, and small where there are thousands.
         expected: likewise; black lines.
         labels: of the axes, with units.
         limits: of the axes; None to fit.
@@ -46,7 +46,7 @@ def save_comparison(
         for k, (name, (x, y)) in enumerate(computed.items()):
             look = {
                 "marker": "os^vDP"[k % 6],
-                "markersize": 3,
+                "markersize": 3 if len(x) < 1000 else 1,
                 "linestyle": "-" if joined else "none",
                 "linewidth": 1.0,
                 "markevery": max(1, len(x) // 12) if joined else 1,
