@@ -46,7 +46,7 @@ def test_particle_that_started_outside_is_named():
 
 @pytest.mark.parametrize(
     ("angle", "friction_angle", "number"),
-    [(45, 25, 22.9), (90, 30, 6.69), (90, 0, 3.83), (60, 20, 10.39), (30, 25, 119.9)],
+    [(45, 25, 22.9), (90, 30, 6.69), (90, 0, 3.83), (60, 20, 10.39), (30, 25, 119.9), (30, 10, 13.50)],
 )
 def test_log_spiral_gives_the_stability_numbers_of_the_literature(angle, friction_angle, number):
     """gamma H / c after Chen (1975), table 9.1."""
@@ -57,6 +57,11 @@ def test_log_spiral_gives_the_stability_numbers_of_the_literature(angle, frictio
     assert spiral.curve[0, 0] < 1.0
     radius = np.linalg.norm(spiral.curve - spiral.pole, axis=1)
     assert radius[-1] >= radius[0] * (1 - 1e-12)
+
+
+def test_spiral_of_a_flat_slope_with_little_friction_dips_below_the_toe():
+    assert bridge.log_spiral(1.0, 30, 1e3, 10.0).curve[:, 1].min() < -0.01
+    assert bridge.log_spiral(1.0, 60, 1e3, 10.0).curve[:, 1].min() == 0.0
 
 
 def test_factor_of_safety_of_the_log_spiral():
