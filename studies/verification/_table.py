@@ -221,5 +221,5 @@ def _docs_case(case: CaseRow) -> str:
         f"![{caption}](images/verification/{case.name}_{name})\n\n*{caption}*" for name, caption in case.figures.items()
     ]
     error = [f"The case ended with an error: {case.error}"] if case.error else []
-    source = f"`studies/verification/{case.name}.py`, {case.seconds:.0f} s"
+    source = f"`studies/verification/{case.name}.py`, {case.seconds:.0f} s of processor time"
     return "\n\n".join([f"### {case.title}", case.text, source, *error, table, *case.notes(), *figures])
