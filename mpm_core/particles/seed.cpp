@@ -188,6 +188,7 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
 template <int D>
 double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& traction, Particles<D>& particles)
 {
+  require_traction(particles); // on ranks without such facets, too, so that all have the same columns
   std::vector<std::vector<Index>> of_cell(static_cast<std::size_t>(mesh.owned_cells));
   for (Index p = 0; p < particles.size(); ++p)
     of_cell[static_cast<std::size_t>(particles.cell[p])].push_back(p);
@@ -205,7 +206,6 @@ double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& tracti
       const double nearest = *std::min_element(distance.begin(), distance.end());
       const auto count = std::count_if(distance.begin(), distance.end(), [&](double d) { return d < nearest + 1e-6; });
       const double area = D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
-      require_traction(particles);
       for (std::size_t j = 0; j < inside.size(); ++j)
         if (distance[j] < nearest + 1e-6)
           for (int i = 0; i < D; ++i)

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from common.plots import CURVES, WIDTH, paper_style
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 Curve = tuple[np.ndarray, np.ndarray]
 COLOURS = (*CURVES, "#1a9c9c", "#c04f9e", "#8c6d31")
@@ -84,6 +84,7 @@ def save_refinement(
                 )
             axes.set_xticks(numbers, [f"{number}" for number in numbers])
             axes.minorticks_off()
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
             axes.set(xlabel=label, ylabel=what)
             axes.tick_params(top=True, right=True, which="both")

@@ -88,7 +88,9 @@ def particles(rings, pressure):
     for tag, direction in zip(wall, outward):
         model.traction(int(tag), pressure * direction)
     steps = 8
-    whole = dict(zip(model.particles.id, model.particles.traction))
+    whole = {}  # traction by number, on all ranks: particles may change ranks
+    for part in MPI.COMM_WORLD.allgather(dict(zip(model.particles.id, model.particles.traction))):
+        whole |= part
     for k in range(1, steps + 1):
         model.particles.set("traction", np.array([k / steps * whole[i] for i in model.particles.id]).reshape(-1, 2))
         list(model.implicit(float(k), dt=1.0, quasi_static=True, nmd=True))

@@ -129,6 +129,16 @@ def test_an_error_on_one_rank_is_raised_on_all(comm, phase):
     assert len(set(comm.allgather(str(raised.value)))) == 1
 
 
+def test_a_traction_at_one_end_is_a_column_on_every_rank(comm):
+    mesh = spread_box((12, 4), (1.2, 0.4), comm, bands)
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.2))
+    model.seed(density=1000.0, per_cell=3)
+    assert model.traction(2, (5.0, 0.0)) == pytest.approx(0.4)  # the side at x = 1.2, of the last rank alone
+    assert model.particles.traction.shape == (len(model.particles), 2)
+    carried = all_by_id(model, ("traction",))["traction"]
+    np.testing.assert_allclose(carried.sum(axis=0), (5.0 * 0.4, 0.0), rtol=1e-12)
+
+
 def test_points_are_seeded_whoever_owns_their_cells(comm):
     x = np.linspace(0.1, 3.9, 20)
     points = np.column_stack([x, np.full(20, 0.21)])

@@ -9,10 +9,11 @@ import pytest
 from mpi4py import MPI
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "tests" / "python")]
+sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "studies" / "verification"), str(ROOT / "tests" / "python")]
 import compare_fem  # noqa: E402
 import handover  # noqa: E402
 import safety  # noqa: E402
+import thick_cylinder  # noqa: E402
 from bridge_cases import slope_particles  # noqa: E402
 from common.slope_fem import slope_fem, weight  # noqa: E402
 
@@ -57,3 +58,8 @@ def test_particles_differ_from_quadratic_elements_as_linear_ones_do(shared_path,
     linear, quadratic = (body.evaluate_at(points)["displacement"] for body in bodies)
     expected = np.linalg.norm(linear - quadratic) / np.linalg.norm(quadratic)
     assert row["displacement_difference_l2"] == pytest.approx(expected, rel=0.05)
+
+
+def test_cylinder_of_the_verification(shared_path):
+    """Its particles move from rank to rank, and some ranks have none that carries the pressure."""
+    assert [check.quantity for check in thick_cylinder.run(True, shared_path).checks if not check.passed] == []
