@@ -2,9 +2,10 @@
 
 The stability factor is γH/c at collapse. Limit analysis minimises it over all rotations about a logarithmic spiral
 through the toe, with associated flow (Chen 1975), here anew for each slope. On flat slopes with little friction the
-spiral dips below the level of the toe before it rises to it. There the ground below and before the toe is of the same
-soil; below all other spirals it is rigid. Quadratic finite elements raise the weight to the last equilibrium. Both
-are upper bounds: finite elements come from above and may end lower than the spiral where another mechanism is better.
+spiral dips below the level of the toe before it rises to it. Where that is more than a hundredth of the height, the
+ground below and before the toe is of the same soil; else it is rigid. Quadratic finite elements raise the weight to the
+last equilibrium. Both are upper bounds: finite elements come from above and may end lower than the spiral where another
+mechanism is better.
 A slope of 30° with a friction angle of 30° carries any weight.
 """
 
