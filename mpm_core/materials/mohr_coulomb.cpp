@@ -5,6 +5,8 @@
 #include "materials/require.h"
 #include "materials/spectral.h"
 
+#include <optional>
+
 // The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
 // turns a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)
 
@@ -154,9 +156,12 @@ template <int D>
 BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
 {
   const Surface m = surface_of(law);
-  const RegionMaps maps = points.tangent ? region_maps(m) : RegionMaps{};
+  std::optional<RegionMaps> maps; // not filled with zeros where it is not needed
   if (points.tangent)
+  {
+    maps = region_maps(m);
     fill_elastic_tangent<D>(m.moduli, points.size, points.tangent);
+  }
   BatchReport report;
   Index failed = 0;
   Candidates<D> candidates;
@@ -170,7 +175,7 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
     gather(points, candidates);
     return_stresses(m, candidates);
     if (points.tangent)
-      write_tangents(m, maps, candidates, points.tangent);
+      write_tangents(m, *maps, candidates, points.tangent);
     report.plastic += scatter(candidates, points);
   }
   if (failed > 0)

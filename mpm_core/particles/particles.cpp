@@ -1,6 +1,7 @@
 #include "particles/particles.h"
 
 #include <algorithm>
+#include <tuple>
 
 namespace mpm
 {
@@ -25,12 +26,15 @@ void require_traction(Particles<D>& particles)
 template <int D>
 void reorder(Particles<D>& particles, std::span<const Index> order)
 {
+  // One column of each type makes room for the next: memory that is new costs more than the copies.
+  std::tuple<Column, std::vector<Index>, std::vector<GlobalIndex>> rooms;
   for_each_column(particles,
-                  [order](const char*, int, auto& column)
+                  [order, &rooms](const char*, int, auto& column)
                   {
                     if (column.empty())
                       return;
-                    std::remove_reference_t<decltype(column)> sorted(column.size());
+                    auto& sorted = std::get<std::remove_reference_t<decltype(column)>>(rooms);
+                    sorted.resize(column.size());
                     for (std::size_t p = 0; p < sorted.size(); ++p)
                       sorted[p] = column[static_cast<std::size_t>(order[p])];
                     column.swap(sorted);

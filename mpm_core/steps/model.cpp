@@ -34,8 +34,8 @@ void sort_particles(Model<D>& model)
   sort_by_cell<D>(model.particles, model.mesh.owned_cells, static_cast<Index>(model.laws.size()));
   find_cell_runs(model, false);
   model.work.soil_shrinks = true;
-  model.work.last_sort = model.totals.steps;
   model.work.strays = 0;
+  model.work.stray_steps = 0;
   ++model.totals.sorts;
 }
 

@@ -113,8 +113,8 @@ struct Workspace
   std::unordered_map<GlobalIndex, Index> owned_cells;
   std::optional<Trouble<D>> trouble;
   double least_mass = 0; ///< nodes below this mass are not moved [kg]
-  std::int64_t last_sort = 0;
-  Index strays = 0; ///< particles that changed cell since the last sort
+  Index strays = 0;             ///< particles that changed cell since the last sort
+  std::int64_t stray_steps = 0; ///< their sum over the steps since
 };
 
 template <int D>

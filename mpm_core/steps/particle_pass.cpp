@@ -14,6 +14,9 @@ namespace
 /// Steps after which the moments of all cells are gathered from the particles again, so that round-off does not add up.
 constexpr std::int64_t gathering_interval = 64;
 
+/// What sorting costs per particle, over what a stray costs more in a step than a particle in its place.
+constexpr double sort_cost = 0.5;
+
 /// A second chance for the particles whose law failed, unless the step is lost anyway.
 template <int D>
 void update_failed(Model<D>& model, const Batch& batch, const PointBatch<D>& points, const std::vector<Index>& failed)
@@ -216,9 +219,9 @@ void settle_particles(Model<D>& model)
   gather_entered<D>(model, arrivals);
   work.strays += arrived;
 
-  // Strays cut the runs of two cells; sorting costs about two steps, so it waits until a tenth of the particles
-  // strayed.
-  if (work.strays > model.particles.size() / 10 && model.totals.steps - work.last_sort > 50)
+  // Strays cut the runs of two cells. Sorting is due when they have cost as much as it does.
+  work.stray_steps += work.strays;
+  if (static_cast<double>(work.stray_steps) > sort_cost * model.particles.size())
     sort_particles(model);
   else if (gone || arrived > 0)
     find_cell_runs(model, false);

@@ -35,8 +35,8 @@ void for_each_number(M& model, F&& f)
   f("support_work", Kind::sum, model.totals.support_work);
   f("plastic_particles", Kind::sum, model.last.plastic);
   f("sorts", Kind::own, model.totals.sorts);
-  f("last_sort", Kind::own, model.work.last_sort);
   f("strays", Kind::own, model.work.strays);
+  f("stray_steps", Kind::own, model.work.stray_steps);
 }
 
 template <class Moments>
@@ -153,7 +153,6 @@ void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<
                       number = static_cast<std::remove_cvref_t<decltype(number)>>(value);
                     }
                   });
-  model.work.last_sort = model.totals.steps;
   map_to_nodes(model);
 }
 

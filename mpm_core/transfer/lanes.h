@@ -58,8 +58,9 @@ inline void change_lanes(const std::array<double*, N>& columns, Index first, Ind
     Piece<N> piece = load_few(columns, first, last);
     change(piece);
     for (std::size_t k = 0; k < N; ++k)
-      for (Index i = first; i < last; ++i)
-        columns[k][i] = piece[k][i - first];
+      for (int l = 0; l < lanes - 1; ++l) // of constant length, lest the compiler calls memcpy for so little
+        if (first + l < last)
+          columns[k][first + l] = piece[k][l];
     return;
   }
   const auto store = [&columns](const Piece<N>& piece, Index to)

@@ -4,6 +4,36 @@
 
 namespace mpm
 {
+namespace
+{
+template <int D>
+void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& shape, CellMoments<D>& moments)
+{
+  const double mass = particles.mass[p], volume = particles.volume[p];
+  Vector<D> xi, mass_xi;
+  for (int i = 0; i < D; ++i)
+  {
+    xi[i] = particles.position[i][p] - shape.centre[i];
+    mass_xi[i] = mass * xi[i];
+    moments.mass_xi[i] += mass_xi[i];
+  }
+  moments.volume += volume;
+  moments.mass += mass;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+  {
+    moments.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+    moments.stress[k] += volume * particles.stress[stress_component<D>[k]][p];
+  }
+  for (int a = 0; a < D; ++a)
+  {
+    const double velocity = particles.velocity[a][p];
+    moments.momentum[a] += mass * velocity;
+    for (int b = 0; b < D; ++b)
+      moments.momentum_xi[a][b] += mass_xi[b] * velocity;
+  }
+}
+} // namespace
+
 template <int D>
 void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<D>& moments)
 {
@@ -19,6 +49,12 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
   columns[2 * D + S] = particles.mass.data();
   columns[2 * D + S + 1] = particles.volume.data();
 
+  if (last - first < lanes) // such as a particle that has changed cells; vectors would not be filled
+  {
+    for (Index p = first; p < last; ++p)
+      add_particle<D>(particles, p, shape, moments);
+    return;
+  }
   constexpr std::size_t members = sizeof(CellMoments<D>) / sizeof(double);
   struct Sums // as the moments, lane by lane
   {
