@@ -80,8 +80,9 @@ void gather(const PointBatch<D>& points, Candidates<D>& candidates)
     candidates.stress.set(i, {});
 }
 
-/// Returns the trial stresses of the candidates to the surface, those that are outside.
-template <int D>
+/// Returns the trial stresses of the candidates to the surface, those that are outside. What only tangents need is kept
+/// for them only: it would not fit into the first-level cache with the rest.
+template <int D, bool for_tangents, bool with_cutoff>
 void return_stresses(const Surface& surface, Candidates<D>& candidates)
 {
   const Surface m = surface; // a copy that no store can alias
@@ -91,17 +92,29 @@ void return_stresses(const Surface& surface, Candidates<D>& candidates)
   {
     const SymTensor<D> trial = candidates.stress.at(i);
     const Spectral<D> spectrum = spectral(trial);
-    const Returned returned = return_to_surface(m, spectrum.stress);
+    const Returned returned = return_to_surface<with_cutoff>(m, spectrum.stress);
     const bool elastic = returned.region == Region::elastic;
     SymTensor<D> stress = recomposed(returned.stress, spectrum.frame);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       stress[k] = elastic ? trial[k] : stress[k]; // not one bit of an elastic stress changes
     candidates.stress.set(i, stress);
-    candidates.trial.set(i, spectrum);
-    candidates.returned.set(i, returned);
+    if constexpr (for_tangents)
+    {
+      candidates.trial.set(i, spectrum);
+      candidates.returned.set(i, returned);
+    }
     candidates.plastic_strain[i] = deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
     candidates.is_plastic[i] = elastic ? 0 : 1;
   }
+}
+
+template <int D, bool for_tangents>
+void return_stresses(const Surface& m, Candidates<D>& candidates)
+{
+  if (m.tension < std::numeric_limits<double>::infinity())
+    return_stresses<D, for_tangents, true>(m, candidates);
+  else
+    return_stresses<D, for_tangents, false>(m, candidates);
 }
 
 /// Writes stress and state of the candidates back and returns how many yielded.
@@ -173,9 +186,13 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
     if (candidates.size == 0)
       continue;
     gather(points, candidates);
-    return_stresses(m, candidates);
-    if (points.tangent)
+    if (!points.tangent)
+      return_stresses<D, false>(m, candidates);
+    else
+    {
+      return_stresses<D, true>(m, candidates);
       write_tangents(m, *maps, candidates, points.tangent);
+    }
     report.plastic += scatter(candidates, points);
   }
   if (failed > 0)
