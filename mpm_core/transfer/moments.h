@@ -48,16 +48,28 @@ struct AffineField
 template <int D, class Nodal>
 inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
 {
-  AffineField<D> field{};
+  // The components of a vector side by side: half the instructions in three dimensions.
+  using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
+  using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
+  using Components = std::conditional_t<D == 2, Pair, Four>;
+  Components value{};
+  std::array<Components, D> by{}; // derivative by each coordinate
   for (int k = 0; k <= D; ++k)
   {
-    const Vector<D>& u = nodal(mesh.cells[cell][k]);
+    const Vector<D>& nodal_value = nodal(mesh.cells[cell][k]);
+    Components u{};
     for (int a = 0; a < D; ++a)
-    {
-      field.value[a] += u[a] * (1.0 / (D + 1));
-      for (int b = 0; b < D; ++b)
-        field.gradient[a][b] += u[a] * mesh.shapes[cell].gradient[k][b];
-    }
+      u[a] = nodal_value[a];
+    value += u * (1.0 / (D + 1));
+    for (int b = 0; b < D; ++b)
+      by[b] += u * mesh.shapes[cell].gradient[k][b];
+  }
+  AffineField<D> field;
+  for (int a = 0; a < D; ++a)
+  {
+    field.value[a] = value[a];
+    for (int b = 0; b < D; ++b)
+      field.gradient[a][b] = by[b][a];
   }
   return field;
 }
