@@ -5,6 +5,7 @@
 #include "materials/require.h"
 #include "materials/spectral.h"
 
+#include <algorithm>
 #include <optional>
 
 // The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
@@ -19,6 +20,10 @@ namespace
 /// Candidates are filled up to a multiple of this, so that no point is left to the scalar remainder of a vector loop:
 /// it would be slow, and might round differently, so that a point's result would depend on its neighbours.
 constexpr std::size_t lanes = 8;
+
+/// Share of candidates in a block from which on all of its points are treated as such, where they are: setting them
+/// side by side would cost more than the points that do not yield after all.
+constexpr double dense_share = 0.6;
 
 /// The points of a block that may yield, side by side
 template <int D>
@@ -80,41 +85,82 @@ void gather(const PointBatch<D>& points, Candidates<D>& candidates)
     candidates.stress.set(i, {});
 }
 
-/// Returns the trial stresses of the candidates to the surface, those that are outside. What only tangents need is kept
-/// for them only: it would not fit into the first-level cache with the rest.
+template <int D>
+using StressColumns = std::array<double*, n_stress<D>>;
+
+/// Returns the trial stresses in the columns to the surface, those that are outside. What only tangents need is kept
+/// for them only: it would not fit into the first-level cache with the rest. Not inlined, so that all points go
+/// through the same instructions and round alike.
 template <int D, bool for_tangents, bool with_cutoff>
-void return_stresses(const Surface& surface, Candidates<D>& candidates)
+[[gnu::noinline]] void return_stresses(const Surface& surface, const StressColumns<D>& columns, std::size_t size,
+                                       Candidates<D>& results)
 {
-  const Surface m = surface; // a copy that no store can alias
-  const std::size_t padded = (candidates.size + lanes - 1) / lanes * lanes;
+  const Surface m = surface; // copies that no store can alias
+  const StressColumns<D> stress = columns;
 #pragma GCC ivdep
-  for (std::size_t i = 0; i < padded; ++i)
+  for (std::size_t i = 0; i < size; ++i)
   {
-    const SymTensor<D> trial = candidates.stress.at(i);
+    SymTensor<D> trial;
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      trial[k] = stress[k][i];
     const Spectral<D> spectrum = spectral(trial);
     const Returned returned = return_to_surface<with_cutoff>(m, spectrum.stress);
     const bool elastic = returned.region == Region::elastic;
-    SymTensor<D> stress = recomposed(returned.stress, spectrum.frame);
+    const SymTensor<D> final = recomposed(returned.stress, spectrum.frame);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
-      stress[k] = elastic ? trial[k] : stress[k]; // not one bit of an elastic stress changes
-    candidates.stress.set(i, stress);
+      stress[k][i] = elastic ? trial[k] : final[k]; // not one bit of an elastic stress changes
     if constexpr (for_tangents)
     {
-      candidates.trial.set(i, spectrum);
-      candidates.returned.set(i, returned);
+      results.trial.set(i, spectrum);
+      results.returned.set(i, returned);
     }
-    candidates.plastic_strain[i] = deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
-    candidates.is_plastic[i] = elastic ? 0 : 1;
+    results.plastic_strain[i] = deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
+    results.is_plastic[i] = elastic ? 0 : 1;
   }
 }
 
 template <int D, bool for_tangents>
-void return_stresses(const Surface& m, Candidates<D>& candidates)
+void return_stresses(const Surface& m, const StressColumns<D>& columns, std::size_t size, Candidates<D>& results)
 {
   if (m.tension < std::numeric_limits<double>::infinity())
-    return_stresses<D, for_tangents, true>(m, candidates);
+    return_stresses<D, for_tangents, true>(m, columns, size, results);
   else
-    return_stresses<D, for_tangents, false>(m, candidates);
+    return_stresses<D, for_tangents, false>(m, columns, size, results);
+}
+
+/// Returns the candidates, side by side.
+template <int D, bool for_tangents>
+void return_candidates(const Surface& m, const PointBatch<D>& points, Candidates<D>& candidates)
+{
+  gather(points, candidates);
+  StressColumns<D> columns;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    columns[k] = candidates.stress.column(k).data();
+  return_stresses<D, for_tangents>(m, columns, (candidates.size + lanes - 1) / lanes * lanes, candidates);
+}
+
+/// Returns the points from `first` on where they are, as many as fill vectors; what is left stays with the candidates.
+/// @returns how many yielded
+template <int D>
+Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first, Index last, Candidates<D>& candidates)
+{
+  const std::size_t size = static_cast<std::size_t>(last - first) / lanes * lanes;
+  StressColumns<D> columns;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    columns[k] = points.stress[k] + first;
+  return_stresses<D, false>(m, columns, size, candidates);
+  double* const accumulated = points.state[0] + first;
+  std::int64_t plastic = 0;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < size; ++i)
+  {
+    accumulated[i] += candidates.plastic_strain[i];
+    plastic += candidates.is_plastic[i];
+  }
+  const auto begin = candidates.point.begin(), end = begin + static_cast<std::ptrdiff_t>(candidates.size);
+  const auto rest = std::lower_bound(begin, end, first + static_cast<Index>(size));
+  candidates.size = static_cast<std::size_t>(std::copy(rest, end, begin) - begin);
+  return static_cast<Index>(plastic);
 }
 
 /// Writes stress and state of the candidates back and returns how many yielded.
@@ -182,15 +228,17 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
   for (Index first = 0; first < points.size; first += block)
   {
     const Index last = std::min(points.size, first + block);
-    failed += elastic_step(m, points, first, last, candidates);
+    const Index failed_here = elastic_step(m, points, first, last, candidates);
+    failed += failed_here;
+    if (!points.tangent && failed_here == 0 && static_cast<double>(candidates.size) > dense_share * (last - first))
+      report.plastic += return_in_place(m, points, first, last, candidates);
     if (candidates.size == 0)
       continue;
-    gather(points, candidates);
     if (!points.tangent)
-      return_stresses<D, false>(m, candidates);
+      return_candidates<D, false>(m, points, candidates);
     else
     {
-      return_stresses<D, true>(m, candidates);
+      return_candidates<D, true>(m, points, candidates);
       write_tangents(m, *maps, candidates, points.tangent);
     }
     report.plastic += scatter(candidates, points);

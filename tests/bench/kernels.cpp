@@ -1,4 +1,4 @@
-/// The kernels of a step one by one, and the memory bandwidth that bounds them.
+/// The kernels of a step one by one, and the memory bandwidth and the arithmetic that bound them.
 
 #include "../cpp/boxes.h"
 
@@ -29,6 +29,29 @@ void stream_triad(benchmark::State& state)
   state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations() * 24 * n));
 }
 BENCHMARK(stream_triad)->Unit(benchmark::kMillisecond);
+
+/// Additions and multiplications per second that a core can do: products and sums fused, in registers, as many side by
+/// side as it takes to wait for none.
+void peak_arithmetic(benchmark::State& state)
+{
+  constexpr std::size_t lanes = 64;
+  constexpr int rounds = 1000;
+  std::array<double, lanes> sums{};
+  double factor = 0.999, summand = 0.001;
+  benchmark::DoNotOptimize(factor);
+  benchmark::DoNotOptimize(summand);
+  for (auto _ : state)
+  {
+    std::array<double, lanes> s = sums;
+    for (int round = 0; round < rounds; ++round)
+      for (std::size_t i = 0; i < lanes; ++i)
+        s[i] = s[i] * factor + summand;
+    sums = s;
+    benchmark::DoNotOptimize(sums);
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()) * 2 * rounds * static_cast<int>(lanes));
+}
+BENCHMARK(peak_arithmetic);
 
 /// A filled box with 10 particles per cell (8 in three dimensions) and its runs.
 template <int D>

@@ -22,6 +22,7 @@ def seconds_per_step(cell_size: float, steps: int, repetitions: int) -> tuple[fl
     model.roller(bridge.LEFT, (1, 0))
     model.fix(bridge.BASE)
     model.set_gravity((0, -9.81))
+    model.rebalance()
     dt = 0.5 * model.critical_time_step()
     best = float("inf")
     for _ in range(repetitions):

@@ -127,18 +127,19 @@ TYPED_TEST(Laws, CountsPointsThatCannotBeUpdated)
   for (Index i = 0; i < start.size; ++i)
     start.set_stress(i, random_stress<D>(random, 1e3));
   for (std::size_t k = 0; k < n; ++k)
-    for (const double bad : {not_a_number, infinity, -infinity, 1e200})
+    for (const auto& [bad, with_tangent] : std::initializer_list<std::pair<double, bool>>{
+             {not_a_number, true}, {infinity, true}, {-infinity, true}, {1e200, true}, {not_a_number, false}})
     {
       Points<D> clean = start, stress = start, strain = start;
       stress.stress[k][300] = stress.stress[k][599] = bad;
       strain.strain_increment[k][300] = strain.strain_increment[k][599] = bad;
-      clean.update(soil);
+      clean.update(soil, with_tangent);
       for (Points<D>* points : {&stress, &strain})
       {
         const Points<D> before = *points;
         Points<D> linear = *points;
         const BatchReport elastic_report = linear.update(elastic);
-        const BatchReport report = points->update(soil, true);
+        const BatchReport report = points->update(soil, with_tangent);
         EXPECT_EQ(report.failed, (std::vector<Index>{300, 599}));
         EXPECT_EQ(elastic_report.failed, (std::vector<Index>{300, 599}));
         for (Index i = 0; i < start.size; ++i)
@@ -150,7 +151,8 @@ TYPED_TEST(Laws, CountsPointsThatCannotBeUpdated)
                       std::isnan(expected.stress[j][p]) ? 0 : expected.stress[j][p]);
           EXPECT_EQ(points->plastic_strain[p], expected.plastic_strain[p]);
         }
-        EXPECT_EQ(points->tangent[300 * n * n], p_wave_modulus(soil));
+        if (with_tangent)
+          EXPECT_EQ(points->tangent[300 * n * n], p_wave_modulus(soil));
       }
     }
 }
