@@ -1,7 +1,70 @@
 #include "transfer/nodes.h"
 
+#include "transfer/lanes.h"
+
 namespace mpm
 {
+namespace
+{
+/// A number for each vertex of a cell. In three dimensions they fill a vector, so that the sums for all vertices take
+/// the instructions of one.
+template <int D>
+using ByVertex = std::conditional_t<D == 3, Lanes, std::array<double, D + 1>>;
+
+/// Derivatives of a cell's shape functions by each coordinate
+template <int D>
+std::array<ByVertex<D>, D> gradients_by_vertex(const CellShape<D>& shape)
+{
+  std::array<ByVertex<D>, D> gradients;
+  for (int b = 0; b < D; ++b)
+    for (int k = 0; k <= D; ++k)
+      gradients[b][k] = shape.gradient[k][b];
+  return gradients;
+}
+
+template <int D>
+void add(double factor, const ByVertex<D>& gradients, ByVertex<D>& sums)
+{
+  if constexpr (D == 3)
+    sums += factor * gradients;
+  else
+    for (int k = 0; k <= D; ++k)
+      sums[k] += factor * gradients[k];
+}
+
+/// sum over particles of q_p N_k(x_p) for all vertices k, from its zeroth and first moment
+template <int D>
+ByVertex<D> at_vertices(double zeroth, const Vector<D>& first, const std::array<ByVertex<D>, D>& gradients)
+{
+  ByVertex<D> sums;
+  for (int k = 0; k <= D; ++k)
+    sums[k] = zeroth * (1.0 / (D + 1));
+  for (int b = 0; b < D; ++b)
+    add<D>(first[b], gradients[b], sums);
+  return sums;
+}
+
+/// f_int of all vertices of a cell in a direction
+template <int D>
+ByVertex<D> internal_forces(const std::array<double, n_symmetric<D>>& stress, int a,
+                            const std::array<ByVertex<D>, D>& gradients)
+{
+  ByVertex<D> forces{};
+  for (int b = 0; b < D; ++b)
+    add<D>(stress[symmetric_index<D>(a, b)], gradients[b], forces);
+  return forces;
+}
+
+template <int D>
+void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMoments<D>& moments, std::span<NodeSums<D>> nodes)
+{
+  for (int k = 0; k <= D; ++k)
+    for (int a = 0; a < D; ++a)
+      nodes[mesh.cells[cell][k]].traction[a] +=
+          at_vertex<D>(moments.force[a], moments.force_xi[a], mesh.shapes[cell].gradient[k]);
+}
+} // namespace
+
 template <int D>
 void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
              std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes)
@@ -13,21 +76,26 @@ void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMome
     const CellMoments<D>& moments = cells[c];
     if (moments.mass == 0)
       continue;
+    const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
+    const ByVertex<D> mass = at_vertices<D>(moments.mass, moments.mass_xi, gradients);
+    std::array<ByVertex<D>, D> momentum, internal;
+    for (int a = 0; a < D; ++a)
+    {
+      momentum[a] = at_vertices<D>(moments.momentum[a], moments.momentum_xi[a], gradients);
+      internal[a] = internal_forces<D>(moments.stress, a, gradients);
+    }
     for (int k = 0; k <= D; ++k)
     {
       NodeSums<D>& node = nodes[mesh.cells[c][k]];
-      const Vector<D>& gradient = mesh.shapes[c].gradient[k];
-      const Vector<D> force = internal_force<D>(moments.stress, gradient);
-      node.mass += at_vertex<D>(moments.mass, moments.mass_xi, gradient);
+      node.mass += mass[k];
       for (int a = 0; a < D; ++a)
       {
-        node.momentum[a] += at_vertex<D>(moments.momentum[a], moments.momentum_xi[a], gradient);
-        node.internal[a] += force[a];
+        node.momentum[a] += momentum[a][k];
+        node.internal[a] += internal[a][k];
       }
-      if (!tractions.empty())
-        for (int a = 0; a < D; ++a)
-          node.traction[a] += at_vertex<D>(tractions[c].force[a], tractions[c].force_xi[a], gradient);
     }
+    if (!tractions.empty())
+      scatter_tractions<D>(mesh, c, tractions[c], nodes);
   }
 }
 
@@ -43,9 +111,13 @@ void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const
     if (cells[c].mass == 0)
       continue;
     const CellMomentum<D> sum = changed_momentum<D>(cells[c], keep, affine_field<D>(mesh, c, nodal));
+    const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
+    std::array<ByVertex<D>, D> sums;
+    for (int a = 0; a < D; ++a)
+      sums[a] = at_vertices<D>(sum.value[a], sum.first[a], gradients);
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
-        momentum[mesh.cells[c][k]][a] += at_vertex<D>(sum.value[a], sum.first[a], mesh.shapes[c].gradient[k]);
+        momentum[mesh.cells[c][k]][a] += sums[a][k];
   }
 }
 

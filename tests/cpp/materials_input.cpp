@@ -151,8 +151,7 @@ TYPED_TEST(Laws, CountsPointsThatCannotBeUpdated)
                       std::isnan(expected.stress[j][p]) ? 0 : expected.stress[j][p]);
           EXPECT_EQ(points->plastic_strain[p], expected.plastic_strain[p]);
         }
-        if (with_tangent)
-          EXPECT_EQ(points->tangent[300 * n * n], p_wave_modulus(soil));
+        EXPECT_TRUE(!with_tangent || points->tangent[300 * n * n] == p_wave_modulus(soil));
       }
     }
 }
