@@ -112,7 +112,7 @@ struct Workspace
   std::vector<int> far_partners; ///< ranks beyond the neighbours that exchange particles after this pass
   std::unordered_map<GlobalIndex, Index> owned_cells;
   std::optional<Trouble<D>> trouble;
-  double least_mass = 0; ///< nodes below this mass are not moved [kg]
+  double least_mass = 0;        ///< nodes below this mass are not moved [kg]
   Index strays = 0;             ///< particles that changed cell since the last sort
   std::int64_t stray_steps = 0; ///< their sum over the steps since
 };
