@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,15 +18,21 @@ namespace
 {
 /// What HDF5's own tables take at most for one dataset and its group, in bytes (measured: some 2000).
 constexpr std::int64_t table_size = 4096;
+/// The same for a group alone.
+constexpr std::int64_t group_size = 512;
 /// Room that is always kept for tables that HDF5 has not written yet, in bytes.
 constexpr std::int64_t table_room = 1 << 18;
+
+/// More names than this in a group go into tables of their own.
+constexpr unsigned most_names_inside = 64;
 
 /// What is reserved at once beyond what is needed: a quarter of it, between these, in bytes. Each call costs some time.
 constexpr std::int64_t least_ahead = 1 << 20, most_ahead = 1 << 26;
 
-/// Reserves space on the disk for bytes [first, last) of a file, which is created if it is not there; its size stays. A
-/// disk that fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that was
-/// written stays. File systems that cannot reserve are taken at their word.
+/// Reserves space on the disk for bytes [first, last) of a file, which is created if it is not there and becomes as
+/// long. A disk that fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that
+/// was written stays. And readers, who note the length of a file first, never find it shorter than HDF5 says it must
+/// be. File systems that cannot reserve are taken at their word.
 /// @return why it cannot be had; empty if it can
 std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t first, std::int64_t last)
 {
@@ -34,24 +41,56 @@ std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t
     return std::strerror(errno);
   int error = 0;
 #ifdef __linux__
-  // Room beyond the end of a file does not count as its size yet.
   rlimit limit{};
   if (::getrlimit(RLIMIT_FSIZE, &limit) == 0 && static_cast<rlim_t>(last) > limit.rlim_cur)
     error = EFBIG;
-  else if (::fallocate(file, FALLOC_FL_KEEP_SIZE, first, last - first) != 0 && errno != EOPNOTSUPP)
+  else if (::fallocate(file, 0, first, last - first) != 0 && errno != EOPNOTSUPP)
     error = errno;
 #endif
   ::close(file);
   return error == 0 ? "" : std::strerror(error);
 }
 
-/// Gives back what was reserved beyond the end of a file.
-void release_rest(const std::filesystem::path& path)
+/// Lets HDF5 write changed tables between flushes, to make room in memory, or not.
+void allow_early_writing(std::int64_t file, bool allowed)
 {
-  std::error_code error;
-  if (const auto size = std::filesystem::file_size(path, error); !error)
-    std::filesystem::resize_file(path, size, error); // of no consequence where it fails
+  H5AC_cache_config_t cache{};
+  cache.version = H5AC__CURR_CACHE_CONFIG_VERSION;
+  H5Fget_mdc_config(file, &cache);
+  cache.evictions_enabled = allowed;
+  H5Fset_mdc_config(file, &cache);
 }
+
+/// Bytes that the disk keeps for a file, its size or more.
+std::int64_t kept_bytes(const std::filesystem::path& path)
+{
+  struct stat status
+  {
+  };
+  return ::stat(path.c_str(), &status) == 0 ? 512 * static_cast<std::int64_t>(status.st_blocks) : 0;
+}
+
+/// How the file is accessed. Its tables are kept in memory up to a fixed size: HDF5 goes through all of them at each
+/// flush, which would come to cost more than the values in a long run.
+hid_t access_properties(MPI_Comm comm, bool parallel)
+{
+  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+  if (parallel) // alone, a rank writes four times as fast without MPI in between
+    H5Pset_fapl_mpio(access, comm, MPI_INFO_NULL);
+  H5Pset_file_locking(access, false, true); // others may read while the run goes on
+  H5Pset_sieve_buf_size(access, 1);         // whole arrays are written, so nothing is to be gathered
+  H5AC_cache_config_t cache{};
+  cache.version = H5AC__CURR_CACHE_CONFIG_VERSION;
+  H5Pget_mdc_config(access, &cache);
+  cache.set_initial_size = true;
+  cache.initial_size = cache.min_size = cache.max_size = 1 << 16;
+  cache.incr_mode = H5C_incr__off;
+  cache.flash_incr_mode = H5C_flash_incr__off;
+  cache.decr_mode = H5C_decr__off;
+  H5Pset_mdc_config(access, &cache);
+  return access;
+}
+
 } // namespace
 
 RowSlice row_slice(MPI_Comm comm, std::size_t local)
@@ -67,16 +106,13 @@ RowSlice row_slice(MPI_Comm comm, std::size_t local)
 
 Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block) : _comm(comm), _path(std::move(path))
 {
-  if (!has_room(0))
+  if (!has_room(table_size))
     check();
   const Quiet quiet;
-  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   int size = 1;
   MPI_Comm_size(_comm, &size);
   _parallel = size > 1;
-  if (_parallel) // alone, a rank writes four times as fast without MPI in between
-    H5Pset_fapl_mpio(access, _comm, MPI_INFO_NULL);
-  H5Pset_file_locking(access, false, true); // others may read while the run goes on
+  const hid_t access = access_properties(_comm, _parallel);
   const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
   H5Pset_userblock(creation, static_cast<hsize_t>(user_block));
   _file = H5Fcreate(_path.c_str(), H5F_ACC_TRUNC, creation, access);
@@ -94,6 +130,7 @@ Hdf5File::~Hdf5File()
   if (finalized || _file < 0)
     return;
   const Quiet quiet;
+  leave_group();
   H5Fclose(_file);
 }
 
@@ -105,7 +142,7 @@ void Hdf5File::note(bool succeeded, const char* doing)
 
 bool Hdf5File::has_room(std::int64_t bytes)
 {
-  _needed += bytes + table_size;
+  _needed += bytes;
   const std::int64_t needed = _needed + table_room;
   if (needed <= _reserved)
     return true;
@@ -134,17 +171,65 @@ void Hdf5File::create_group(const std::string& name)
   if (_file < 0)
     throw RunError("cannot write " + _path.string() + ": it is closed");
   const Quiet quiet;
+  if (!has_room(group_size))
+    return;
   const hid_t group = H5Gcreate2(_file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   note(group >= 0, "write");
   if (group >= 0)
     H5Gclose(group);
 }
 
+void Hdf5File::create_groups(const std::vector<std::string>& names)
+{
+  if (_file < 0)
+    throw RunError("cannot write " + _path.string() + ": it is closed");
+  const Quiet quiet;
+  if (!has_room(group_size * static_cast<std::int64_t>(names.size())))
+    return;
+  const hid_t creation = H5Pcreate(H5P_GROUP_CREATE);
+  // With their order kept, a few names are stored in the group itself instead of in tables beside it.
+  H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED);
+  H5Pset_link_phase_change(creation, most_names_inside, most_names_inside / 2);
+  std::vector<hid_t> groups;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    groups.push_back(H5Gcreate_anon(_file, creation, H5P_DEFAULT));
+  H5Pclose(creation);
+  flush();
+  allow_early_writing(_file, false);
+  for (std::size_t k = 0; k < names.size(); ++k)
+  {
+    note(H5Olink(groups[k], _file, names[k].c_str(), H5P_DEFAULT, H5P_DEFAULT) >= 0, "write");
+    H5Gclose(groups[k]);
+  }
+  flush();
+  allow_early_writing(_file, true);
+}
+
+void Hdf5File::remove_group(const std::string& name)
+{
+  const Quiet quiet;
+  note(H5Ldelete(_file, name.c_str(), H5P_DEFAULT) >= 0, "write");
+}
+
+void Hdf5File::enter_group(const std::string& name)
+{
+  const Quiet quiet;
+  leave_group();
+  _group = H5Gopen2(_file, name.c_str(), H5P_DEFAULT);
+  note(_group >= 0, "write");
+}
+
+void Hdf5File::leave_group()
+{
+  if (_group >= 0)
+    H5Gclose(std::exchange(_group, -1));
+}
+
 template <class T>
 void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, std::span<const T> values)
 {
   const Quiet quiet;
-  if (!has_room(rows.total * width * static_cast<std::int64_t>(sizeof(T))))
+  if (!has_room(table_size + rows.total * width * static_cast<std::int64_t>(sizeof(T))))
     return;
   const int rank = width == 1 ? 1 : 2;
   const hsize_t columns = static_cast<hsize_t>(width);
@@ -166,7 +251,8 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
     H5Pset_shuffle(creation);
     H5Pset_deflate(creation, static_cast<unsigned>(_compression));
   }
-  const hid_t dataset = H5Dcreate2(_file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT, creation, H5P_DEFAULT);
+  const hid_t dataset = H5Dcreate2(_group >= 0 ? _group : _file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT,
+                                   creation, H5P_DEFAULT);
   H5Pclose(creation);
   note(dataset >= 0, "write");
   const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
@@ -184,7 +270,7 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
 void Hdf5File::write_text(const std::string& name, const std::string& text)
 {
   const Quiet quiet;
-  if (!has_room(static_cast<std::int64_t>(text.size())))
+  if (!has_room(table_size + static_cast<std::int64_t>(text.size())))
     return;
   const hid_t type = H5Tcopy(H5T_C_S1);
   H5Tset_size(type, text.size() + 1);
@@ -202,7 +288,9 @@ void Hdf5File::flush()
 {
   const Quiet quiet;
   note(H5Fflush(_file, H5F_SCOPE_GLOBAL) >= 0, "write");
-  _reserved = 0;
+  // Where the file was cut to its size, as MPI does, what was reserved beyond is gone.
+  if (_parallel || kept_bytes(_path) < _reserved)
+    _reserved = 0;
 }
 
 void Hdf5File::check()
@@ -215,15 +303,18 @@ void Hdf5File::close()
 {
   if (_file < 0)
     return;
-  {
-    const Quiet quiet;
-    note(H5Fclose(_file) >= 0, "close");
-  }
-  _file = -1;
+  const Quiet quiet;
+  leave_group();
+  flush();
   int rank = 0;
   MPI_Comm_rank(_comm, &rank);
-  if (rank == 0)
-    release_rest(_path);
+  hsize_t length = 0;
+  if (rank == 0 && H5Fget_filesize(_file, &length) >= 0)
+  {
+    std::error_code of_no_consequence;
+    std::filesystem::resize_file(_path, length, of_no_consequence); // gives back what was reserved
+  }
+  note(H5Fclose(std::exchange(_file, -1)) >= 0, "close");
   check();
 }
 

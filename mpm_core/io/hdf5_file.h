@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace mpm
 {
@@ -42,8 +43,19 @@ public:
 
   void create_group(const std::string& name);
 
+  /// Makes empty groups at once. The list of names in a file is what a kill while it is written spoils for all that is
+  /// named in it, so it is better written seldom than often; the groups are in the file before it names them.
+  void create_groups(const std::vector<std::string>& names);
+
+  /// Takes a group away, with all that is in it.
+  void remove_group(const std::string& name);
+
+  /// Opens a group for the datasets written from now on, until `leave_group`.
+  void enter_group(const std::string& name);
+  void leave_group();
+
   /// Writes a whole array, each rank its rows.
-  /// @param name    of the dataset, from the root: "/frames/0/position"
+  /// @param name    of the dataset, from the root, or in the group that was entered
   /// @param rows    this rank's share, from `row_slice`
   /// @param width   values per row; the dataset has the shape (rows.total, width), or (rows.total,) if the width is 1
   /// @param values  (rows.local, width) row-major; T is float, double, std::int32_t or std::int64_t
@@ -72,11 +84,12 @@ private:
 
   MPI_Comm _comm;
   std::filesystem::path _path;
-  std::int64_t _file = -1; ///< hid_t, which is not named here so that only sources of this folder see HDF5
-  std::string _failure;    ///< what failed first on this rank; empty if nothing did
+  std::int64_t _file = -1;  ///< hid_t, which is not named here so that only sources of this folder see HDF5
+  std::int64_t _group = -1; ///< hid_t of the group that was entered
+  std::string _failure;     ///< what failed first on this rank; empty if nothing did
   int _compression = 0;
   bool _parallel = false;     ///< several ranks write by MPI; one by itself does without
   std::int64_t _needed = 0;   ///< bytes that the file may have come to need
-  std::int64_t _reserved = 0; ///< bytes that are certain to be had; HDF5 gives the rest back when it flushes
+  std::int64_t _reserved = 0; ///< bytes that are certain to be had
 };
 } // namespace mpm

@@ -11,6 +11,11 @@ namespace
 {
 const std::array<const char*, 6> component_names = {"xx", "yy", "zz", "xy", "yz", "xz"};
 
+/// Groups for frames are made so many at a time; a frame itself changes its own group only.
+constexpr int groups_ahead = 64;
+
+std::string frame_group(int frame) { return "/frames/" + std::to_string(frame); }
+
 std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix)
 {
   if (path.extension() == ".h5" || path.extension() == ".xdmf")
@@ -79,18 +84,24 @@ void require_frame(MPI_Comm comm, double time, std::string error, const std::vec
 } // namespace
 
 SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage)
-    : _file(comm, with_suffix(path, ".h5")), _xdmf_path(with_suffix(path, ".xdmf")), _grid(std::move(grid)),
-      _storage(storage)
+    : _file(comm, with_suffix(path, ".h5")), _xdmf(with_suffix(path, ".xdmf"), std::move(grid)), _storage(storage)
 {
   _file.set_compression(storage.compression);
-  replace_xdmf(xdmf_series(_grid, ""));
+  with_xdmf([&] { return _xdmf.write_without_frames(); });
   _file.create_group("/frames");
 }
 
 void SeriesFile::begin_frame()
 {
-  _group = "/frames/" + std::to_string(_n_frames);
-  _file.create_group(_group);
+  if (_n_frames == _n_groups)
+  {
+    std::vector<std::string> names;
+    for (int k = 0; k < groups_ahead; ++k)
+      names.push_back(frame_group(_n_groups++));
+    _file.create_groups(names);
+  }
+  _group = frame_group(_n_frames);
+  _file.enter_group(_group);
 }
 
 template <class T>
@@ -99,52 +110,52 @@ void SeriesFile::copy_columns(std::span<const double> values, const Columns& fro
   const auto width = static_cast<std::size_t>(from.width), padded = static_cast<std::size_t>(from.padded_width);
   const std::size_t n = values.size() / width;
   columns.resize(n * padded);
-  for (std::size_t row = 0; row < n; ++row)
-  {
-    const double* in = &values[row * width + static_cast<std::size_t>(from.first)];
-    T* out = &columns[row * padded];
-    for (std::size_t k = 0; k < padded; ++k)
-      out[k] = k < static_cast<std::size_t>(from.count) ? static_cast<T>(in[k]) : T(0);
-  }
+  if (padded == width)
+    std::transform(values.begin(), values.end(), columns.begin(), [](double v) { return static_cast<T>(v); });
+  else if (padded == 1)
+    for (std::size_t row = 0; row < n; ++row)
+      columns[row] = static_cast<T>(values[row * width + static_cast<std::size_t>(from.first)]);
+  else
+    for (std::size_t row = 0; row < n; ++row)
+      for (std::size_t k = 0; k < padded; ++k)
+        columns[row * padded + k] = k < width ? static_cast<T>(values[row * width + k]) : T(0);
 }
 
 XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
                                  const Columns& columns)
 {
-  const std::string dataset = _group + "/" + name;
   const bool single = _storage.precision == Precision::float32;
   const int width = columns.padded_width;
   if (single)
   {
     // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
     copy_columns(values, columns, _single);
-    _file.write<float>(dataset, rows, width, _single);
+    _file.write<float>(name, rows, width, _single);
   }
   else if (width == columns.width)
-    _file.write<double>(dataset, rows, width, values);
+    _file.write<double>(name, rows, width, values);
   else
   {
     copy_columns(values, columns, _columns);
-    _file.write<double>(dataset, rows, width, _columns);
+    _file.write<double>(name, rows, width, _columns);
   }
-  return {_file.path().filename().string() + ":" + dataset, rows.total, width, false, single ? 4 : 8};
+  return {address(name), rows.total, width, false, single ? 4 : 8};
 }
 
 XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& rows, int width,
                                     std::span<const std::int64_t> values)
 {
-  const std::string dataset = _group + "/" + name;
   int small =
       std::all_of(values.begin(), values.end(), [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
   MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
   if (small)
   {
     _integers.assign(values.begin(), values.end());
-    _file.write<std::int32_t>(dataset, rows, width, _integers);
+    _file.write<std::int32_t>(name, rows, width, _integers);
   }
   else
-    _file.write<std::int64_t>(dataset, rows, width, values);
-  return {_file.path().filename().string() + ":" + dataset, rows.total, width, true, small ? 4 : 8};
+    _file.write<std::int64_t>(name, rows, width, values);
+  return {address(name), rows.total, width, true, small ? 4 : 8};
 }
 
 XdmfData SeriesFile::write_points(const std::string& name, const RowSlice& rows, int dimension,
@@ -184,25 +195,39 @@ std::string SeriesFile::write_index_fields(const std::string& center, const RowS
 
 void SeriesFile::end_frame(double time, const std::string& content)
 {
+  _file.leave_group();
   _file.flush();
   _file.check();
   ++_n_frames;
-  _frames += xdmf_frame(time, content);
-  replace_xdmf(xdmf_series(_grid, _frames));
+  with_xdmf([&] { return _xdmf.append(xdmf_frame(time, content)); });
 }
 
 void SeriesFile::write_single(const std::string& content)
 {
   _file.flush();
   _file.check();
-  replace_xdmf(xdmf_single(_grid, content));
+  with_xdmf([&] { return _xdmf.write_single(content); });
 }
 
-void SeriesFile::replace_xdmf(const std::string& text)
+void SeriesFile::close()
+{
+  for (; _n_groups > _n_frames; --_n_groups)
+    _file.remove_group(frame_group(_n_groups - 1));
+  _file.close();
+  with_xdmf([&] { return _xdmf.finish(); });
+}
+
+std::string SeriesFile::address(const std::string& name) const
+{
+  return _file.path().filename().string() + ":" + _group + "/" + name;
+}
+
+template <class F>
+void SeriesFile::with_xdmf(F&& work)
 {
   int rank = 0;
   MPI_Comm_rank(comm(), &rank);
-  const std::string failure = shared_failure(comm(), rank == 0 ? replaced_file(_xdmf_path, text) : "");
+  const std::string failure = shared_failure(comm(), rank == 0 ? work() : std::string());
   if (!failure.empty())
     throw RunError(failure);
 }

@@ -74,7 +74,8 @@ public:
   /// Writes the XDMF file of a grid without time.
   void write_single(const std::string& content);
 
-  void close() { _file.close(); }
+  /// Closes both files.
+  void close();
   MPI_Comm comm() const { return _file.comm(); }
 
 private:
@@ -89,15 +90,18 @@ private:
   static void copy_columns(std::span<const double> values, const Columns& from, std::vector<T>& columns);
   XdmfData write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
                        const Columns& columns);
-  void replace_xdmf(const std::string& text);
+  /// Where a dataset of the present group is to be found, in XDMF.
+  std::string address(const std::string& name) const;
+  /// Lets the first rank do something with the XDMF file; what goes wrong is an error on all.
+  template <class F>
+  void with_xdmf(F&& work);
 
   Hdf5File _file;
-  std::filesystem::path _xdmf_path;
-  std::string _grid;
+  XdmfSeries _xdmf;
   Storage _storage;
   std::string _group; ///< group that datasets go into, without trailing slash
   int _n_frames = 0;
-  std::string _frames;                 ///< XDMF of the frames so far
+  int _n_groups = 0;                   ///< groups that are there for frames; those behind the last frame are empty
   std::vector<std::int32_t> _integers; ///< room for numbers that need no more
   std::vector<float> _single;          ///< room for a field in single precision
   std::vector<double> _columns;        ///< the same in double precision, where columns are chosen or padded

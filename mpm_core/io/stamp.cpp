@@ -1,8 +1,8 @@
 #include "io/stamp.h"
 
+#include "io/descriptor.h"
 #include "parallel/agreement.h"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -14,24 +14,6 @@ namespace mpm
 {
 namespace
 {
-/// A file that closes itself.
-class Descriptor
-{
-public:
-  Descriptor(const std::filesystem::path& path, int flags) : _file(::open(path.c_str(), flags | O_CLOEXEC)) {}
-  ~Descriptor()
-  {
-    if (_file >= 0)
-      ::close(_file);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return _file; }
-
-private:
-  int _file;
-};
-
 struct Sum
 {
   std::uint64_t checksum = 0;

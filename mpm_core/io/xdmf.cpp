@@ -1,5 +1,8 @@
 #include "io/xdmf.h"
 
+#include "io/descriptor.h"
+
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -25,9 +28,50 @@ std::string attribute_type(int width)
   }
 }
 
-std::string document(const std::string& grid)
+const std::string document_head = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n";
+const std::string document_end = "</Domain>\n</Xdmf>\n";
+const std::string series_end = "</Grid>\n" + document_end;
+/// The end of a series that has room behind it; and the end of that room.
+const std::string open_end = series_end + "<?room ", room_end = "?>\n";
+
+constexpr std::size_t least_room = 1 << 16;
+
+/// Spaces to put where the file is this long, so that an end written behind them lies in one page: the system writes
+/// that at once, even if the run is killed meanwhile.
+std::size_t spaces_before_end(std::size_t length)
 {
-  return "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n" + grid + "</Domain>\n</Xdmf>\n";
+  constexpr std::size_t page = 4096;
+  const std::size_t used = length % page;
+  return used + open_end.size() > page ? page - used : 0;
+}
+
+/// Writes a text so that readers see the old file or the new one, whole, whenever they look or the run is killed.
+std::string replaced_file(const std::filesystem::path& path, const std::string& text)
+{
+  std::filesystem::path aside = path;
+  aside += ".part";
+  errno = 0;
+  std::ofstream file(aside, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (!file)
+    return "cannot write " + aside.string() + ": " + std::strerror(errno);
+  std::error_code error;
+  std::filesystem::rename(aside, path, error);
+  return error ? "cannot write " + path.string() + ": " + error.message() : "";
+}
+
+/// Overwrites a part of a file.
+bool overwritten(int file, const std::string& text, std::size_t at)
+{
+  for (std::size_t done = 0; done < text.size();)
+  {
+    const auto wrote = ::pwrite(file, text.data() + done, text.size() - done, static_cast<off_t>(at + done));
+    if (wrote <= 0)
+      return false;
+    done += static_cast<std::size_t>(wrote);
+  }
+  return true;
 }
 } // namespace
 
@@ -69,29 +113,41 @@ std::string xdmf_frame(double time, const std::string& content)
   return text.str();
 }
 
-std::string xdmf_series(const std::string& name, const std::string& frames)
+std::string XdmfSeries::write_single(const std::string& content)
 {
-  return document("<Grid Name=\"" + name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n" + frames +
-                  "</Grid>\n");
+  return replaced_file(_path,
+                       document_head + "<Grid Name=\"" + _name + "\" GridType=\"Uniform\">\n" + content + series_end);
 }
 
-std::string xdmf_single(const std::string& name, const std::string& content)
+std::string XdmfSeries::append(const std::string& frame)
 {
-  return document("<Grid Name=\"" + name + "\" GridType=\"Uniform\">\n" + content + "</Grid>\n");
-}
-
-std::string replaced_file(const std::filesystem::path& path, const std::string& text)
-{
-  std::filesystem::path aside = path;
-  aside += ".part";
+  const std::size_t from = _end + open_end.size(), spaces = spaces_before_end(from + frame.size());
+  const std::string addition = frame + std::string(spaces, ' ') + open_end;
+  _frames += frame;
+  if (from + addition.size() > _room_end)
+    return rewrite(std::max(least_room, _frames.size()));
   errno = 0;
-  std::ofstream file(aside, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (!file)
-    return "cannot write " + aside.string() + ": " + std::strerror(errno);
-  std::error_code error;
-  std::filesystem::rename(aside, path, error);
-  return error ? "cannot write " + path.string() + ": " + error.message() : "";
+  const Descriptor file(_path, O_WRONLY);
+  if (file.number() < 0 || !overwritten(file.number(), addition, from) ||
+      !overwritten(file.number(), std::string(open_end.size(), ' '), _end))
+    return "cannot write " + _path.string() + ": " + std::strerror(errno);
+  _end = from + frame.size() + spaces;
+  return {};
+}
+
+std::string XdmfSeries::finish() { return _frames.empty() ? "" : rewrite(0); }
+
+std::string XdmfSeries::rewrite(std::size_t room)
+{
+  std::string text =
+      document_head + "<Grid Name=\"" + _name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n" + _frames;
+  if (room == 0)
+    return replaced_file(_path, text + series_end);
+  text.append(spaces_before_end(text.size()), ' ');
+  _end = text.size();
+  text += open_end;
+  text.append(room, ' ');
+  _room_end = text.size();
+  return replaced_file(_path, text + room_end);
 }
 } // namespace mpm

@@ -34,13 +34,35 @@ std::string xdmf_attribute(const std::string& name, const std::string& center, c
 /// One frame of a series.
 std::string xdmf_frame(double time, const std::string& content);
 
-/// A whole file: frames as a collection over time.
-std::string xdmf_series(const std::string& name, const std::string& frames);
+/// The XDMF file of a series. Readers find a whole document in it whenever they look or the run is killed.
+///
+/// A frame is added without writing those before it once more. The file goes on after the document's end with a
+/// processing instruction of many spaces, which readers skip. A frame, and the document's new end, are written among
+/// these spaces; then the old end, with the beginning of the instruction, is blotted out. When there is no room left,
+/// or at the end, the whole file is written aside and renamed.
+///
+/// Functions give what went wrong, with path and reason; an empty text if nothing did.
+class XdmfSeries
+{
+public:
+  /// @param name  of the grid
+  XdmfSeries(std::filesystem::path path, std::string name) : _path(std::move(path)), _name(std::move(name)) {}
 
-/// A whole file: one grid without time.
-std::string xdmf_single(const std::string& name, const std::string& content);
+  std::string write_without_frames() { return rewrite(0); }
+  /// Writes one grid without time in place of the series.
+  std::string write_single(const std::string& content);
+  /// Adds a frame, made by `xdmf_frame`.
+  std::string append(const std::string& frame);
+  /// Leaves the document without room behind it. Nothing is added after that.
+  std::string finish();
 
-/// Writes a text so that readers see the old file or the new one, whole, whenever they look or the run is killed.
-/// @return what went wrong, with path and reason; empty if nothing did
-std::string replaced_file(const std::filesystem::path& path, const std::string& text);
+private:
+  std::string rewrite(std::size_t room);
+
+  std::filesystem::path _path;
+  std::string _name;
+  std::string _frames;       ///< those so far
+  std::size_t _end = 0;      ///< where the document's end begins in the file
+  std::size_t _room_end = 0; ///< where the spaces end
+};
 } // namespace mpm

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import time
 from xml.etree import ElementTree
 
 import h5py
@@ -103,6 +104,9 @@ def test_vtk_reads_particles_and_mesh_over_time(tmp_path):
     with ParticleOutput(tmp_path / "particles", COMM) as output:
         for step, fields in enumerate(frames):
             output.write(float(step), fields)
+            # The files are still open.
+            data = read_with_vtk(tmp_path / "particles.xdmf", float(step))
+            assert data.GetNumberOfPoints() == len(fields["position"])
     for step, fields in enumerate(frames):
         data = read_with_vtk(tmp_path / "particles.xdmf", float(step))
         n = len(fields["position"])
@@ -146,33 +150,77 @@ def test_both_files_are_valid_while_the_run_goes_on(tmp_path):
         for step in range(3):
             output.write(float(step), particle_fields(5, 2))
             tree = ElementTree.parse(tmp_path / "particles.xdmf")
-            assert [float(time.get("Value")) for time in tree.iter("Time")] == list(range(step + 1))
-            # Another process, as ParaView is.
-            read = "import h5py, sys; print(len(h5py.File(sys.argv[1])['frames']))"
+            assert [float(t.get("Value")) for t in tree.iter("Time")] == list(range(step + 1))
+            # Another process, as ParaView is. Empty groups are room for frames to come.
+            read = "import h5py, sys; print(sum(len(g) > 0 for g in h5py.File(sys.argv[1])['frames'].values()))"
             counted = subprocess.run(
                 [sys.executable, "-c", read, tmp_path / "particles.h5"], capture_output=True, text=True, check=True
             )
             assert int(counted.stdout) == step + 1
 
 
-def test_frames_survive_a_kill(tmp_path):
-    script = f"""
-import os, signal
+def test_a_long_series_is_valid_all_the_time(tmp_path):
+    path, n = tmp_path / "particles.xdmf", 400  # frames, more than room is kept for at once, in both files
+    with ParticleOutput(path, COMM) as output:
+        for step in range(n):
+            output.write(float(step), {"position": np.full((2, 2), step), "mass": np.full(2, step)})
+            if step % 7 == 0 or step > n - 10:
+                times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
+                assert times == list(range(step + 1))
+    with h5py.File(tmp_path / "particles.h5") as file:
+        assert set(file["frames"]) == {str(step) for step in range(n)}
+        assert all(file[f"frames/{step}/mass"][1] == step for step in range(n))
+    times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
+    assert times == list(range(n)) and path.read_text().endswith("</Xdmf>\n")
+
+
+# Frames until it is killed; each field of frame k is k.
+WRITES_FOR_EVER = """
+import itertools, sys, time
 import numpy as np
 from mpi4py import MPI
-from mpm_core.output import ParticleOutput
-output = ParticleOutput({str(tmp_path / "particles")!r}, MPI.COMM_WORLD)
-for step in range(4):
-    output.write(step, {{"position": np.full((1000, 2), step)}})
-os.kill(os.getpid(), signal.SIGKILL)
+from mpm_core.output import MeshOutput, ParticleOutput
+particles = ParticleOutput(sys.argv[1] + "/particles", MPI.COMM_WORLD)
+mesh = MeshOutput(sys.argv[1] + "/mesh", MPI.COMM_WORLD, np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
+for step in itertools.count():
+    particles.write(step, {"position": np.full((1000, 2), step), "mass": np.full(1000, step)})
+    mesh.write(step, {"mass": np.full(3, step)})
+    print(step, flush=True)
+    time.sleep(0.003)
 """
-    killed = subprocess.run([sys.executable, "-c", script], timeout=60)
-    assert killed.returncode == -signal.SIGKILL
-    with meshio.xdmf.TimeSeriesReader(tmp_path / "particles.xdmf") as reader:
-        reader.read_points_cells()
-        assert reader.num_steps == 4
-        for step in range(4):
-            np.testing.assert_array_equal(reader.read_data(step)[1]["position"][:, :2], step)
+
+
+def read_all(folder):
+    """Reads both series by meshio and all that h5py finds under the names in the XDMF files; gives the numbers of frames."""
+    counts = []
+    for name in ("particles", "mesh"):
+        with meshio.xdmf.TimeSeriesReader(folder / f"{name}.xdmf") as reader:
+            reader.read_points_cells()
+            counts.append(reader.num_steps)
+            for step in {0, reader.num_steps // 2, reader.num_steps - 1}:
+                t, data, _ = reader.read_data(step)
+                assert t == step and np.all(data["mass"] == step)
+        with h5py.File(folder / f"{name}.h5") as file:
+            assert all(np.all(file[f"frames/{step}/mass"][()] == step) for step in range(counts[-1]))
+    return counts
+
+
+def test_series_are_read_while_the_run_goes_on_and_after_a_kill(tmp_path):
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        with subprocess.Popen(
+            [sys.executable, "-c", WRITES_FOR_EVER, tmp_path], stdout=subprocess.PIPE, text=True
+        ) as run:
+            for line in run.stdout:
+                if line == "1\n":
+                    break
+            first, _ = read_all(tmp_path)
+            time.sleep(0.3 * random.random())
+            second, _ = read_all(tmp_path)
+            run.kill()
+        last, _ = read_all(tmp_path)
+        assert 2 <= first < second <= last
+        assert run.returncode == -signal.SIGKILL
 
 
 def test_missing_folder_is_named(tmp_path):
