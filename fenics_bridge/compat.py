@@ -8,6 +8,7 @@ Tested with 0.5.2 and 0.9.0; what differs in 0.10 follows its documentation.
 from __future__ import annotations
 
 import inspect
+import os
 
 import dolfinx
 import numpy as np
@@ -30,6 +31,8 @@ def create_mesh(comm, points, cells, dim):
     cells: (m, dim + 1) int64, this rank's share of the cells, by those numbers
     Collective.
     """
+    # PT-SCOTCH 7 takes all cores of the machine for each rank, and its threads cut a mesh differently each time.
+    os.environ.setdefault("SCOTCH_PTHREAD_NUMBER", "1")
     cells = np.ascontiguousarray(cells, dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64)
     if basix_ufl is not None:

@@ -59,17 +59,24 @@ bool find_parts(CellGraph& graph, MPI_Comm comm, std::vector<SCOTCH_Num>& parts)
 {
   int size = 1;
   MPI_Comm_size(comm, &size);
-  SCOTCH_Dgraph dgraph;
+  // The same parts each time: what its threads find depends on which is first.
+  SCOTCH_Context context;
+  SCOTCH_contextInit(&context);
+  SCOTCH_contextOptionSetNum(&context, SCOTCH_OPTIONNUMDETERMINISTIC, 1);
+  SCOTCH_contextRandomReset(&context);
+  SCOTCH_Dgraph dgraph, bound;
   SCOTCH_Strat strategy; // PT-SCOTCH's own
   SCOTCH_stratInit(&strategy);
-  SCOTCH_randomReset();
-  bool good = SCOTCH_dgraphInit(&dgraph, comm) == 0;
+  bool good = SCOTCH_dgraphInit(&dgraph, comm) == 0 && SCOTCH_dgraphInit(&bound, comm) == 0;
   const auto vertices = static_cast<SCOTCH_Num>(graph.weights.size());
   const auto edges = static_cast<SCOTCH_Num>(graph.neighbours.size());
   good = good && SCOTCH_dgraphBuild(&dgraph, 0, vertices, vertices, graph.offsets.data(), nullptr, graph.weights.data(),
                                     nullptr, edges, edges, graph.neighbours.data(), nullptr, nullptr) == 0;
-  good = good && SCOTCH_dgraphPart(&dgraph, size, &strategy, parts.data()) == 0;
+  good = good && SCOTCH_contextBindDgraph(&context, &dgraph, &bound) == 0;
+  good = good && SCOTCH_dgraphPart(&bound, size, &strategy, parts.data()) == 0;
+  SCOTCH_dgraphExit(&bound);
   SCOTCH_dgraphExit(&dgraph);
+  SCOTCH_contextExit(&context);
   SCOTCH_stratExit(&strategy);
   return good;
 }
