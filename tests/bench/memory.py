@@ -82,7 +82,9 @@ def save(folder: Path, rows: np.ndarray, particles: int) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cell-size", type=float, default=0.008, help="sides of the squares [m]; 0.008: 10^6 particles")
+    parser.add_argument(
+        "--cell-size", type=float, default=0.008, help="sides of the squares [m]; 0.008: 10^6 particles"
+    )
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--every", type=int, default=10, help="steps between looks")
     parser.add_argument("--output", type=Path, default=Path("results/memory"), help="folder for table and picture")
