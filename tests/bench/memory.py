@@ -97,8 +97,12 @@ def main() -> int:
     if comm.rank == 0:
         a.output.mkdir(parents=True, exist_ok=True)
         save(a.output, rows, particles)
-        print(f"{particles} particles, {comm.size} rank(s), {int(rows[-1, 0])} steps, {seconds:.1f} s of processor time; after step "
-              f"{SETTLED} each rank holds {later.min():.0f} to {later.max():.0f} MB, grown by at most {grown:.2%}")  # fmt: skip
+        print(
+            f"{particles} particles, {comm.size} rank(s), {int(rows[-1, 0])} steps, {seconds:.1f} s of processor time"
+        )
+        print(
+            f"after step {SETTLED} each rank holds {later.min():.0f} to {later.max():.0f} MB, grown by at most {grown:.2%}"
+        )
     return int(grown > 0.01)
 
 
