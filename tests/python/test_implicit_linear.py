@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from core_cases import box
-from implicit_cases import SLOPE_SOIL, slope, tangent
+from implicit_cases import LEFT, SLOPE_SOIL, floor, slope, tangent
 from mpm_core.implicit import Stepper
 
 import mpm_core as mpm
@@ -11,8 +11,12 @@ from mpm_core import _core, linear
 
 
 def krylov_iterations(h, law, nmd):
-    """Of each Newton iteration in a quasi-static step under 20 kN/m3."""
-    model = slope(h, weight=20e3, per_cell=3, law=law)
+    """Of each Newton iteration in a quasi-static step of the slope under 20 kN/m3."""
+    return quasi_static_step(slope(h, weight=20e3, per_cell=3, law=law), nmd)
+
+
+def quasi_static_step(model, nmd):
+    """Krylov iterations of each Newton iteration."""
     options = _core.ImplicitOptions()
     options.quasi_static, options.mixed_discretisation = True, nmd
     stepper = Stepper(model, mpm.Newton(), options, 1.0)
@@ -27,6 +31,20 @@ def test_krylov_iterations_grow_by_less_than_half_from_h_to_a_quarter(nmd, monke
     coarse, fine = (max(krylov_iterations(h, law, nmd)) for h in (0.1, 0.025))
     assert 1 < coarse < 25
     assert fine < 1.5 * coarse
+
+
+def test_krylov_iterations_grow_by_less_than_half_in_three_dimensions(monkeypatch):
+    monkeypatch.setattr(linear, "_DIRECT_LIMIT", {2: 0, 3: 0})
+
+    def iterations(n):
+        model = mpm.Model(box([n] * 3), mpm.LinearElastic(young=1e6, poisson=0.3))
+        model.seed(density=2000.0, per_cell=1)
+        model.fix(floor(3))
+        model.roller(LEFT, (1, 0, 0))
+        model.set_gravity((0, 0, -9.81))
+        return max(quasi_static_step(model, False))
+
+    assert iterations(16) < 1.5 * iterations(4)
 
 
 def test_multigrid_solves_the_tangent_of_yielding_soil(monkeypatch):
