@@ -165,9 +165,9 @@ TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents)
   find_forces(model, step);
 
   std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
-  step.residual.resize(step.forces.size());
+  step.residual.assign(step.forces.size(), {});
   for (std::size_t i = 0; i < step.residual.size(); ++i)
-    for (int a = 0; a < D; ++a)
+    for (int a = 0; a < D && step.active[i]; ++a)
     {
       const double external = step.external[i][a], internal = step.forces[i].internal[a];
       const double inertia = inertia_force(model, step, static_cast<Index>(i), a).force;

@@ -10,6 +10,7 @@
 
 #include "steps/implicit_ghost.h"
 #include "steps/implicit_inertia.h"
+#include "transfer/cell_strain.h"
 
 namespace mpm
 {
@@ -68,6 +69,7 @@ struct ImplicitStep
   std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
   /// Sum V dsigma/dstrain of each owned cell, without zz in plane strain; engineering shear
   std::vector<std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>> stiffness;
+  std::vector<CellStrain<D>> strains;   ///< of each owned cell that is filled, in the trial
   std::vector<CellTangent<D>> tangents; ///< of each owned cell
   std::vector<TrialForces<D>> forces;
   std::vector<GhostFacet<D>> ghosts; ///< stabilised facets

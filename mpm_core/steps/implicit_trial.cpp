@@ -66,22 +66,27 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
   return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
-/// Copies one run's stresses, turned, and its states to the scratch and prepares its strains.
+/// Copies a batch's stresses and states to the scratch.
 template <int D>
-void load_run(const Model<D>& model, const Run& run, const CellStrain<D>& strain, Index at, TrialScratch<D>& scratch)
+void load_batch(const Model<D>& model, const Batch& batch, TrialScratch<D>& scratch)
 {
-  const Index size = run.last - run.first;
+  const Index size = batch.last - batch.first;
   for (int k = 0; k < n_stress<D>; ++k)
-  {
+    std::copy_n(model.particles.stress[k].data() + batch.first, size, scratch.stress[k]);
+  for (std::size_t k = 0; k < model.particles.state.size(); ++k)
+    std::copy_n(model.particles.state[k].data() + batch.first, size, scratch.state[k]);
+}
+
+/// Strains one run and turns its stresses, at `at` in the scratch.
+template <int D>
+void strain_run(Index size, const CellStrain<D>& strain, Index at, TrialScratch<D>& scratch)
+{
+  for (int k = 0; k < n_stress<D>; ++k)
     std::fill_n(scratch.strain[k] + at, size, strain.increment[k]);
-    std::copy_n(model.particles.stress[k].data() + run.first, size, scratch.stress[k] + at);
-  }
   SymmetricColumns<D> columns;
   for (int k = 0; k < n_symmetric<D>; ++k)
     columns[k] = scratch.stress[stress_component<D>[k]];
   rotate<D>(columns, at, at + size, strain.rotation);
-  for (std::size_t k = 0; k < model.particles.state.size(); ++k)
-    std::copy_n(model.particles.state[k].data() + run.first, size, scratch.state[k] + at);
 }
 
 /// Counts a failure, and keeps the trouble of the first.
@@ -129,9 +134,11 @@ template <int D>
 void sum_run(const Model<D>& model, ImplicitStep<D>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
 {
   const double* const volume = model.particles.volume.data() + run.first;
-  for (int k = 0; k < n_symmetric<D>; ++k)
-    for (Index p = 0; p < run.last - run.first; ++p)
-      step.stress[run.cell][k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
+  auto sum = step.stress[run.cell];
+  for (Index p = 0; p < run.last - run.first; ++p)
+    for (int k = 0; k < n_symmetric<D>; ++k) // sums side by side, none waits for the other
+      sum[k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
+  step.stress[run.cell] = sum;
 }
 
 /// Adds V C of one run; rows and columns of zz are not needed in plane strain.
@@ -140,14 +147,16 @@ void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialS
                    std::array<Symmetric<D>, n_symmetric<D>>& stiffness)
 {
   constexpr int S = n_stress<D>;
+  auto sum = stiffness; // not through the reference, which might be to what is read
   for (Index p = 0; p < run.last - run.first; ++p)
   {
     const double* const c = &scratch.tangent[static_cast<std::size_t>((at + p) * S * S)];
     const double volume = model.particles.volume[run.first + p];
     for (int k = 0; k < n_symmetric<D>; ++k)
       for (int j = 0; j < n_symmetric<D>; ++j)
-        stiffness[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
+        sum[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
   }
+  stiffness = sum;
 }
 
 /// Full cells integrate the mean of their particles over their own volume.
@@ -174,6 +183,7 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
   const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
   step.stress.assign(cells, {});
   step.stiffness.assign(tangents ? cells : 0, {});
+  step.strains.resize(cells);
   TrialScratch<D> scratch;
   scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
   TrialCount<D> count;
@@ -181,10 +191,12 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
   for (std::size_t r = 0; r < runs.size();)
   {
     const Batch batch = next_batch(runs, r);
+    load_batch(model, batch, scratch);
     for (r = batch.first_run; r < batch.last_run; ++r)
     {
       const TrialStrain<D> trial = cell_strain(model, step, runs[r].cell);
-      load_run(model, runs[r], trial.strain, runs[r].first - batch.first, scratch);
+      step.strains[runs[r].cell] = trial.strain;
+      strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
       if (!trial.keeps_volume)
         note_failure(model, Trouble<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
     }
@@ -205,8 +217,7 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
     step.tangents.resize(cells);
   for (std::size_t c = 0; tangents && c < cells; ++c)
     if (model.work.moments[c].volume > 0)
-      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c],
-                                         cell_strain(model, step, static_cast<Index>(c)).strain, step.options);
+      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
   return count;
 }
 

@@ -152,6 +152,11 @@ class NewtonSolver:
             linear_iterations=system.linear_iterations,
         )
 
+    @property
+    def tolerance(self) -> float:
+        """Of the residual."""
+        return self._options.tolerance
+
     def tangent_of(self, step: Any) -> Tangent:
         """The tangent at a step's iterate."""
         step.assemble()
@@ -171,6 +176,7 @@ class _StepSystem:
     def __init__(self, solver: NewtonSolver, step: Any, dt: float) -> None:
         self._solver, self._step, self._dt = solver, step, dt
         self._has_tangents = False
+        self._last, self._reduction = np.inf, 1.0
         self.reason = ""
         self.linear_iterations: list[int] = []
 
@@ -179,10 +185,12 @@ class _StepSystem:
         if residual == float("inf"):  # v0 carried on over the whole step is too much; begin at rest
             self._step.velocity = np.zeros_like(self._step.velocity)
             residual = self._trial(tangents=True)
-        self._base = self._step.velocity
+        self._base, self._last = self._step.velocity, residual
         return residual
 
     def correction(self) -> bool:
+        if not self._has_tangents:
+            self._trial(tangents=True)
         tangent = self._solver.tangent_of(self._step)
         du = tangent.solve(self._step.residual)
         self.linear_iterations.append(tangent.iterations)
@@ -193,15 +201,18 @@ class _StepSystem:
 
     def move(self, share: float) -> float:
         self._step.velocity = self._base + share * self._correction
-        return self._trial(tangents=share == 1.0)
+        return self._trial(tangents=share == 1.0 and not self._ends_next())
 
     def work(self) -> float:
         return self._solver.sum(float(self._step.residual @ self._correction))
 
     def keep(self) -> None:
-        if not self._has_tangents:
-            self._trial(tangents=True)
         self._base = self._step.velocity
+        self._reduction, self._last = self._residual / self._last, self._residual
+
+    def _ends_next(self) -> bool:
+        """Whether the next residual will be the last one, if the iteration converges quadratically; it needs no tangents."""
+        return self._last * self._reduction**2 < self._solver.tolerance
 
     def _trial(self, tangents: bool) -> float:
         report = self._step.trial(tangents=tangents)
@@ -209,4 +220,5 @@ class _StepSystem:
         if report["failed"]:
             self.reason = report["reason"]
             return float("inf")
-        return relative(report)
+        self._residual = relative(report)
+        return self._residual
