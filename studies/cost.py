@@ -204,7 +204,8 @@ def save_costs(path: Path, rows: list[dict]) -> None:
                     axes.plot(x, y, "o", color=colour, markersize=4, fillstyle="full" if row["reached"] else "none")
                     if not row["reached"]:
                         axes.annotate("", (x, 1.8 * y), (x, y), arrowprops={"arrowstyle": "->", "color": colour})
-            axes.set_ylim(top=4 * max(of(row) for row in rows))
+            every = [of(row) for row in rows]
+            axes.set_ylim(np.nanmin(every) / 2, 4 * np.nanmax(every))
             axes.grid(linewidth=0.3, color="#d0d0d0")
             if soil == SOILS[0]:
                 axes.set_ylabel(label)

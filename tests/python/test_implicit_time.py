@@ -88,6 +88,25 @@ def test_damped_slope_comes_to_rest_where_the_explicit_one_does(slope_at_rest, s
     assert crest_displacement(model) == pytest.approx(at_rest, rel=0.1)
 
 
+def test_thin_toe_does_not_hinder_the_slide_unless_its_nodes_have_no_ghost_penalty():
+    """The toe runs out over cells in which there is hardly any soil."""
+
+    def slide(**options):
+        model = slope()
+        reports = list(model.implicit(10.0, dt=50 * model.critical_time_step(), damping=0.75, **options))
+        return model, sum(report.iterations for report in reports), sum(report.cuts for report in reports)
+
+    explicit = slope()
+    list(explicit.explicit(10.0, damping=0.75))
+    model, iterations, cuts = slide()
+    assert cuts == 0
+    toe = [each.particles.position[:, 0].max() for each in (model, explicit)]
+    assert toe[0] > 2.15 and toe[0] == pytest.approx(toe[1], abs=0.02)
+    assert np.linalg.norm(model.particles.velocity, axis=1).max() < 0.05
+    _, without, cuts = slide(ghost=mpm.GhostPenalty(filled=0.0))
+    assert cuts > 0 and without > 1.5 * iterations
+
+
 def test_a_step_that_fails_is_cut_and_leaves_the_particles_as_they_were():
     """No quasi-static slope carries 3.5 times its collapse load."""
     model = slope(0.2)
