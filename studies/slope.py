@@ -72,8 +72,8 @@ def parser() -> ArgumentParser:
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
     add_count(p, "--frame-steps", None, "steps between further times at which particles are stored (default: none)")
     add_output_options(p, FIELDS)
-    add_number(p, "--rebalance", None, "-", "cut the mesh anew when the most particles on a rank are this much above the mean, "
-               "such as 1.2 (default: never)", above=1)  # fmt: skip
+    add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
+               above=1)  # fmt: skip
     add_checkpoint_options(p)
     add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p

@@ -96,7 +96,9 @@ std::vector<Index> weighted_parts(const Mesh<D>& mesh, std::span<const GlobalInd
 template <int D>
 std::vector<Index> weighted_parts(const Mesh<D>&, std::span<const GlobalIndex>, MPI_Comm)
 {
-  throw RunError("the mesh cannot be cut anew: this program was built without PT-SCOTCH (Debian: libptscotch-dev)");
+  throw RunError(
+      "the mesh cannot be cut anew: this program was built without PT-SCOTCH (Debian: libptscotch-dev). Without "
+      "`rebalance`, or with a large one, a run keeps the mesh as it is cut");
 }
 #endif
 

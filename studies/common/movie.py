@@ -35,17 +35,17 @@ class Movie:
         scene: mesh behind the particles.
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
             (n,) [m^3 per metre], quantities by their keys (n,) in SI units, and ``id`` (n,) when rows change their order
-            or number from frame to frame.
+            or number from frame to frame. On ranks other than the first each is None.
         quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
     """
 
     title: str
     scene: Scene
-    frames: Sequence[Mapping[str, np.ndarray]]
+    frames: Sequence[Mapping[str, np.ndarray] | None]
     quantities: Mapping[str, Quantity] = field(default_factory=lambda: QUANTITIES)
 
     def __post_init__(self) -> None:
-        if self.frames and PORE in self.frames[0]:
+        if self.frames and self.frames[0] is not None and PORE in self.frames[0]:
             object.__setattr__(self, "quantities", {**self.quantities, PORE: PORE_PRESSURE})
 
 
