@@ -1,4 +1,4 @@
-"""Studies of the finite elements on several ranks: `mpirun -n N python3 -m pytest tests/mpi`."""
+"""Studies on several ranks: `mpirun -n N python3 -m pytest tests/mpi`."""
 
 import json
 import sys
@@ -13,6 +13,7 @@ sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "studies" / "verification"), s
 import compare_fem  # noqa: E402
 import handover  # noqa: E402
 import safety  # noqa: E402
+import slope  # noqa: E402
 import thick_cylinder  # noqa: E402
 from bridge_cases import slope_particles  # noqa: E402
 from common.slope_fem import slope_fem, weight  # noqa: E402
@@ -24,6 +25,15 @@ def summary_of(study, folder, *options):
     assert study.main(["--output", str(folder), *options]) == 0
     MPI.COMM_WORLD.barrier()
     return json.loads((folder / "summary.json").read_text())
+
+
+def test_slope_from_start_to_page(shared_path):
+    """The main study with its finite elements, hand-over, balance of load, pictures and page."""
+    summary = summary_of(slope, shared_path, "--cell-size", "0.1", "--time", "0.5", "--frames", "3")
+    assert summary["ranks"] == MPI.COMM_WORLD.size
+    assert summary["initial_out_of_balance_ratio"] < 1e-8
+    assert 0.01 < summary["crest_displacement_m"] < 0.1
+    assert (shared_path / "report.html").stat().st_size > 100_000
 
 
 def test_factor_of_safety_is_that_of_one_rank(shared_path):
