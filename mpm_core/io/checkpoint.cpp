@@ -116,7 +116,7 @@ std::string put_in_place(const std::filesystem::path& aside, const std::filesyst
   const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const bool flushed = directory >= 0 && (::fsync(directory) == 0 || errno == EINVAL); // some file systems cannot
-  const std::string failure = flushed ? "" : std::strerror(errno);
+  std::string failure = flushed ? "" : std::strerror(errno);
   if (directory >= 0)
     ::close(directory);
   return failure;
@@ -220,7 +220,7 @@ std::string checkpoint_description(MPI_Comm comm, const std::filesystem::path& p
 {
   check_stamp(comm, path);
   Hdf5Input file(comm, path);
-  const std::string text = file.read_text("description");
+  std::string text = file.read_text("description");
   file.check();
   return text;
 }

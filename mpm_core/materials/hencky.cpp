@@ -61,7 +61,7 @@ void write_tangent(const PointBatch<D>& points, Index i, double inverse, double 
 std::vector<std::string> state_names(const Hencky& law)
 {
   std::vector<std::string> names = state_names(law.law);
-  names.push_back("log_volume");
+  names.emplace_back("log_volume");
   return names;
 }
 

@@ -7,7 +7,7 @@ namespace mpm
 std::vector<std::string> state_names(const Undrained& law)
 {
   std::vector<std::string> names = state_names(law.skeleton);
-  names.push_back("excess_pore_pressure");
+  names.emplace_back("excess_pore_pressure");
   return names;
 }
 
@@ -30,7 +30,7 @@ BatchReport update(const Undrained& law, const PointBatch<D>& points)
   for (std::size_t k = 0; k < 3; ++k)
     for (Index i = 0; i < points.size; ++i)
       points.stress[k][i] += pressure[i];
-  const BatchReport report = update<D>(law.skeleton, points);
+  BatchReport report = update<D>(law.skeleton, points);
   const auto& strain = points.strain_increment;
   auto failed = report.failed.begin();
   for (Index i = 0; i < points.size; ++i)

@@ -1,6 +1,7 @@
 #include "mesh/search.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace mpm
 {
@@ -62,7 +63,7 @@ Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
       location.cell = c;
       return location;
     }
-    if (!(value == value))
+    if (std::isnan(value))
       return location;
     location.exit_cell = c;
     location.exit_facet = vertex;

@@ -42,6 +42,8 @@ template <class T>
 void update(const Halo& halo, std::vector<T>& values)
 {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
-  update(halo, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
+  constexpr std::size_t width =
+      sizeof(T) / sizeof(double); // NOLINT(bugprone-sizeof-expression): T may be double itself
+  update(halo, reinterpret_cast<double*>(values.data()), static_cast<int>(width));
 }
 } // namespace mpm

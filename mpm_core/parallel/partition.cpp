@@ -35,6 +35,7 @@ CellGraph cell_graph(const Mesh<D>& mesh, std::span<const GlobalIndex> weights, 
   GlobalIndex count = mesh.owned_cells, first = 0;
   MPI_Scan(&count, &first, 1, MPI_INT64_T, MPI_SUM, comm);
   std::vector<double> own;
+  own.reserve(weights.size());
   for (Index c = 0; c < mesh.owned_cells; ++c)
     own.push_back(static_cast<double>(first - count + c));
   const std::vector<double> numbers = with_ghost_values(mesh, own, comm);

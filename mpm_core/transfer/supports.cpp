@@ -74,6 +74,7 @@ std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchang
     }
   }
   std::vector<Support<D>> supports;
+  supports.reserve(by_node.size());
   for (const auto& [node, support] : by_node)
     supports.push_back(support);
   return supports;
