@@ -38,7 +38,7 @@ def resident_memory() -> float:
 
 def slope(cell_size: float) -> mpm.Model:
     """The slope under 80 kN/m3, from zero stress, 10 particles per triangle."""
-    mesh = bridge.background_mesh(*bridge.slope_mesh(comm, cell_size=cell_size))
+    mesh = bridge.background_mesh(*bridge.slope_mesh(comm, cell_size=cell_size, kind="fitted"))
     model = mpm.Model(mesh, mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0))
     model.seed(density=80e3 / 9.81, per_cell=10, cell_tag=bridge.SOIL)
     model.roller(bridge.LEFT, (1, 0))
