@@ -9,6 +9,7 @@ import ufl
 from dolfinx import fem
 
 from fenics_bridge import compat
+from fenics_bridge.errors import agree
 from fenics_bridge.fields import assembled
 from fenics_bridge.supports import require_tag
 
@@ -44,6 +45,17 @@ class Load:
         )
 
 
+def require_finite(comm, load):
+    """Raises InputError on all ranks where a load has a value that is not finite on any. Collective."""
+    problem = None
+    for name in ("unit_weight", "pressure", "displacement"):
+        value = getattr(load, name)
+        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v)]
+        if wrong:
+            problem = f"{name} is {wrong[0]}, expected finite numbers"
+    agree(comm, problem)
+
+
 def _weight_by_tag(unit_weight):
     """Unit weights by cell tag; None stands for all cells whose tag is not there."""
     return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
@@ -62,8 +74,9 @@ class LoadVectors:
     def forces(self, load):
         """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain).
 
-        Collective; raises InputError, on all ranks, for a tag that does not exist.
+        Collective; raises InputError, on all ranks, for a tag that does not exist or a value that is not finite.
         """
+        require_finite(self._space.mesh.comm, load)
         by_tag = _weight_by_tag(load.unit_weight)
         elsewhere = by_tag.get(None, 0.0)
         forces = elsewhere * self._weight[None]

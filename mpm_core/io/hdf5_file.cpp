@@ -106,6 +106,11 @@ RowSlice row_slice(MPI_Comm comm, std::size_t local)
 
 Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block) : _comm(comm), _path(std::move(path))
 {
+  if (!is_same_on_all_ranks(_comm, _path))
+  {
+    _failure = "path is not the same on all ranks; here: " + _path.string();
+    check();
+  }
   if (!has_room(table_size))
     check();
   const Quiet quiet;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <functional>
 
 namespace mpm
 {
@@ -43,24 +42,12 @@ std::string fields_error(const std::vector<OutputField>& fields, const std::vect
                          std::size_t n_rows)
 {
   for (const OutputField& field : fields)
-    if (const std::string error = field_error(field.name, field.components, field.values.size(), n_rows);
-        !error.empty())
+    if (std::string error = field_error(field.name, field.components, field.values.size(), n_rows); !error.empty())
       return error;
   for (const OutputIndexField& field : index_fields)
-    if (const std::string error = field_error(field.name, 1, field.values.size(), n_rows); !error.empty())
+    if (std::string error = field_error(field.name, 1, field.values.size(), n_rows); !error.empty())
       return error;
   return {};
-}
-
-/// Whether all ranks give the same text; different ones would make ranks wait for each other for ever.
-/// @note Collective
-bool is_same_on_all_ranks(MPI_Comm comm, const std::string& text)
-{
-  const std::size_t hash = std::hash<std::string>{}(text);
-  const std::uint64_t mine[2] = {hash, ~hash};
-  std::uint64_t smallest[2] = {};
-  MPI_Allreduce(mine, smallest, 2, MPI_UINT64_T, MPI_MIN, comm);
-  return smallest[0] == ~smallest[1];
 }
 
 /// @note Collective
@@ -96,6 +83,7 @@ void SeriesFile::begin_frame()
   if (_n_frames == _n_groups)
   {
     std::vector<std::string> names;
+    names.reserve(groups_ahead);
     for (int k = 0; k < groups_ahead; ++k)
       names.push_back(frame_group(_n_groups++));
     _file.create_groups(names);

@@ -1,5 +1,7 @@
 #include "parallel/agreement.h"
 
+#include <functional>
+
 namespace mpm
 {
 std::string shared_failure(MPI_Comm comm, const std::string& failure)
@@ -18,5 +20,14 @@ std::string shared_failure(MPI_Comm comm, const std::string& failure)
   text.resize(static_cast<std::size_t>(length));
   MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
   return text;
+}
+
+bool is_same_on_all_ranks(MPI_Comm comm, const std::string& text)
+{
+  const std::size_t hash = std::hash<std::string>{}(text);
+  const std::uint64_t mine[2] = {hash, ~hash};
+  std::uint64_t smallest[2] = {};
+  MPI_Allreduce(mine, smallest, 2, MPI_UINT64_T, MPI_MIN, comm);
+  return smallest[0] == ~smallest[1];
 }
 } // namespace mpm

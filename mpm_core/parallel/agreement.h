@@ -13,6 +13,10 @@ namespace mpm
 /// @note Collective
 std::string shared_failure(MPI_Comm comm, const std::string& failure);
 
+/// Whether all ranks give the same text; different ones would make ranks wait for each other for ever.
+/// @note Collective
+bool is_same_on_all_ranks(MPI_Comm comm, const std::string& text);
+
 /// Does something that concerns this rank only; when it raises an InputError on any rank, all ranks raise it.
 /// @note Collective; `work` must not be
 template <class F>

@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import within
-from .explicit import is_report_due, require_particles
+from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
@@ -31,13 +31,13 @@ FADING = 0.1
 
 
 def implicit_options(
-    model: Model,
     damping: float,
     pic: float,
     nmd: bool,
     integration: Integration,
     quasi_static: bool,
     ghost: GhostPenalty | None,
+    small_displacements: bool = False,
 ) -> Any:
     """The core's options of the scheme; see `Model.implicit`."""
     options = _core.ImplicitOptions()
@@ -49,7 +49,10 @@ def implicit_options(
     options.integration = integration
     options.quasi_static = bool(quasi_static)
     options.ghost = (ghost or GhostPenalty()).options()
-    require_particles(model)
+    if small_displacements and not quasi_static:
+        raise InputError("small_displacements is True, expected False unless quasi_static is True")
+    options.hold_positions = bool(small_displacements)
+    options.average_stress = bool(small_displacements and nmd)
     return options
 
 

@@ -7,10 +7,11 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import InputError, Integration, StressUpdate
+from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
-from .explicit import explicit_options, report_times, run_explicit, run_options, steps_between
+from .collective import collectively
+from .explicit import explicit_options, report_times, require_particles, run_explicit, run_options, steps_between
 from .ghost import GhostPenalty
 from .implicit import implicit_options, run_implicit, settle
 from .mesh import floats
@@ -150,12 +151,18 @@ class Model(Body):
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, a law failed; with the place.
         """
-        options = explicit_options(damping, pic, nmd, integration, stress_update)
-        run = run_options(dt, courant, allow_unstable)
-        times = report_times(self, until, every, since)
-        return run_explicit(
-            self, options, run, times, watch, rebalance_threshold(rebalance), steps_between(every_steps)
+        options, run, times, threshold, steps = collectively(
+            self.comm,
+            lambda: (
+                explicit_options(damping, pic, nmd, integration, stress_update),
+                run_options(dt, courant, allow_unstable),
+                report_times(self, until, every, since),
+                rebalance_threshold(rebalance),
+                steps_between(every_steps),
+            ),
         )
+        require_particles(self)
+        return run_explicit(self, options, run, times, watch, threshold, steps)
 
     def implicit(
         self,
@@ -206,17 +213,19 @@ class Model(Body):
             RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
                 particles are as after the last step that converged.
         """
-        options = implicit_options(self, damping, pic, nmd, integration, quasi_static, ghost)
-        if small_displacements and not quasi_static:
-            raise InputError("small_displacements is True, expected False unless quasi_static is True")
-        options.hold_positions = bool(small_displacements)
-        options.average_stress = bool(small_displacements and nmd)
-        longest = positive("dt", dt, "s")
-        times = report_times(self, until, every, since)
+        options, longest, times, steps, threshold = collectively(
+            self.comm,
+            lambda: (
+                implicit_options(damping, pic, nmd, integration, quasi_static, ghost, small_displacements),
+                positive("dt", dt, "s"),
+                report_times(self, until, every, since),
+                steps_between(1 if every is None and every_steps is None else every_steps),
+                rebalance_threshold(rebalance),
+            ),
+        )
+        require_particles(self)
         return run_implicit(
-            self, solver or Newton(), options, times=times, dt=longest, watch=watch,
-            every_steps=steps_between(1 if every is None and every_steps is None else every_steps),
-            rebalance=rebalance_threshold(rebalance),
+            self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold
         )  # fmt: skip
 
     def equilibrate(
@@ -245,5 +254,5 @@ class Model(Body):
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
-        options = implicit_options(self, 0.0, 0.0, nmd, integration, True, ghost)
+        options = collectively(self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost))
         return settle(self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps)
