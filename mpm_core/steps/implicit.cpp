@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace mpm
 {
@@ -226,7 +227,11 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   model.time += step.dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
-  map_to_nodes(model); // so that the out-of-balance ratio is that of the particles as they are now
+  // So that the out-of-balance ratio is that of the particles as they are now. Nodes that the soil has just left keep
+  // the velocities of this step until the next one.
+  const bool shrinks = std::exchange(work.soil_shrinks, false);
+  map_to_nodes(model);
+  work.soil_shrinks = shrinks;
   for (std::size_t i = 0; options.average_stress && i < step.forces.size(); ++i)
     work.nodes[i].internal = step.forces[i].internal;
   return true;

@@ -37,6 +37,18 @@ def test_converges_to_the_explicit_result_at_first_order():
     assert (order > 0.85).all() and (order < 1.15).all(), errors
 
 
+def test_nodes_that_the_soil_leaves_keep_the_velocity_of_the_step():
+    model = mpm.Model(
+        box([12, 3], [1.2, 0.3], body=((0.1, 0.1), (0.3, 0.2))), mpm.LinearElastic(young=1e6, poisson=0.2)
+    )
+    model.seed(density=1000.0, per_cell=6, cell_tag=1)
+    body = np.unique(model.mesh.cells[np.unique(model.particles.cell)])
+    model.particles.set("velocity", np.tile([1.0, 0.0], (len(model.particles), 1)))
+    list(model.implicit(0.5, dt=0.5))  # it flies five cells on without strain
+    assert (model.nodal("mass")[body] == 0).all()
+    np.testing.assert_allclose(model.nodal("velocity")[body], np.tile([1.0, 0.0], (len(body), 1)), atol=1e-9)
+
+
 def test_damping_is_that_of_the_explicit_scheme_where_steps_are_small():
     until = 3.0 * H / WAVE_SPEED
     reference, model = vibrating_column(), vibrating_column()
