@@ -1,7 +1,8 @@
 """Particles and background mesh over time, in parallel HDF5 files with XDMF files beside them.
 
-ParaView, VTK and meshio open the ``.xdmf`` file, also while the run goes on and after it was killed: it is replaced as a
-whole after each frame, when the frame is in the ``.h5`` file. h5py reads the datasets ``/frames/NUMBER/NAME`` directly.
+ParaView, VTK and meshio open the ``.xdmf`` file, also while the run goes on and after it was killed: it names a frame when all
+of it is in the ``.h5`` file. h5py reads the datasets ``/frames/NUMBER/NAME`` directly; while the run goes on there are empty
+groups too, room for frames to come.
 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
 and six components are a symmetric tensor, ``xx yy zz xy`` or ``xx yy zz xy yz xz``, and become one dataset for each
