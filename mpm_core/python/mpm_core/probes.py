@@ -185,7 +185,7 @@ class SectionProbe:
         model, mesh, dim = self.model, self.model.mesh, self.model.mesh.dim
         corners = mesh.points[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
-        cut = before.any(axis=1) & ~before.all(axis=1)
+        cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))
         if self._box is not None:
             centres = corners.mean(axis=1)
             cut &= ((centres >= self._box[0]) & (centres <= self._box[1])).all(axis=1)
@@ -202,7 +202,7 @@ class SectionProbe:
         model.comm.Allreduce(mine, force)
         along = {"force_normal_N": float(force @ self._normal)}
         names = _components("force", "N", AXES[:dim])
-        return {"time_s": model.time, **dict(zip(names, force.tolist(), strict=True)), **along}
+        return {"time_s": model.time, **dict(zip(names, map(float, force), strict=True)), **along}
 
 
 def _matrices(stress: NDArray, dim: int) -> NDArray[np.float64]:
