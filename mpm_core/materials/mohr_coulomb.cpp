@@ -23,7 +23,7 @@ constexpr std::size_t lanes = 8;
 
 /// Share of candidates in a block from which on all of its points are treated as such, where they are: setting them
 /// side by side would cost more than the points that do not yield after all.
-constexpr double dense_share = 0.6;
+constexpr double dense_share = 0.45;
 
 /// The points of a block that may yield, side by side
 template <int D>

@@ -15,7 +15,7 @@ namespace
 constexpr std::int64_t gathering_interval = 64;
 
 /// What sorting costs per particle, over what a stray costs more in a step than a particle in its place.
-constexpr double sort_cost = 0.5;
+constexpr double sort_cost = 0.8;
 
 /// A second chance for the particles whose law failed, unless the step is lost anyway.
 template <int D>
