@@ -5,7 +5,6 @@
 #include "materials/require.h"
 #include "materials/spectral.h"
 
-#include <algorithm>
 #include <optional>
 
 // The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
@@ -45,12 +44,17 @@ Surface surface_of(const MohrCoulomb& law)
                  law.dilation_angle * degree, law.tension_cutoff);
 }
 
-/// Elastic step of the points first to last: their stress becomes the trial stress, unless that is not usable. Notes
-/// the points that may yield and returns the number of those that failed.
-template <int D>
-Index elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last, Candidates<D>& candidates)
+/// What the elastic step found in a block.
+struct ElasticStep
 {
-  WorkColumn<std::int64_t> may_leave;
+  WorkColumn<std::int64_t> may_leave; ///< 1 for points that may yield
+  Index leaving, failed;              ///< their number, and that of points whose trial stress is not usable
+};
+
+/// Elastic step of the points first to last: their stress becomes the trial stress, unless that is not usable.
+template <int D>
+void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last, ElasticStep& step)
+{
   std::int64_t failed = 0, leaving = 0;
 #pragma GCC ivdep
   for (Index i = first; i < last; ++i)
@@ -60,17 +64,24 @@ Index elastic_step(const Surface& m, const PointBatch<D>& points, Index first, I
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
     const std::int64_t leaves = usable & may_yield(m, trial) ? 1 : 0;
-    may_leave[static_cast<std::size_t>(i - first)] = leaves;
+    step.may_leave[static_cast<std::size_t>(i - first)] = leaves;
     leaving += leaves;
     failed += usable ? 0 : 1;
   }
+  step.leaving = static_cast<Index>(leaving);
+  step.failed = static_cast<Index>(failed);
+}
+
+/// Lists the points of a block that may yield, from the given one of its points on.
+template <int D>
+void list_candidates(const ElasticStep& step, Index first, Index from, Index last, Candidates<D>& candidates)
+{
   candidates.size = 0;
-  for (Index i = first; i < last && leaving > 0; ++i) // without a branch on the single point
+  for (Index i = from; i < last; ++i) // without a branch on the single point
   {
     candidates.point[candidates.size] = i;
-    candidates.size += static_cast<std::size_t>(may_leave[static_cast<std::size_t>(i - first)]);
+    candidates.size += static_cast<std::size_t>(step.may_leave[static_cast<std::size_t>(i - first)]);
   }
-  return static_cast<Index>(failed);
 }
 
 /// Copies the trial stresses of the candidates, and fills up with zero stress.
@@ -139,12 +150,12 @@ void return_candidates(const Surface& m, const PointBatch<D>& points, Candidates
   return_stresses<D, for_tangents>(m, columns, (candidates.size + lanes - 1) / lanes * lanes, candidates);
 }
 
-/// Returns the points from `first` on where they are, as many as fill vectors; what is left stays with the candidates.
+/// Returns points from `first` on where they are; their number must fill vectors.
 /// @returns how many yielded
 template <int D>
-Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first, Index last, Candidates<D>& candidates)
+Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first, std::size_t size,
+                      Candidates<D>& candidates)
 {
-  const std::size_t size = static_cast<std::size_t>(last - first) / lanes * lanes;
   StressColumns<D> columns;
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     columns[k] = points.stress[k] + first;
@@ -157,9 +168,6 @@ Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first
     accumulated[i] += candidates.plastic_strain[i];
     plastic += candidates.is_plastic[i];
   }
-  const auto begin = candidates.point.begin(), end = begin + static_cast<std::ptrdiff_t>(candidates.size);
-  const auto rest = std::lower_bound(begin, end, first + static_cast<Index>(size));
-  candidates.size = static_cast<std::size_t>(std::copy(rest, end, begin) - begin);
   return static_cast<Index>(plastic);
 }
 
@@ -192,6 +200,31 @@ void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D
       write_tangent<D>(m, maps, candidates.trial.at(i), candidates.returned.at(i),
                        tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
+/// Returns the points of a block that yield, after its elastic step, and writes their tangents, if wanted.
+/// @returns how many yielded
+template <int D>
+Index return_block(const Surface& m, const std::optional<RegionMaps>& maps, const PointBatch<D>& points, Index first,
+                   Index last, const ElasticStep& step, Candidates<D>& candidates)
+{
+  Index plastic = 0, from = first; // points before `from` have been returned
+  if (!points.tangent && step.failed == 0 && step.leaving > dense_share * (last - first))
+  {
+    const std::size_t size = static_cast<std::size_t>(last - first) / lanes * lanes;
+    plastic += return_in_place(m, points, first, size, candidates);
+    from += static_cast<Index>(size);
+  }
+  list_candidates(step, first, from, last, candidates);
+  if (candidates.size == 0)
+    return plastic;
+  if (!points.tangent)
+    return_candidates<D, false>(m, points, candidates);
+  else
+  {
+    return_candidates<D, true>(m, points, candidates);
+    write_tangents(m, *maps, candidates, points.tangent);
+  }
+  return plastic + scatter(candidates, points);
+}
 } // namespace
 
 void check(const MohrCoulomb& law)
@@ -223,25 +256,16 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
   }
   BatchReport report;
   Index failed = 0;
+  ElasticStep step;
   Candidates<D> candidates;
   constexpr auto block = static_cast<Index>(block_size);
   for (Index first = 0; first < points.size; first += block)
   {
     const Index last = std::min(points.size, first + block);
-    const Index failed_here = elastic_step(m, points, first, last, candidates);
-    failed += failed_here;
-    if (!points.tangent && failed_here == 0 && static_cast<double>(candidates.size) > dense_share * (last - first))
-      report.plastic += return_in_place(m, points, first, last, candidates);
-    if (candidates.size == 0)
-      continue;
-    if (!points.tangent)
-      return_candidates<D, false>(m, points, candidates);
-    else
-    {
-      return_candidates<D, true>(m, points, candidates);
-      write_tangents(m, *maps, candidates, points.tangent);
-    }
-    report.plastic += scatter(candidates, points);
+    elastic_step(m, points, first, last, step);
+    failed += step.failed;
+    if (step.leaving > 0)
+      report.plastic += return_block(m, maps, points, first, last, step, candidates);
   }
   if (failed > 0)
     report.failed = unusable_points<D>(m.moduli, points);
