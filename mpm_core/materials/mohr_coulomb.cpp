@@ -200,6 +200,7 @@ void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D
       write_tangent<D>(m, maps, candidates.trial.at(i), candidates.returned.at(i),
                        tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
+
 /// Returns the points of a block that yield, after its elastic step, and writes their tangents, if wanted.
 /// @returns how many yielded
 template <int D>
