@@ -76,6 +76,15 @@ def implicit_solve(case):
     list(model.implicit(0.1, dt=0.1))
 
 
+def singular_tangent(case):
+    # Nothing holds the soil along its base, and the one rank that factorises is alone in knowing.
+    model = mpm.Model(case.model.mesh, case.model.laws)
+    model.seed(density=2000.0, per_cell=3, cell_tag=1)
+    model.roller(3, (0, 1))
+    model.set_gravity((2.5, -9.5))
+    model.equilibrate()
+
+
 def body(case, law):
     soil, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(case.comm, cell_size=0.1))
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
@@ -105,6 +114,7 @@ PHASES = {
     checkpoint: "path is not the same on all ranks|nowhere",
     restart: "nothing.h5",
     implicit_solve: "follows the law PythonLaw of Fragile",
+    singular_tangent: "no equilibrium at t = 0 s",
     finite_elements: "unit_weight is nan",
     law_in_finite_elements: "1[0-9]? steps: ",
 }
