@@ -42,6 +42,10 @@ class AveragedKinematics:
         components = points.size * cell[:, None] + np.arange(points.size)
         self._columns = np.repeat(components, points.size, axis=0)
         self._tangent = _matrix(comm, (size, size), self._columns, 1.0)
+        # PETSc's triple product would add up what ranks send in the order in which it arrives.
+        self._transposed = self._strain.transpose(PETSc.Mat())
+        self._change: PETSc.Mat | None = None
+        self._stiffness: PETSc.Mat | None = None
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
         self._held = self._held_dofs()
 
@@ -66,7 +70,9 @@ class AveragedKinematics:
         weighted = self._volumes[:, None, None] * self._points.tangent
         self._tangent.setValuesCSR(*_rows(self._columns, weighted.reshape(-1, self._points.size)))
         self._tangent.assemble()
-        matrix = self._tangent.ptap(self._strain)
+        self._change = self._tangent.matMult(self._strain, self._change)
+        self._stiffness = self._transposed.matMult(self._change, self._stiffness)
+        matrix = self._stiffness.copy()  # whose places are kept for the next product
         matrix.zeroRowsColumns(self._held, 1.0)
         return matrix
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
@@ -13,6 +12,7 @@ from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import assembled, cell_function, elastic_stress, nodal_average, strain
 from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.loads import elastic_load
+from fenics_bridge.stiffness import Stiffness
 from fenics_bridge.supports import Constraints
 
 
@@ -127,9 +127,7 @@ def _solved(space, constraints, tangent, residual_of, options_prefix, factor=Non
     solution.x.array[constraints.dofs] = constraints.values
     residual = assembled(fem.form(residual_of(solution)), space)
     residual.array[constraints.dofs] = 0.0
-    matrix = petsc.assemble_matrix(fem.form(tangent), bcs=constraints.bcs)
-    matrix.assemble()
-    matrix.setBlockSize(space.dofmap.index_map_bs)
+    matrix = Stiffness(tangent, space, constraints).assembled()
     if not LinearSolver(space, options_prefix, factor).solve(matrix, residual, increment):
         raise RuntimeError("the linear solver failed; do the supports hold the body?")
     solution.x.array[:] += increment.x.array

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem, la
-from dolfinx.fem import petsc
 
 from fenics_bridge import compat
 from fenics_bridge.fields import assembled, strain
+from fenics_bridge.stiffness import Stiffness
 
 
 class Kinematics:
@@ -19,7 +19,7 @@ class Kinematics:
 
     def __init__(self, increment, points, constraints):
         """increment: displacement function whose strain is wanted; points: QuadraturePoints."""
-        self._space, self._points, self._constraints = increment.function_space, points, constraints
+        self._space, self._points = increment.function_space, points
         domain, size = self._space.mesh, points.size
         self._strain = fem.Expression(strain(increment), points.reference)
         self._stress, self._stress_rows = self._quadrature_function(size)
@@ -28,10 +28,9 @@ class Kinematics:
         test, trial = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
         self._internal = fem.form(ufl.inner(self._stress, strain(test)) * dx)
-        self._stiffness = fem.form(ufl.inner(ufl.dot(matrix, strain(trial)), strain(test)) * dx)
+        stiffness = ufl.inner(ufl.dot(matrix, strain(trial)), strain(test)) * dx
+        self._stiffness = Stiffness(stiffness, self._space, constraints)
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
-        self._matrix = petsc.create_matrix(self._stiffness)
-        self._matrix.setBlockSize(self._space.dofmap.index_map_bs)
 
     def strain_increment(self):
         """Strain of the increment at the points: (n, S)."""
@@ -47,10 +46,7 @@ class Kinematics:
         """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
         size = self._points.size**2
         self._tangent.x.array.reshape(-1, size)[self._tangent_rows] = self._points.tangent.reshape(-1, size)
-        self._matrix.zeroEntries()
-        petsc.assemble_matrix(self._matrix, self._stiffness, bcs=self._constraints.bcs)
-        self._matrix.assemble()
-        return self._matrix
+        return self._stiffness.assembled()
 
     def _quadrature_function(self, size):
         space = compat.quadrature_space(self._space.mesh, self._points.degree, size)

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-import numpy as np
-from mpi4py import MPI
+from mpm_core.petsc import DIRECT_LIMIT, defaults, direct_options, solved
 from petsc4py import PETSc
 
 
 class LinearSolver:
     """Solution of linear systems on a displacement space by PETSc.
 
-    The default is a direct solver (LU); PETSc options with `options_prefix` change it, for instance
-    -elastic_ksp_type cg -elastic_pc_type gamg.
+    The default is a direct solver (LU), on one rank unless the system is large; PETSc options with `options_prefix` change
+    it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
     """
 
     def __init__(self, space, options_prefix, factor=None):
         """factor: PETSc's name of the package for LU, e.g. "mumps"; by default PETSc's own choice."""
-        self._comm = space.mesh.comm
-        self._n_owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
-        self._ksp = PETSc.KSP().create(self._comm)
+        ranks, index_map, bs = space.mesh.comm.size, space.dofmap.index_map, space.dofmap.index_map_bs
+        self._n_owned = index_map.size_local * bs
+        dim = space.mesh.geometry.dim
+        on_one = ranks == 1 or index_map.size_global * bs <= dim * DIRECT_LIMIT[dim]
+        choice = {"pc_factor_mat_solver_type": factor} if factor else {}
+        if on_one and not factor:  # half the time of PETSc's default, nested dissection
+            choice["pc_factor_mat_ordering_type"] = "amd"
+        self._options = direct_options(ranks if on_one else 1, choice)
+        self._options_prefix = options_prefix
+        self._ksp = PETSc.KSP().create(space.mesh.comm)
         self._ksp.setOptionsPrefix(options_prefix)
-        self._ksp.setType("preonly")
-        self._ksp.getPC().setType("lu")
-        if factor is not None:
-            self._ksp.getPC().setFactorSolverType(factor)
-        elif self._comm.size == 1:  # half the time of PETSc's default, nested dissection
-            self._ksp.getPC().setFactorOrdering("amd")
-        self._ksp.setFromOptions()
 
     def solve(self, matrix, residual, increment):
         """Write matrix^-1 residual to `increment`. True when the solver converged.
@@ -36,14 +35,10 @@ class LinearSolver:
         right, left = matrix.createVecs()
         left.array[:] = residual.array[: self._n_owned]
         self._ksp.setOperators(matrix)
-        try:
-            self._ksp.solve(left, right)
-            solved = self._ksp.getConvergedReason() > 0 and bool(np.all(np.isfinite(right.array_r)))
-        except PETSc.Error:  # a factorisation that gave up
-            solved = False
-        if not self._comm.allreduce(int(solved), MPI.MIN):
-            self._ksp.reset()  # MUMPS cannot be used again after a singular matrix
-            return False
+        with defaults(self._options_prefix, self._options):
+            self._ksp.setFromOptions()
+            if not solved(self._ksp, left, right):
+                return False
         increment.x.array[: self._n_owned] = right.array_r
         increment.x.scatter_forward()
         return True

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem, la
-from dolfinx.fem import petsc
 from mpm_core.newton import newton
 
 import mpm_core as mpm
@@ -19,6 +18,7 @@ from fenics_bridge.load_steps import raise_load
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
 from fenics_bridge.quadrature import QuadraturePoints
+from fenics_bridge.stiffness import Stiffness
 from fenics_bridge.supports import Constraints
 
 
@@ -117,7 +117,7 @@ class _MixedKinematics:
 
     def __init__(self, solution, increment, points, constraints, law):
         space = solution.function_space
-        self._space, self._points, self._bcs = space, points, constraints.bcs
+        self._space, self._points = space, points
         domain, size = space.mesh, points.size
         young, poisson = law.young, law.poisson
         self.scale = young / (2 * (1 + poisson))
@@ -135,9 +135,9 @@ class _MixedKinematics:
             return self.scale * (-p * ufl.div(v) - q * ufl.div(u) - flexibility * p * q) * dx
 
         self._internal = fem.form(ufl.inner(self._stress, strain(v)) * dx + volume(u, p))
-        self._stiffness = fem.form(ufl.inner(ufl.dot(matrix, strain(du)), strain(v)) * dx + volume(du, dp))
+        stiffness = ufl.inner(ufl.dot(matrix, strain(du)), strain(v)) * dx + volume(du, dp)
+        self._stiffness = Stiffness(stiffness, space, constraints)
         self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
-        self._matrix = petsc.create_matrix(self._stiffness)
 
     def strain_increment(self):
         """Deviatoric strain of the increment at the points: (n, S)."""
@@ -154,10 +154,7 @@ class _MixedKinematics:
         size = self._points.size
         tangent = self._deviator @ self._points.tangent @ self._deviator
         self._tangent.x.array.reshape(-1, size**2)[self._tangent_rows] = tangent.reshape(-1, size**2)
-        self._matrix.zeroEntries()
-        petsc.assemble_matrix(self._matrix, self._stiffness, bcs=self._bcs)
-        self._matrix.assemble()
-        return self._matrix
+        return self._stiffness.assembled()
 
     def _quadrature_function(self, size):
         space = compat.quadrature_space(self._space.mesh, self._points.degree, size)
