@@ -17,7 +17,7 @@ from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
-from common.movie import PORE, Movie, fem_frame, has_pore_pressure
+from common.movie import PORE, Movie, fem_frame
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
 from common.page import Page
@@ -103,7 +103,7 @@ class Files:
         restarted = case.args.restart is not None
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
         a = case.args
-        self.names = ["position", *a.fields.split(","), *([PORE] if has_pore_pressure(self.model) else [])]
+        self.names = a.fields.split(",")
         self.particles = ParticleOutput(particles, comm, not a.float64, a.compression)
         self.mesh = MeshOutput(
             background, comm, mesh.points, mesh.cells[: mesh.owned_cells], not a.float64, a.compression
@@ -116,8 +116,9 @@ class Files:
         self.probes = [ProbeFile(folder / f"{name}.csv", probe, keep=restarted) for name, probe in probes.items()]
 
     def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
-        """Add a frame. Collective."""
-        self.particles.write(time, {name: fields[name] for name in self.names})
+        """Add a frame; ``fields`` are those of `Watch.fields`. Collective."""
+        pore = {PORE: fields[PORE]} if PORE in fields else None
+        self.particles.write_particles(time, self.model.particles, self.names, pore)
         nodes = {
             name: self.start.nodal_of(self.model.mesh, self.model.nodal(name))
             for name in ("mass", "velocity", "internal_force")

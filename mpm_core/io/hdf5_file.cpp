@@ -19,15 +19,17 @@ namespace
 /// What HDF5's own tables take at most for one dataset and its group, in bytes (measured: some 2000).
 constexpr std::int64_t table_size = 4096;
 /// The same for a group alone.
-constexpr std::int64_t group_size = 512;
+constexpr std::int64_t group_size = 1024;
 /// Room that is always kept for tables that HDF5 has not written yet, in bytes.
 constexpr std::int64_t table_room = 1 << 18;
 
 /// More names than this in a group go into tables of their own.
 constexpr unsigned most_names_inside = 64;
+/// Names, and their length, for which a group has room from the start; adding room later takes time.
+constexpr unsigned names_expected = 16, length_expected = 16;
 
 /// What is reserved at once beyond what is needed: a quarter of it, between these, in bytes. Each call costs some time.
-constexpr std::int64_t least_ahead = 1 << 20, most_ahead = 1 << 26;
+constexpr std::int64_t least_ahead = 1 << 22, most_ahead = 1 << 26;
 
 /// Reserves space on the disk for bytes [first, last) of a file, which is created if it is not there and becomes as
 /// long. A disk that fills up while HDF5 writes leaves a file that HDF5 cannot even close; asked beforehand, all that
@@ -195,6 +197,7 @@ void Hdf5File::create_groups(const std::vector<std::string>& names)
   // With their order kept, a few names are stored in the group itself instead of in tables beside it.
   H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED);
   H5Pset_link_phase_change(creation, most_names_inside, most_names_inside / 2);
+  H5Pset_est_link_info(creation, names_expected, length_expected);
   std::vector<hid_t> groups;
   for (std::size_t k = 0; k < names.size(); ++k)
     groups.push_back(H5Gcreate_anon(_file, creation, H5P_DEFAULT));
@@ -247,8 +250,9 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
     H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, count, nullptr);
   else
     H5Sselect_none(in_file);
-  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
-  if (_compression > 0 && rows.total > 0)
+  const bool compressed = _compression > 0 && rows.total > 0;
+  const hid_t creation = compressed ? H5Pcreate(H5P_DATASET_CREATE) : H5P_DEFAULT;
+  if (compressed)
   {
     // Deflate works on chunks; of this size HDF5's own tables stay small.
     const hsize_t chunk[2] = {std::min<hsize_t>(shape[0], 1 << 16), columns};
@@ -258,16 +262,18 @@ void Hdf5File::write(const std::string& name, const RowSlice& rows, int width, s
   }
   const hid_t dataset = H5Dcreate2(_group >= 0 ? _group : _file, name.c_str(), native_type<T>(), in_file, H5P_DEFAULT,
                                    creation, H5P_DEFAULT);
-  H5Pclose(creation);
+  if (compressed)
+    H5Pclose(creation);
   note(dataset >= 0, "write");
-  const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
+  const hid_t transfer = _parallel ? H5Pcreate(H5P_DATASET_XFER) : H5P_DEFAULT;
   if (_parallel)
     H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
   if (dataset >= 0 && rows.total > 0)
     note(H5Dwrite(dataset, native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0, "write");
   if (dataset >= 0)
     H5Dclose(dataset);
-  H5Pclose(transfer);
+  if (_parallel)
+    H5Pclose(transfer);
   H5Sclose(in_memory);
   H5Sclose(in_file);
 }

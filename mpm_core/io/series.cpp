@@ -22,19 +22,49 @@ std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix
   return path += suffix;
 }
 
-bool is_symmetric_tensor(int components) { return components == 4 || components == 6; }
+bool is_symmetric_tensor(std::size_t components) { return components == 4 || components == 6; }
+
+/// Rows that are converted at once, so that what the components write stays in the cache.
+constexpr std::size_t rows_at_once = 1024;
+
+/// Puts columns side by side into rows, with zeros after them.
+template <class T>
+std::span<const T> copied_columns(std::span<const OutputColumn> columns, std::size_t n_rows, int width,
+                                  std::vector<T>& rows)
+{
+  const auto w = static_cast<std::size_t>(width);
+  if (columns.size() < w)
+    rows.assign(n_rows * w, T(0));
+  else
+    rows.resize(n_rows * w);
+  for (std::size_t begin = 0; begin < n_rows; begin += rows_at_once)
+    for (std::size_t k = 0; k < columns.size(); ++k)
+    {
+      const auto [first, stride, minus] = columns[k];
+      const std::size_t end = std::min(n_rows, begin + rows_at_once);
+      T* to = rows.data() + k;
+      if (minus)
+        for (std::size_t row = begin; row < end; ++row)
+          to[row * w] = static_cast<T>(first[row * stride] - minus[row * stride]);
+      else if (w == 1 && stride == 1)
+        std::transform(first + begin, first + end, to + begin, [](double v) { return static_cast<T>(v); });
+      else
+        for (std::size_t row = begin; row < end; ++row)
+          to[row * w] = static_cast<T>(first[row * stride]);
+    }
+  return rows;
+}
 
 /// What is wrong with a field's name or length; empty if nothing is.
-std::string field_error(const std::string& name, int components, std::size_t n_values, std::size_t n_rows)
+std::string field_error(const std::string& name, std::size_t components, std::size_t found, std::size_t expected)
 {
   const auto plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
   if (name.empty() || !std::all_of(name.begin(), name.end(), plain))
     return "name of a field is '" + name + "', expected letters, digits, _ and -";
   if (components < 1)
     return name + " has " + std::to_string(components) + " components, expected at least 1";
-  if (n_values != n_rows * static_cast<std::size_t>(components))
-    return name + " has " + std::to_string(n_values) + " values, expected " + std::to_string(n_rows) + " rows of " +
-           std::to_string(components);
+  if (found != expected)
+    return name + " has " + std::to_string(found) + " rows, expected " + std::to_string(expected);
   return {};
 }
 
@@ -42,11 +72,14 @@ std::string fields_error(const std::vector<OutputField>& fields, const std::vect
                          std::size_t n_rows)
 {
   for (const OutputField& field : fields)
-    if (std::string error = field_error(field.name, field.components, field.values.size(), n_rows); !error.empty())
+    if (std::string error = field_error(field.name, field.columns.size(), field.rows, n_rows); !error.empty())
       return error;
   for (const OutputIndexField& field : index_fields)
-    if (std::string error = field_error(field.name, 1, field.values.size(), n_rows); !error.empty())
+  {
+    const std::size_t found = std::visit([](auto values) { return values.size(); }, field.values);
+    if (std::string error = field_error(field.name, 1, found, n_rows); !error.empty())
       return error;
+  }
   return {};
 }
 
@@ -62,13 +95,22 @@ void require_frame(MPI_Comm comm, double time, std::string error, const std::vec
   std::string names;
   for (const auto& list : fields)
     for (const OutputField& field : list)
-      names += field.name + ":" + std::to_string(field.components) + ",";
+      names += field.name + ":" + std::to_string(field.columns.size()) + ",";
   for (const OutputIndexField& field : index_fields)
     names += field.name + ",";
   if (!is_same_on_all_ranks(comm, names))
     throw InputError("fields are not the same on all ranks; here: " + names);
 }
 } // namespace
+
+OutputField row_field(std::string name, std::span<const double> values, int components)
+{
+  const auto width = static_cast<std::size_t>(components);
+  OutputField field{std::move(name), width == 0 ? 0 : values.size() / width, {}};
+  for (std::size_t k = 0; k < width; ++k)
+    field.columns.push_back({values.data() + k, width});
+  return field;
+}
 
 SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage)
     : _file(comm, with_suffix(path, ".h5")), _xdmf(with_suffix(path, ".xdmf"), std::move(grid)), _storage(storage)
@@ -92,41 +134,16 @@ void SeriesFile::begin_frame()
   _file.enter_group(_group);
 }
 
-template <class T>
-void SeriesFile::copy_columns(std::span<const double> values, const Columns& from, std::vector<T>& columns)
+XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns,
+                                 int width)
 {
-  const auto width = static_cast<std::size_t>(from.width), padded = static_cast<std::size_t>(from.padded_width);
-  const std::size_t n = values.size() / width;
-  columns.resize(n * padded);
-  if (padded == width)
-    std::transform(values.begin(), values.end(), columns.begin(), [](double v) { return static_cast<T>(v); });
-  else if (padded == 1)
-    for (std::size_t row = 0; row < n; ++row)
-      columns[row] = static_cast<T>(values[row * width + static_cast<std::size_t>(from.first)]);
-  else
-    for (std::size_t row = 0; row < n; ++row)
-      for (std::size_t k = 0; k < padded; ++k)
-        columns[row * padded + k] = k < width ? static_cast<T>(values[row * width + k]) : T(0);
-}
-
-XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
-                                 const Columns& columns)
-{
+  // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
   const bool single = _storage.precision == Precision::float32;
-  const int width = columns.padded_width;
+  const auto n = static_cast<std::size_t>(rows.local);
   if (single)
-  {
-    // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
-    copy_columns(values, columns, _single);
-    _file.write<float>(name, rows, width, _single);
-  }
-  else if (width == columns.width)
-    _file.write<double>(name, rows, width, values);
+    _file.write<float>(name, rows, width, copied_columns(columns, n, width, _single));
   else
-  {
-    copy_columns(values, columns, _columns);
-    _file.write<double>(name, rows, width, _columns);
-  }
+    _file.write<double>(name, rows, width, copied_columns(columns, n, width, _double));
   return {address(name), rows.total, width, false, single ? 4 : 8};
 }
 
@@ -146,10 +163,16 @@ XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& row
   return {address(name), rows.total, width, true, small ? 4 : 8};
 }
 
-XdmfData SeriesFile::write_points(const std::string& name, const RowSlice& rows, int dimension,
-                                  std::span<const double> values)
+XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& rows, int width,
+                                    std::span<const std::int32_t> values)
 {
-  return write_reals(name, rows, values, {dimension, 0, dimension, 3});
+  _file.write<std::int32_t>(name, rows, width, values);
+  return {address(name), rows.total, width, true, 4};
+}
+
+XdmfData SeriesFile::write_points(const RowSlice& rows, const OutputField& points)
+{
+  return write_reals(points.name, rows, points.columns, 3);
 }
 
 std::string SeriesFile::write_fields(const std::string& center, const RowSlice& rows,
@@ -158,16 +181,19 @@ std::string SeriesFile::write_fields(const std::string& center, const RowSlice& 
   std::string text;
   for (const OutputField& field : fields)
   {
-    const int n = field.components;
+    const std::span<const OutputColumn> columns = field.columns;
+    const std::size_t n = columns.size();
     if (is_symmetric_tensor(n))
-      for (int k = 0; k < n; ++k)
+      for (std::size_t k = 0; k < n; ++k)
       {
-        const std::string name = field.name + "_" + component_names[static_cast<std::size_t>(k)];
-        text += xdmf_attribute(name, center, write_reals(name, rows, field.values, {n, k, 1, 1}));
+        const std::string name = field.name + "_" + component_names[k];
+        text += xdmf_attribute(name, center, write_reals(name, rows, columns.subspan(k, 1), 1));
       }
     else
-      text +=
-          xdmf_attribute(field.name, center, write_reals(field.name, rows, field.values, {n, 0, n, n == 2 ? 3 : n}));
+    {
+      const int width = n == 2 ? 3 : static_cast<int>(n);
+      text += xdmf_attribute(field.name, center, write_reals(field.name, rows, columns, width));
+    }
   }
   return text;
 }
@@ -177,7 +203,9 @@ std::string SeriesFile::write_index_fields(const std::string& center, const RowS
 {
   std::string text;
   for (const OutputIndexField& field : fields)
-    text += xdmf_attribute(field.name, center, write_integers(field.name, rows, 1, field.values));
+    text += std::visit([&](auto values)
+                       { return xdmf_attribute(field.name, center, write_integers(field.name, rows, 1, values)); },
+                       field.values);
   return text;
 }
 
@@ -225,14 +253,13 @@ ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path,
 {
 }
 
-void ParticleSeries::write(double time, int dimension, std::span<const double> position,
-                           const std::vector<OutputField>& fields, const std::vector<OutputIndexField>& index_fields)
+void ParticleSeries::write(double time, const OutputField& position, const std::vector<OutputField>& fields,
+                           const std::vector<OutputIndexField>& index_fields)
 {
-  const std::size_t n = position.size() / static_cast<std::size_t>(dimension);
-  require_frame(_series.comm(), time, fields_error(fields, index_fields, n), {fields}, index_fields);
-  const RowSlice rows = row_slice(_series.comm(), n);
+  require_frame(comm(), time, fields_error(fields, index_fields, position.rows), {fields}, index_fields);
+  const RowSlice rows = row_slice(comm(), position.rows);
   _series.begin_frame();
-  const XdmfData points = _series.write_points("position", rows, dimension, position);
+  const XdmfData points = _series.write_points(rows, position);
   if (rows.total != _vertices.rows)
     _vertices = write_vertices(rows);
   // Named as a field as well: some readers give the points of the first frame only. It costs no space.
@@ -247,7 +274,7 @@ XdmfData ParticleSeries::write_vertices(const RowSlice& rows)
   std::vector<std::int64_t> numbers(static_cast<std::size_t>(rows.local));
   for (std::size_t i = 0; i < numbers.size(); ++i)
     numbers[i] = rows.before + static_cast<std::int64_t>(i);
-  return _series.write_integers("vertices", rows, 1, numbers);
+  return _series.write_integers("vertices", rows, 1, std::span<const std::int64_t>(numbers));
 }
 
 MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
@@ -259,8 +286,9 @@ MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage
   std::vector<std::int64_t> numbers(cells.begin(), cells.end());
   for (std::int64_t& node : numbers)
     node += _nodes.before;
-  const XdmfData topology = _series.write_integers("cells", _cells, dimension + 1, numbers);
-  const XdmfData geometry = _series.write_points("points", _nodes, dimension, points);
+  const XdmfData topology =
+      _series.write_integers("cells", _cells, dimension + 1, std::span<const std::int64_t>(numbers));
+  const XdmfData geometry = _series.write_points(_nodes, row_field("points", points, dimension));
   _grid = xdmf_topology(dimension == 2 ? "Triangle" : "Tetrahedron", topology) + xdmf_geometry(geometry);
   _series.write_single(_grid);
 }

@@ -5,23 +5,35 @@
 #include "io/hdf5_file.h"
 #include "io/xdmf.h"
 
+#include <variant>
 #include <vector>
 
 namespace mpm
 {
-/// Real values to write: `values` is (n, components), row-major.
+/// One component of real values to write, where they are: every `stride`-th number from `first` on.
+struct OutputColumn
+{
+  const double* first;
+  std::size_t stride = 1;
+  const double* minus = nullptr; ///< what is taken away from each, with the same stride; nothing if null
+};
+
+/// Real values to write, one row per particle, node or cell.
 struct OutputField
 {
   std::string name;
-  int components = 1;
-  std::span<const double> values;
+  std::size_t rows;
+  std::vector<OutputColumn> columns; ///< one per component
 };
+
+/// The field of an array (n, components), row-major.
+OutputField row_field(std::string name, std::span<const double> values, int components);
 
 /// Whole numbers to write, one per particle, node or cell.
 struct OutputIndexField
 {
   std::string name;
-  std::span<const std::int64_t> values;
+  std::variant<std::span<const std::int64_t>, std::span<const std::int32_t>> values;
 };
 
 enum class Precision
@@ -56,11 +68,13 @@ public:
   void begin_frame();
 
   /// Writes points of 2 or 3 coordinates, padded to 3, into the present group.
-  XdmfData write_points(const std::string& name, const RowSlice& rows, int dimension, std::span<const double> values);
+  XdmfData write_points(const RowSlice& rows, const OutputField& points);
 
   /// Numbers that all fit into 32 bits are stored so.
   XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
                           std::span<const std::int64_t> values);
+  XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
+                          std::span<const std::int32_t> values);
 
   /// Writes fields that live on nodes or cells into the present group.
   /// @return their description in XDMF
@@ -79,17 +93,8 @@ public:
   MPI_Comm comm() const { return _file.comm(); }
 
 private:
-  /// Which columns of an array go into a dataset, with zeros after them.
-  struct Columns
-  {
-    int width;        ///< of the array
-    int first, count; ///< columns taken
-    int padded_width; ///< of the dataset
-  };
-  template <class T>
-  static void copy_columns(std::span<const double> values, const Columns& from, std::vector<T>& columns);
-  XdmfData write_reals(const std::string& name, const RowSlice& rows, std::span<const double> values,
-                       const Columns& columns);
+  /// @param width  of the dataset; zeros come after the columns
+  XdmfData write_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
   /// Where a dataset of the present group is to be found, in XDMF.
   std::string address(const std::string& name) const;
   /// Lets the first rank do something with the XDMF file; what goes wrong is an error on all.
@@ -104,7 +109,7 @@ private:
   int _n_groups = 0;                   ///< groups that are there for frames; those behind the last frame are empty
   std::vector<std::int32_t> _integers; ///< room for numbers that need no more
   std::vector<float> _single;          ///< room for a field in single precision
-  std::vector<double> _columns;        ///< the same in double precision, where columns are chosen or padded
+  std::vector<double> _double;         ///< the same in double precision
 };
 
 /// Particles over time. Their number may change, and ranks may have none.
@@ -115,12 +120,13 @@ public:
 
   /// Writes a frame.
   /// @param time        s, finite
-  /// @param dimension   2 or 3
-  /// @param position    (n, dimension) of this rank's particles; m
-  /// @param fields      of n rows each; the same names on all ranks
+  /// @param position    of this rank's particles, 2 or 3 components; m
+  /// @param fields      of as many rows each; the same names on all ranks
   /// @throws InputError if lengths do not match, names differ between ranks or are no plain words
-  void write(double time, int dimension, std::span<const double> position, const std::vector<OutputField>& fields,
+  void write(double time, const OutputField& position, const std::vector<OutputField>& fields,
              const std::vector<OutputIndexField>& index_fields);
+
+  MPI_Comm comm() const { return _series.comm(); }
 
   void close() { _series.close(); }
 

@@ -1,7 +1,9 @@
 #include "python/bindings.h"
 
-#include "io/series.h"
+#include "io/particle_fields.h"
+#include "parallel/agreement.h"
 #include "python/arrays.h"
+#include "steps/run.h"
 
 #include <memory>
 
@@ -26,7 +28,7 @@ std::vector<OutputField> output_fields(const RealFields& fields)
 {
   std::vector<OutputField> output;
   for (const auto& [name, array] : fields)
-    output.push_back({name, width(array), values<double>(array)});
+    output.push_back(row_field(name, values<double>(array), width(array)));
   return output;
 }
 
@@ -36,6 +38,20 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
   for (const auto& [name, array] : fields)
     output.push_back({name, values<std::int64_t>(array)});
   return output;
+}
+
+/// Writes fields of a model's particles from where they are, and further ones.
+template <int D>
+void write_model(ParticleSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
+                 const RealFields& more, const IntegerFields& more_integers)
+{
+  ParticleFields all;
+  collectively(series.comm(), [&] { all = particle_fields<D>(model.particles, names); });
+  for (OutputField& field : output_fields(more))
+    all.fields.push_back(std::move(field));
+  for (OutputIndexField& field : output_fields(more_integers))
+    all.index_fields.push_back(std::move(field));
+  series.write(time, all.position, all.fields, all.index_fields);
 }
 } // namespace
 
@@ -49,11 +65,14 @@ void bind_io(py::module_& m)
       .def(
           "write",
           [](ParticleSeries& series, double time, const RealArray& position, const RealFields& fields,
-             const IntegerFields& index_fields) {
-            series.write(time, width(position), values<double>(position), output_fields(fields),
+             const IntegerFields& index_fields)
+          {
+            series.write(time, row_field("position", values<double>(position), width(position)), output_fields(fields),
                          output_fields(index_fields));
           },
           py::arg("time"), py::arg("position"), py::arg("fields"), py::arg("index_fields"))
+      .def("write_model", &write_model<2>)
+      .def("write_model", &write_model<3>)
       .def("close", &ParticleSeries::close);
 
   py::class_<MeshSeries>(m, "MeshSeries")

@@ -53,10 +53,10 @@ def measured(model: mpm.Model, steps: int, every: int) -> tuple[np.ndarray, floa
     started = time.process_time()
     with tempfile.TemporaryDirectory() as name:
         with ParticleOutput(Path(comm.bcast(name)) / "particles", comm) as output:
-            output.write(0.0, {name: getattr(p, name) for name in ("position", *FIELDS)})
+            output.write_particles(0.0, p, FIELDS)
             for report in model.explicit(1e9, every_steps=every, damping=0.75):
                 if report.steps % FRAME == 0:
-                    output.write(report.time, {name: getattr(p, name) for name in ("position", *FIELDS)})
+                    output.write_particles(report.time, p, FIELDS)
                 rows.append([report.steps, *comm.allgather(resident_memory())])
                 if report.steps >= steps:
                     break

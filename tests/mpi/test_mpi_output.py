@@ -5,7 +5,9 @@ import meshio
 import numpy as np
 import pytest
 from mpm_core.output import MeshOutput, ParticleOutput
+from partitions import one_does_all, scattered, spread_box
 
+import mpm_core as mpm
 from mpm_core import InputError, RunError
 
 
@@ -23,6 +25,35 @@ def test_shares_are_stored_by_rising_rank(comm, shared_path):
             numbers = [100 * rank + i for rank in range(comm.size) for i in range(count[rank])]
             np.testing.assert_array_equal(file[f"frames/{step}/position"][:, 0], ranks)
             np.testing.assert_array_equal(file[f"frames/{step}/id"][()], numbers)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("float32", [True, False])
+def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path, dim, float32):
+    owners = scattered if dim == 2 else one_does_all
+    counts, sizes = ((6, 4), (3.0, 2.0)) if dim == 2 else ((3, 2, 2), (3.0, 2.0, 2.0))
+    mesh = spread_box(counts, sizes, comm, owners)
+    model = mpm.Model(mesh, mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0))
+    model.seed(density=2000.0, per_cell=1)
+    model.set_gravity((0, -9.81, 0)[:dim])
+    *_, report = model.explicit(0.01)
+    p = model.particles
+    names = ["displacement", "velocity", "stress", "state", "plastic_strain", "volume", "id", "material", "cell"]
+    more = {"pore": 2.0 * p.volume, "number": 3 * p.id}
+    with ParticleOutput(shared_path / "a", comm, float32) as output:
+        output.write(0.0, {name: getattr(p, name) for name in ("position", *names)} | more)
+    with ParticleOutput(shared_path / "b", comm, float32) as output:
+        output.write_particles(0.0, p, names, more)
+        with pytest.raises(InputError, match="particle field is 'weight', which does not exist"):
+            output.write_particles(0.0, p, ["weight"])
+        with pytest.raises(InputError, match="'traction', but no particle carries one"):
+            output.write_particles(0.0, p, ["traction"])
+    with h5py.File(shared_path / "a.h5") as one, h5py.File(shared_path / "b.h5") as other:
+        assert set(one["frames/0"]) == set(other["frames/0"]) and len(one["frames/0/id"]) == report.particles > 0
+        for name, values in one["frames/0"].items():
+            assert values.dtype == other["frames/0"][name].dtype
+            np.testing.assert_array_equal(values[()], other["frames/0"][name][()], err_msg=name)
+        assert np.abs(one["frames/0/displacement"][:, 1]).max() > 0
 
 
 @pytest.mark.parametrize("compression", [1, 9])

@@ -13,7 +13,7 @@ component, ``NAME_xx`` and so on; other numbers of components are kept as they a
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 
 import numpy as np
@@ -22,6 +22,7 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .collective import collectively
+from .particles import Particles
 
 
 class ParticleOutput:
@@ -68,6 +69,24 @@ class ParticleOutput:
         """
         position, real, whole = collectively(self._comm, lambda: _particle_fields(fields))
         self._series.write(float(time), position, real, whole)
+
+    def write_particles(
+        self, time: float, particles: Particles, names: Sequence[str], more: Mapping[str, np.ndarray] | None = None
+    ) -> None:
+        """Write a frame of fields of a model's particles, as ``write`` does but without copies of them.
+
+        Args:
+            time: s.
+            particles: of a model.
+            names: attributes of ``particles``, such as ``velocity``; the position is always written.
+            more: further fields by name, one row per particle.
+
+        Raises:
+            InputError: a field that does not exist, or of another length.
+            RunError: the frame cannot be written.
+        """
+        real, whole = collectively(self._comm, lambda: _split_fields(more or {}))
+        self._series.write_model(float(time), particles._core, list(names), real, whole)
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
@@ -179,14 +198,21 @@ def _particle_fields(
     position = _numeric("position", fields["position"])
     if position.ndim != 2 or position.shape[1] not in (2, 3):
         raise InputError(f"position has shape {position.shape}, expected (n, 2) or (n, 3)")
-    others = {name: _numeric(name, values) for name, values in fields.items() if name != "position"}
+    others = {name: values for name, values in fields.items() if name != "position"}
     for name, values in others.items():
-        if len(values) != len(position):
+        if len(_numeric(name, values)) != len(position):
             raise InputError(f"{name} has {len(values)} rows, expected {len(position)} as position has")
+    return (np.ascontiguousarray(position, np.float64), *_split_fields(others))
+
+
+def _split_fields(
+    fields: Mapping[str, np.ndarray],
+) -> tuple[list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
+    """Real fields and fields of whole numbers."""
+    others = {name: _numeric(name, values) for name, values in fields.items()}
     whole = {name: values for name, values in others.items() if values.dtype.kind in "iub" and values.ndim == 1}
     real = {name: values for name, values in others.items() if name not in whole}
     return (
-        np.ascontiguousarray(position, np.float64),
         _real_fields(real),
         [(name, np.ascontiguousarray(values, np.int64)) for name, values in whole.items()],
     )
