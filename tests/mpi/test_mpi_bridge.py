@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from partitions import all_by_id, assert_same
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 from bridge_cases import (
+    MESHES,
     POISSON,
     UNIT_WEIGHT,
     YOUNG,
@@ -133,6 +136,24 @@ def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
         for comm in (COMM, MPI.COMM_SELF)
     ]
     assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails
+
+
+def test_a_slope_on_a_mesh_of_gmsh_slides_alike_on_any_number_of_ranks():
+    """A thousand steps without damping, on DOLFINx's partition and cut anew."""
+    runs = []
+    for comm, threshold in ((COMM, 1.2), (MPI.COMM_SELF, None)):
+        parts = bridge.read_mesh(MESHES / "slope.geo", comm, 2, {"cell_size": 0.1})
+        soil = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0)
+        model = mpm.Model(bridge.background_mesh(*parts), soil)
+        model.seed(density=80e3 / 9.81, per_cell=3, cell_tag=bridge.SOIL)
+        model.roller(bridge.LEFT, (1, 0))
+        model.fix(bridge.BASE)
+        model.set_gravity((0, -9.81))
+        *_, report = model.explicit(1.0, dt=1e-3, pic=0.01, rebalance=threshold)
+        assert report.steps == 1000
+        runs.append(all_by_id(model))
+    assert np.abs(runs[1]["displacement"]).max() > 0.5 and runs[1]["state"].max() > 0.1
+    assert_same(*runs)
 
 
 def by_id(model, *names):

@@ -73,6 +73,35 @@ def test_an_implicit_run_that_is_rebalanced_is_the_same_run(comm):
     assert comm.size == 1 or model.cuts > 0
 
 
+def heap(comm):
+    """A block of tetrahedra between smooth walls that slides and spreads along its smooth base."""
+    mesh = spread_box((12, 3, 4), (1.2, 0.3, 0.4), comm, body=((0, 0, 0), (0.5, 0.3, 0.3)))
+    model = mpm.Model(mesh, mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=100.0, friction_angle=20.0))
+    model.seed(density=2000.0, per_cell=1, cell_tag=1)
+    for wall, normal in ((1, (1, 0, 0)), (3, (0, 1, 0)), (4, (0, 1, 0)), (5, (0, 0, 1))):
+        model.roller(wall, normal)
+    model.set_gravity((5.0, 0.0, -8.5))
+    return model
+
+
+def test_a_run_of_tetrahedra_that_is_rebalanced_is_the_same_run(comm):
+    model, alone = heap(comm), heap(MPI.COMM_SELF)
+    explicit = dict(until=0.3, every=0.05, since=0.0, dt=1e-3, pic=0.01)
+    for each, threshold in ((model, 1.2), (alone, None)):
+        *_, report = each.explicit(**explicit, rebalance=threshold)
+    assert report.steps == 300 and (comm.size == 1 or model.cuts > 1)
+    moved = all_by_id(model)
+    assert moved["displacement"][:, 0].max() > 0.4
+    assert_same(moved, all_by_id(alone))
+    implicit = dict(until=0.34, dt=0.02, damping=0.3, solver=mpm.Newton(tolerance=1e-11))
+    iterations = [
+        [r.iterations for r in each.implicit(**implicit, rebalance=threshold)]
+        for each, threshold in ((model, 1.01), (alone, None))
+    ]
+    assert iterations[0] == iterations[1]
+    assert_same(all_by_id(model), all_by_id(alone))
+
+
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 def test_a_restart_after_a_cut_goes_on_to_the_last_bit(comm, shared_path, scheme):
     # Damping makes a difference in the last bit grow.
