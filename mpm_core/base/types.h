@@ -9,6 +9,8 @@
 ///   Strain has the same order with engineering shear, gamma = 2 epsilon.
 ///   In plane strain the component zz of a strain increment is zero, that of the stress is not.
 
+#include "base/huge_pages.h"
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -34,8 +36,12 @@ using Vector = std::array<double, D>;
 template <int D>
 using SymTensor = std::array<double, n_stress<D>>;
 
+/// A large array: one entry per particle, cell or node.
+template <class T>
+using Array = std::vector<T, HugePages<T>>;
+
 /// One entry per particle.
-using Column = std::vector<double>;
+using Column = Array<double>;
 
 /// Input that the toolkit cannot work with. The message names the argument, its value and what was expected.
 class InputError : public std::invalid_argument

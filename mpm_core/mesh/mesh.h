@@ -40,7 +40,7 @@ struct Mesh
 {
   std::vector<Vector<D>> points;
   std::vector<std::array<Index, D + 1>> cells;
-  std::vector<CellShape<D>> shapes;
+  Array<CellShape<D>> shapes;
   /// Cell across the facet opposite to vertex k, or `none`
   std::vector<std::array<Index, D + 1>> neighbours;
   std::vector<Index> cell_tags;

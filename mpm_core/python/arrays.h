@@ -59,8 +59,8 @@ std::span<T> mutable_values(const char* name, py::array& array)
 }
 
 /// A new array with a copy of the values; (n,) when width is 1 and flat, else (n, width).
-template <class T>
-py::array_t<T> copied(const std::vector<T>& values)
+template <class T, class Allocator>
+py::array_t<T> copied(const std::vector<T, Allocator>& values)
 {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }

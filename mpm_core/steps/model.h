@@ -87,14 +87,14 @@ struct Inventory
 template <int D>
 struct Workspace
 {
-  bool ready = false;                        ///< runs and moments agree with the particles
-  std::vector<Run> runs;                     ///< of the particles as they are now
-  std::vector<unsigned char> cell_marks;     ///< room, one per cell; all zero
-  std::vector<CellMoments<D>> moments;       ///< of the particles as they are now; zero outside of `soil`
-  std::vector<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
-  MeshPart soil;                             ///< where particles are, or have been since the last sort
-  bool soil_shrinks = false;                 ///< cells that have become empty are to be left out
-  std::vector<NodeSums<D>> nodes;
+  bool ready = false;                    ///< runs and moments agree with the particles
+  std::vector<Run> runs;                 ///< of the particles as they are now
+  std::vector<unsigned char> cell_marks; ///< room, one per cell; all zero
+  Array<CellMoments<D>> moments;         ///< of the particles as they are now; zero outside of `soil`
+  Array<TractionMoments<D>> tractions;   ///< likewise; empty where no particle carries any
+  MeshPart soil;                         ///< where particles are, or have been since the last sort
+  bool soil_shrinks = false;             ///< cells that have become empty are to be left out
+  Array<NodeSums<D>> nodes;
   std::vector<Vector<D>> start_velocity;             ///< v_i at the start of the step
   std::vector<Vector<D>> acceleration;               ///< a_i
   std::vector<Vector<D>> velocity_change;            ///< of the nodes, as the particles take it

@@ -43,7 +43,7 @@ template <class Moments>
 constexpr int moments_width = sizeof(Moments) / sizeof(double);
 
 template <int D, class Moments>
-Table table_of(const Model<D>& model, const char* name, const std::vector<Moments>& moments)
+Table table_of(const Model<D>& model, const char* name, const Array<Moments>& moments)
 {
   constexpr std::size_t width = moments_width<Moments>;
   Table table{name, moments_width<Moments> + 1, {}};
@@ -58,7 +58,7 @@ Table table_of(const Model<D>& model, const char* name, const std::vector<Moment
 }
 
 template <int D, class Moments>
-void take(const Model<D>& model, const Table& table, std::vector<Moments>& moments)
+void take(const Model<D>& model, const Table& table, Array<Moments>& moments)
 {
   std::fill(moments.begin(), moments.end(), Moments{});
   const auto width = static_cast<std::size_t>(table.width);
