@@ -1,6 +1,7 @@
 #include "steps/batch_strain.h"
 
 #include "steps/integration.h"
+#include "transfer/affine_field.h"
 
 #include <algorithm>
 

@@ -44,7 +44,8 @@ void solve_momentum(Model<D>& model, double damping, double dt)
   }
 }
 
-/// v_i at the end of the step. MUSL maps the new velocities of the particles back (19); the moments tell what they are.
+/// v_i at the end of the step. MUSL maps the new velocities of the particles back (19): what is kept of the old ones
+/// gives the momentum of the step's start, and the moments tell what their changes give.
 template <int D>
 void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double dt)
 {
@@ -58,11 +59,16 @@ void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double d
         work.velocity[i][a] = work.start_velocity[i][a] + dt * work.acceleration[i][a];
     return;
   }
-  scatter_momentum<D>(model.mesh, work.soil, work.moments, 1 - options.pic_share, work.velocity_change, work.velocity);
+  scatter_momentum<D>(model.mesh, work.soil, work.moments, work.velocity_change, work.velocity);
   sum_shared(model.exchange, work.velocity);
+  const double keep = 1 - options.pic_share;
   for (Index i : work.soil.nodes)
+  {
+    const NodeSums<D>& node = work.nodes[i];
+    const double per_mass = node.mass > work.least_mass ? 1 / node.mass : 0;
     for (int a = 0; a < D; ++a)
-      work.velocity[i][a] = work.nodes[i].mass > work.least_mass ? work.velocity[i][a] / work.nodes[i].mass : 0;
+      work.velocity[i][a] = (keep * node.momentum[a] + work.velocity[i][a]) * per_mass;
+  }
   for (const Support<D>& support : model.supports)
     impose<D>(support, work.velocity[support.node]);
 }

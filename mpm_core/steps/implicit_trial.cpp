@@ -3,6 +3,7 @@
 #include "steps/batches.h"
 #include "steps/implicit_tangent.h"
 #include "steps/integration.h"
+#include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
 
 #include <algorithm>

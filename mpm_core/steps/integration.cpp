@@ -1,5 +1,7 @@
 #include "steps/integration.h"
 
+#include "transfer/affine_field.h"
+
 #include <algorithm>
 
 namespace mpm

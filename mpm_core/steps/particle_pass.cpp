@@ -154,13 +154,14 @@ void particle_pass(Model<D>& model, const PassOptions& options)
   // The particles of a dual domain grow each in its own way, so that their volumes do not follow from the cell's
   // strain.
   const bool anew = model.integration == Integration::dual_domain || model.totals.steps % gathering_interval == 0;
-  for (Index c : work.soil.cells)
-  {
-    if (anew)
-      work.moments[c] = {};
-    if (!work.tractions.empty())
-      work.tractions[c] = {};
-  }
+  if (anew || !work.tractions.empty())
+    for (Index c : work.soil.cells)
+    {
+      if (anew)
+        work.moments[c] = {};
+      if (!work.tractions.empty())
+        work.tractions[c] = {};
+    }
   if (options.stress)
     model.last.plastic = 0;
   BatchScratch<D> scratch{};

@@ -19,6 +19,8 @@ inline constexpr int lanes = 4;
 /// One number of each of these particles. The compilers' own vectors (g++, clang++): plain arrays of constant length
 /// are unrolled into scalars.
 using Lanes [[gnu::vector_size(lanes * sizeof(double))]] = double;
+/// Two numbers
+using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
 /// -1 where something holds, 0 elsewhere; what the comparison of two `Lanes` gives
 using LaneMask [[gnu::vector_size(lanes * sizeof(double))]] = std::int64_t;
 
@@ -114,9 +116,8 @@ inline T root(const T& a)
 
 inline double sum(const Lanes& a)
 {
-  double total = 0;
-  for (int l = 0; l < lanes; ++l)
-    total += a[l];
-  return total;
+  static_assert(lanes == 4);
+  const Pair halves = __builtin_shufflevector(a, a, 0, 1) + __builtin_shufflevector(a, a, 2, 3);
+  return halves[0] + halves[1];
 }
 } // namespace mpm

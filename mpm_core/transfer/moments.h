@@ -43,37 +43,6 @@ struct AffineField
   Matrix<D> gradient;
 };
 
-/// The field that nodal values have inside a cell.
-/// @param nodal  value of node i, a callable Index -> const Vector<D>&
-template <int D, class Nodal>
-inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
-{
-  // The components of a vector side by side: half the instructions in three dimensions.
-  using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
-  using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
-  using Components = std::conditional_t<D == 2, Pair, Four>;
-  Components value{};
-  std::array<Components, D> by{}; // derivative by each coordinate
-  for (int k = 0; k <= D; ++k)
-  {
-    const Vector<D>& nodal_value = nodal(mesh.cells[cell][k]);
-    Components u{};
-    for (int a = 0; a < D; ++a)
-      u[a] = nodal_value[a];
-    value += u * (1.0 / (D + 1));
-    for (int b = 0; b < D; ++b)
-      by[b] += u * mesh.shapes[cell].gradient[k][b];
-  }
-  AffineField<D> field;
-  for (int a = 0; a < D; ++a)
-  {
-    field.value[a] = value[a];
-    for (int b = 0; b < D; ++b)
-      field.gradient[a][b] = by[b][a];
-  }
-  return field;
-}
-
 template <int D>
 inline AffineField<D> scaled(AffineField<D> field, double factor)
 {
@@ -103,34 +72,6 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
 template <int D>
 void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
             TractionMoments<D>& moments);
-
-/// Momentum of a cell's particles and its first moment
-template <int D>
-struct CellMomentum
-{
-  Vector<D> value; ///< sum m_p v_p
-  Matrix<D> first; ///< sum m_p v_p (x) xi; [component of v][component of xi]
-};
-
-/// What the momentum becomes when each particle's velocity becomes `keep` times itself plus an affine field f at its
-/// place; the particles are not visited.
-template <int D>
-inline CellMomentum<D> changed_momentum(const CellMoments<D>& moments, double keep, const AffineField<D>& f)
-{
-  CellMomentum<D> result;
-  for (int a = 0; a < D; ++a)
-  {
-    result.value[a] = keep * moments.momentum[a] + moments.mass * f.value[a] + dot<D>(f.gradient[a], moments.mass_xi);
-    for (int b = 0; b < D; ++b)
-    {
-      double sum = keep * moments.momentum_xi[a][b] + f.value[a] * moments.mass_xi[b];
-      for (int c = 0; c < D; ++c)
-        sum += f.gradient[a][c] * moments.mass_xixi[symmetric_index<D>(c, b)];
-      result.first[a][b] = sum;
-    }
-  }
-  return result;
-}
 
 /// Takes moments of the same cell out of others, such as those of a particle that leaves it.
 template <class Moments>

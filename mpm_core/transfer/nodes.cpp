@@ -1,6 +1,6 @@
 #include "transfer/nodes.h"
 
-#include "transfer/lanes.h"
+#include "transfer/affine_field.h"
 
 namespace mpm
 {
@@ -100,7 +100,7 @@ void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMome
 }
 
 template <int D>
-void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells, double keep,
+void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
                       std::span<const Vector<D>> change, std::span<Vector<D>> momentum)
 {
   for (Index node : part.nodes)
@@ -110,11 +110,21 @@ void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const
   {
     if (cells[c].mass == 0)
       continue;
-    const CellMomentum<D> sum = changed_momentum<D>(cells[c], keep, affine_field<D>(mesh, c, nodal));
+    const AffineField<D> f = affine_field<D>(mesh, c, nodal);
     const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
     std::array<ByVertex<D>, D> sums;
     for (int a = 0; a < D; ++a)
-      sums[a] = at_vertices<D>(sum.value[a], sum.first[a], gradients);
+    {
+      const double momentum = cells[c].mass * f.value[a] + dot<D>(f.gradient[a], cells[c].mass_xi);
+      Vector<D> first; // moment of it
+      for (int b = 0; b < D; ++b)
+      {
+        first[b] = f.value[a] * cells[c].mass_xi[b];
+        for (int d = 0; d < D; ++d)
+          first[b] += f.gradient[a][d] * cells[c].mass_xixi[symmetric_index<D>(d, b)];
+      }
+      sums[a] = at_vertices<D>(momentum, first, gradients);
+    }
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
         momentum[mesh.cells[c][k]][a] += sums[a][k];
@@ -124,7 +134,7 @@ void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const
 #define INSTANTIATE(D)                                                                                                 \
   template void scatter<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>,                           \
                            std::span<const TractionMoments<D>>, std::span<NodeSums<D>>);                               \
-  template void scatter_momentum<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>, double,          \
+  template void scatter_momentum<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>,                  \
                                     std::span<const Vector<D>>, std::span<Vector<D>>);
 INSTANTIATE(2)
 INSTANTIATE(3)

@@ -40,9 +40,9 @@ template <int D>
 void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
              std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes);
 
-/// The momentum `sum m_p N_i v_p` that (19) needs, after the velocities have become v_p = keep v_p + sum N_i change_i.
-/// The particles are not visited.
+/// The momentum `sum m_p N_i sum_j N_j change_j` of particles that all had the velocity of the nodal field `change` at
+/// their place: the consistent mass matrix times `change`. The particles are not visited.
 template <int D>
-void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells, double keep,
+void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
                       std::span<const Vector<D>> change, std::span<Vector<D>> momentum);
 } // namespace mpm

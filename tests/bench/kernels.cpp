@@ -113,6 +113,76 @@ void strain(benchmark::State& state)
 BENCHMARK(strain<2>)->Arg(18)->Arg(112);
 BENCHMARK(strain<3>)->Arg(5)->Arg(24);
 
+template <int D>
+void stress_sums(benchmark::State& state)
+{
+  Filled<D> box(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    for (const Run& run : box.runs)
+      benchmark::DoNotOptimize(stress_sum<D>(box.particles, run.first, run.last));
+  count_particles(state, box.particles.size());
+}
+BENCHMARK(stress_sums<2>)->Arg(18)->Arg(112);
+BENCHMARK(stress_sums<3>)->Arg(5)->Arg(24);
+
+/// What is done once per cell; rates are in cells.
+template <int D>
+struct Gathered : Filled<D>
+{
+  std::vector<CellMoments<D>> moments;
+  MeshPart part;
+  std::vector<NodeSums<D>> nodes;
+  std::vector<Vector<D>> change, momentum;
+
+  explicit Gathered(int n)
+      : Filled<D>(n), moments(this->mesh.cells.size()), nodes(this->mesh.points.size()),
+        change(this->mesh.points.size()), momentum(this->mesh.points.size())
+  {
+    std::vector<Index> cells;
+    for (const Run& run : this->runs)
+    {
+      gather<D>(this->particles, run.first, run.last, this->mesh.shapes[run.cell], moments[run.cell]);
+      cells.push_back(run.cell);
+    }
+    part = make_part<D>(this->mesh, cells, {});
+  }
+};
+
+template <int D>
+void move_moments(benchmark::State& state)
+{
+  Gathered<D> box(static_cast<int>(state.range(0)));
+  const CellMotion<D> rest{1, {}, {}};
+  for (auto _ : state)
+    for (CellMoments<D>& moments : box.moments)
+      move<D>(moments, rest);
+  count_particles(state, static_cast<Index>(box.moments.size()));
+}
+BENCHMARK(move_moments<2>)->Arg(18)->Arg(112);
+BENCHMARK(move_moments<3>)->Arg(5)->Arg(24);
+
+template <int D>
+void scatter_to_nodes(benchmark::State& state)
+{
+  Gathered<D> box(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    scatter<D>(box.mesh, box.part, box.moments, {}, box.nodes);
+  count_particles(state, static_cast<Index>(box.moments.size()));
+}
+BENCHMARK(scatter_to_nodes<2>)->Arg(18)->Arg(112);
+BENCHMARK(scatter_to_nodes<3>)->Arg(5)->Arg(24);
+
+template <int D>
+void scatter_changes(benchmark::State& state)
+{
+  Gathered<D> box(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    scatter_momentum<D>(box.mesh, box.part, box.moments, box.change, box.momentum);
+  count_particles(state, static_cast<Index>(box.moments.size()));
+}
+BENCHMARK(scatter_changes<2>)->Arg(18)->Arg(112);
+BENCHMARK(scatter_changes<3>)->Arg(5)->Arg(24);
+
 /// A law on one batch in the first-level cache. `shear` strains: 0 stays elastic, 1 yields everywhere.
 template <int D>
 void mohr_coulomb(benchmark::State& state)

@@ -1,5 +1,6 @@
 #include "boxes.h"
 #include "mesh/search.h"
+#include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
 #include "transfer/nodes.h"
 

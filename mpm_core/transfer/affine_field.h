@@ -1,0 +1,51 @@
+#pragma once
+/// @file
+/// Vector fields that are affine in a cell, worked out with the components of a vector side by side in a register.
+
+#include "transfer/lanes.h"
+#include "transfer/moments.h"
+
+namespace mpm
+{
+/// The components of a vector in a vector register; in three dimensions the last lane is free.
+template <int D>
+using Components = std::conditional_t<D == 2, Pair, Lanes>;
+
+template <int D>
+[[gnu::always_inline]] inline Components<D> components(const Vector<D>& v)
+{
+  if constexpr (D == 2)
+    return Pair{v[0], v[1]};
+  else
+    return Lanes{v[0], v[1], v[2], 0};
+}
+
+/// The field that nodal values have inside a cell.
+/// @param nodal  value of node i, a callable Index -> const Vector<D>&
+template <int D, class Nodal>
+inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
+{
+  const auto& nodes = mesh.cells[cell];
+  const auto& gradient = mesh.shapes[cell].gradient;
+  // Begun with the first vertex: g++ would set an array of vectors to zero in memory.
+  Components<D> value = components<D>(nodal(nodes[0]));
+  std::array<Components<D>, D> by; // derivative by each coordinate
+  for (int b = 0; b < D; ++b)
+    by[b] = value * gradient[0][b];
+  for (int k = 1; k <= D; ++k)
+  {
+    const Components<D> u = components<D>(nodal(nodes[k]));
+    value += u;
+    for (int b = 0; b < D; ++b)
+      by[b] += u * gradient[k][b];
+  }
+  AffineField<D> field;
+  for (int a = 0; a < D; ++a)
+  {
+    field.value[a] = value[a] * (1.0 / (D + 1));
+    for (int b = 0; b < D; ++b)
+      field.gradient[a][b] = by[b][a];
+  }
+  return field;
+}
+} // namespace mpm
