@@ -24,17 +24,20 @@ constexpr std::size_t lanes = 8;
 /// side by side would cost more than the points that do not yield after all.
 constexpr double dense_share = 0.45;
 
+/// Points by whose share of candidates the rest of a block is judged: where it is over `dense_share`, the others are
+/// taken for candidates unseen, a seventh of the law's time where all yield.
+constexpr Index sample_size = 32;
+
 /// The points of a block that may yield, side by side
 template <int D>
 struct Candidates
 {
   std::size_t size = 0;
-  WorkColumn<Index> point;             ///< number in the batch
-  WorkColumns<SymTensor<D>> stress;    ///< trial stress, then the final one
-  WorkColumns<Spectral<D>> trial;      ///< principal stresses and directions before the return
-  WorkColumns<Returned> returned;      ///< principal stresses after the return, and the region
-  WorkColumn<double> plastic_strain;   ///< increment of the accumulated plastic deviatoric strain
-  WorkColumn<std::int64_t> is_plastic; ///< 1 where the point yields
+  WorkColumn<Index> point;           ///< number in the batch
+  WorkColumns<SymTensor<D>> stress;  ///< trial stress, then the final one
+  WorkColumn<double> plastic_strain; ///< accumulated plastic deviatoric strain
+  WorkColumns<Spectral<D>> trial;    ///< principal stresses and directions before the return; for tangents only
+  WorkColumns<Returned> returned;    ///< principal stresses after the return, and the region; for tangents only
 };
 
 Surface surface_of(const MohrCoulomb& law)
@@ -48,28 +51,44 @@ Surface surface_of(const MohrCoulomb& law)
 struct ElasticStep
 {
   WorkColumn<std::int64_t> may_leave; ///< 1 for points that may yield
-  Index leaving, failed;              ///< their number, and that of points whose trial stress is not usable
+  Index leaving = 0, failed = 0;      ///< their number, and that of points whose trial stress is not usable
 };
 
-/// Elastic step of the points first to last: their stress becomes the trial stress, unless that is not usable.
-template <int D>
-void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last, ElasticStep& step)
+/// Elastic step of the points from to last of the block that begins with `first`: their stress becomes the trial
+/// stress, unless that is not usable.
+/// @tparam unseen  whether all are taken for points that may yield
+template <int D, bool unseen>
+void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index from, Index last, ElasticStep& step)
 {
   std::int64_t failed = 0, leaving = 0;
 #pragma GCC ivdep
-  for (Index i = first; i < last; ++i)
+  for (Index i = from; i < last; ++i)
   {
     const SymTensor<D> trial = elastic_trial<D>(m.moduli, points, i);
     const bool usable = is_usable<D>(trial);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
-    const std::int64_t leaves = usable & may_yield(m, trial) ? 1 : 0;
+    const std::int64_t leaves = usable & (unseen || may_yield(m, trial)) ? 1 : 0;
     step.may_leave[static_cast<std::size_t>(i - first)] = leaves;
     leaving += leaves;
     failed += usable ? 0 : 1;
   }
-  step.leaving = static_cast<Index>(leaving);
-  step.failed = static_cast<Index>(failed);
+  step.leaving += static_cast<Index>(leaving);
+  step.failed += static_cast<Index>(failed);
+}
+
+/// Elastic step of the points of a block.
+template <int D>
+ElasticStep elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last)
+{
+  ElasticStep step;
+  const Index sampled = std::min(last, first + sample_size);
+  elastic_step<D, false>(m, points, first, first, sampled, step);
+  if (step.leaving > dense_share * (sampled - first))
+    elastic_step<D, true>(m, points, first, sampled, last, step);
+  else
+    elastic_step<D, false>(m, points, first, sampled, last, step);
+  return step;
 }
 
 /// Lists the points of a block that may yield, from the given one of its points on.
@@ -84,7 +103,7 @@ void list_candidates(const ElasticStep& step, Index first, Index from, Index las
   }
 }
 
-/// Copies the trial stresses of the candidates, and fills up with zero stress.
+/// Copies the trial stresses and plastic strains of the candidates, and fills up with zeros.
 template <int D>
 void gather(const PointBatch<D>& points, Candidates<D>& candidates)
 {
@@ -92,22 +111,35 @@ void gather(const PointBatch<D>& points, Candidates<D>& candidates)
 #pragma GCC ivdep
     for (std::size_t i = 0; i < candidates.size; ++i)
       candidates.stress.column(k)[i] = points.stress[k][candidates.point[i]];
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < candidates.size; ++i)
+    candidates.plastic_strain[i] = points.state[0][candidates.point[i]];
   for (std::size_t i = candidates.size; i % lanes != 0; ++i)
+  {
     candidates.stress.set(i, {});
+    candidates.plastic_strain[i] = 0;
+  }
 }
 
+/// Stresses and accumulated plastic strains of points to return, whose number fills vectors
 template <int D>
-using StressColumns = std::array<double*, n_stress<D>>;
+struct Returning
+{
+  std::size_t size;
+  std::array<double*, n_stress<D>> stress; ///< trial stress, then the final one
+  double* plastic_strain;
+};
 
-/// Returns the trial stresses in the columns to the surface, those that are outside. What only tangents need is kept
-/// for them only: it would not fit into the first-level cache with the rest. Not inlined, so that all points go
-/// through the same instructions and round alike.
+/// Returns the trial stresses that are outside to the surface. What only tangents need is kept for them only: it would
+/// not fit into the first-level cache with the rest. Not inlined, so that all points go through the same instructions
+/// and round alike.
+/// @returns how many yielded
 template <int D, bool for_tangents, bool with_cutoff>
-[[gnu::noinline]] void return_stresses(const Surface& surface, const StressColumns<D>& columns, std::size_t size,
-                                       Candidates<D>& results)
+[[gnu::noinline]] Index return_stresses(const Surface& surface, const Returning<D>& columns, Candidates<D>& results)
 {
   const Surface m = surface; // copies that no store can alias
-  const StressColumns<D> stress = columns;
+  const auto [size, stress, plastic_strain] = columns;
+  std::int64_t plastic = 0;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < size; ++i)
   {
@@ -125,29 +157,38 @@ template <int D, bool for_tangents, bool with_cutoff>
       results.trial.set(i, spectrum);
       results.returned.set(i, returned);
     }
-    results.plastic_strain[i] = deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
-    results.is_plastic[i] = elastic ? 0 : 1;
+    plastic_strain[i] += deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
+    plastic += elastic ? 0 : 1;
   }
+  return static_cast<Index>(plastic);
 }
 
 template <int D, bool for_tangents>
-void return_stresses(const Surface& m, const StressColumns<D>& columns, std::size_t size, Candidates<D>& results)
+Index return_stresses(const Surface& m, const Returning<D>& columns, Candidates<D>& results)
 {
   if (m.tension < std::numeric_limits<double>::infinity())
-    return_stresses<D, for_tangents, true>(m, columns, size, results);
-  else
-    return_stresses<D, for_tangents, false>(m, columns, size, results);
+    return return_stresses<D, for_tangents, true>(m, columns, results);
+  return return_stresses<D, for_tangents, false>(m, columns, results);
 }
 
-/// Returns the candidates, side by side.
+/// Returns the candidates, side by side, and writes their stresses and plastic strains back.
+/// @returns how many yielded
 template <int D, bool for_tangents>
-void return_candidates(const Surface& m, const PointBatch<D>& points, Candidates<D>& candidates)
+Index return_candidates(const Surface& m, const PointBatch<D>& points, Candidates<D>& candidates)
 {
   gather(points, candidates);
-  StressColumns<D> columns;
+  Returning<D> columns{(candidates.size + lanes - 1) / lanes * lanes, {}, candidates.plastic_strain.data()};
   for (std::size_t k = 0; k < n_stress<D>; ++k)
-    columns[k] = candidates.stress.column(k).data();
-  return_stresses<D, for_tangents>(m, columns, (candidates.size + lanes - 1) / lanes * lanes, candidates);
+    columns.stress[k] = candidates.stress.column(k).data();
+  const Index plastic = return_stresses<D, for_tangents>(m, columns, candidates);
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < candidates.size; ++i)
+      points.stress[k][candidates.point[i]] = candidates.stress.column(k)[i];
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < candidates.size; ++i)
+    points.state[0][candidates.point[i]] = candidates.plastic_strain[i];
+  return plastic;
 }
 
 /// Returns points from `first` on where they are; their number must fill vectors.
@@ -156,38 +197,10 @@ template <int D>
 Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first, std::size_t size,
                       Candidates<D>& candidates)
 {
-  StressColumns<D> columns;
+  Returning<D> columns{size, {}, points.state[0] + first};
   for (std::size_t k = 0; k < n_stress<D>; ++k)
-    columns[k] = points.stress[k] + first;
-  return_stresses<D, false>(m, columns, size, candidates);
-  double* const accumulated = points.state[0] + first;
-  std::int64_t plastic = 0;
-#pragma GCC ivdep
-  for (std::size_t i = 0; i < size; ++i)
-  {
-    accumulated[i] += candidates.plastic_strain[i];
-    plastic += candidates.is_plastic[i];
-  }
-  return static_cast<Index>(plastic);
-}
-
-/// Writes stress and state of the candidates back and returns how many yielded.
-template <int D>
-Index scatter(const Candidates<D>& candidates, const PointBatch<D>& points)
-{
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-#pragma GCC ivdep
-    for (std::size_t i = 0; i < candidates.size; ++i)
-      points.stress[k][candidates.point[i]] = candidates.stress.column(k)[i];
-  double* const accumulated = points.state[0];
-  std::int64_t plastic = 0;
-#pragma GCC ivdep
-  for (std::size_t i = 0; i < candidates.size; ++i)
-  {
-    accumulated[candidates.point[i]] += candidates.plastic_strain[i];
-    plastic += candidates.is_plastic[i];
-  }
-  return static_cast<Index>(plastic);
+    columns.stress[k] = points.stress[k] + first;
+  return return_stresses<D, false>(m, columns, candidates);
 }
 
 /// Writes the tangents of the candidates that yielded.
@@ -196,7 +209,7 @@ void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D
 {
   constexpr std::size_t entries = n_stress<D> * n_stress<D>;
   for (std::size_t i = 0; i < candidates.size; ++i)
-    if (candidates.is_plastic[i])
+    if (candidates.returned.at(i).region != Region::elastic)
       write_tangent<D>(m, maps, candidates.trial.at(i), candidates.returned.at(i),
                        tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
@@ -218,13 +231,10 @@ Index return_block(const Surface& m, const std::optional<RegionMaps>& maps, cons
   if (candidates.size == 0)
     return plastic;
   if (!points.tangent)
-    return_candidates<D, false>(m, points, candidates);
-  else
-  {
-    return_candidates<D, true>(m, points, candidates);
-    write_tangents(m, *maps, candidates, points.tangent);
-  }
-  return plastic + scatter(candidates, points);
+    return plastic + return_candidates<D, false>(m, points, candidates);
+  plastic += return_candidates<D, true>(m, points, candidates);
+  write_tangents(m, *maps, candidates, points.tangent);
+  return plastic;
 }
 } // namespace
 
@@ -257,13 +267,12 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
   }
   BatchReport report;
   Index failed = 0;
-  ElasticStep step;
   Candidates<D> candidates;
   constexpr auto block = static_cast<Index>(block_size);
   for (Index first = 0; first < points.size; first += block)
   {
     const Index last = std::min(points.size, first + block);
-    elastic_step(m, points, first, last, step);
+    const ElasticStep step = elastic_step(m, points, first, last);
     failed += step.failed;
     if (step.leaving > 0)
       report.plastic += return_block(m, maps, points, first, last, step, candidates);
