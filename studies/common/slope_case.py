@@ -95,12 +95,13 @@ class SlopeCase:
         return Scene(points, cells.reshape(-1, 3), np.concatenate(tags) == bridge.SOIL)
 
     def crest_particle(self) -> int:
-        """Number of the particle that started nearest to the crest. Collective."""
-        start = self.model.particles.initial_position
-        distance = np.hypot(start[:, 0] - self.args.crest, start[:, 1] - self.args.height)
-        nearest = np.argmin(distance) if len(distance) else None
-        own = (np.inf, -1) if nearest is None else (distance[nearest], int(self.model.particles.id[nearest]))
-        return min(self.model.comm.allgather(own))[1]
+        """Number of the particle that started nearest to the crest, of several as near the highest number. Collective."""
+        p, comm = self.model.particles, self.model.comm
+        distance = np.linalg.norm(p.initial_position[:, :2] - (self.args.crest, self.args.height), axis=1)
+        nearest = comm.allreduce(distance.min(initial=np.inf), MPI.MIN)
+        # Round-off, which depends on the partition, must not choose between them.
+        near = p.id[distance <= nearest + 1e-9 * self.args.height]
+        return comm.allreduce(int(near.max(initial=-1)), MPI.MAX)
 
     @property
     def surface(self) -> np.ndarray:
