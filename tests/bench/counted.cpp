@@ -1,4 +1,5 @@
-/// Small explicit steps and one Newton assembly, whose instructions `tests/bench/budget.py` counts under callgrind.
+/// Small explicit steps and one Newton assembly, whose instructions `tests/bench/budget.py` counts under callgrind;
+/// `tests/run memcheck` looks at their memory.
 
 #include "../cpp/boxes.h"
 
