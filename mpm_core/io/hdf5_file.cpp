@@ -20,13 +20,17 @@ namespace
 constexpr std::int64_t table_size = 4096;
 /// The same for a group alone.
 constexpr std::int64_t group_size = 1024;
+/// The same for a name in a group.
+constexpr std::int64_t link_size = 48;
 /// Room that is always kept for tables that HDF5 has not written yet, in bytes.
 constexpr std::int64_t table_room = 1 << 18;
 
-/// More names than this in a group go into tables of their own.
+/// More names than this, or than were expected, in a group go into tables of their own.
 constexpr unsigned most_names_inside = 64;
-/// Names, and their length, for which a group has room from the start; adding room later takes time.
-constexpr unsigned names_expected = 16, length_expected = 16;
+/// Length of names for which a group has room from the start; adding room later takes time.
+constexpr unsigned name_length = 16;
+/// Names in the group of a frame.
+constexpr unsigned names_in_frame = 16;
 
 /// What is reserved at once beyond what is needed: a quarter of it, between these, in bytes. Each call costs some time.
 constexpr std::int64_t least_ahead = 1 << 22, most_ahead = 1 << 26;
@@ -93,6 +97,16 @@ hid_t access_properties(MPI_Comm comm, bool parallel)
   return access;
 }
 
+/// How groups are made. With their order kept, names can be stored in the group itself instead of in tables beside it:
+/// that is quick, and readers, who read it as a whole, meet no table that has changed since they read another.
+hid_t group_properties(unsigned expected_names)
+{
+  const hid_t creation = H5Pcreate(H5P_GROUP_CREATE);
+  H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED);
+  H5Pset_link_phase_change(creation, std::max(most_names_inside, expected_names), 0);
+  H5Pset_est_link_info(creation, expected_names, name_length);
+  return creation;
+}
 } // namespace
 
 RowSlice row_slice(MPI_Comm comm, std::size_t local)
@@ -137,7 +151,7 @@ Hdf5File::~Hdf5File()
   if (finalized || _file < 0)
     return;
   const Quiet quiet;
-  leave_group();
+  leave_all_groups();
   H5Fclose(_file);
 }
 
@@ -173,15 +187,17 @@ bool Hdf5File::has_room(std::int64_t bytes)
   return obstacle.empty();
 }
 
-void Hdf5File::create_group(const std::string& name)
+void Hdf5File::create_group(const std::string& name, unsigned expected_names)
 {
   if (_file < 0)
     throw RunError("cannot write " + _path.string() + ": it is closed");
   const Quiet quiet;
-  if (!has_room(group_size))
+  if (!has_room(group_size + link_size * expected_names))
     return;
-  const hid_t group = H5Gcreate2(_file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t creation = group_properties(expected_names);
+  const hid_t group = H5Gcreate2(_file, name.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT);
   note(group >= 0, "write");
+  H5Pclose(creation);
   if (group >= 0)
     H5Gclose(group);
 }
@@ -193,11 +209,7 @@ void Hdf5File::create_groups(const std::vector<std::string>& names)
   const Quiet quiet;
   if (!has_room(group_size * static_cast<std::int64_t>(names.size())))
     return;
-  const hid_t creation = H5Pcreate(H5P_GROUP_CREATE);
-  // With their order kept, a few names are stored in the group itself instead of in tables beside it.
-  H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED);
-  H5Pset_link_phase_change(creation, most_names_inside, most_names_inside / 2);
-  H5Pset_est_link_info(creation, names_expected, length_expected);
+  const hid_t creation = group_properties(names_in_frame);
   std::vector<hid_t> groups;
   for (std::size_t k = 0; k < names.size(); ++k)
     groups.push_back(H5Gcreate_anon(_file, creation, H5P_DEFAULT));
@@ -207,7 +219,7 @@ void Hdf5File::create_groups(const std::vector<std::string>& names)
   for (std::size_t k = 0; k < names.size(); ++k)
   {
     note(H5Olink(groups[k], _file, names[k].c_str(), H5P_DEFAULT, H5P_DEFAULT) >= 0, "write");
-    H5Gclose(groups[k]);
+    _ahead[names[k]] = groups[k];
   }
   flush();
   allow_early_writing(_file, true);
@@ -216,6 +228,8 @@ void Hdf5File::create_groups(const std::vector<std::string>& names)
 void Hdf5File::remove_group(const std::string& name)
 {
   const Quiet quiet;
+  if (const auto group = _ahead.extract(name))
+    H5Gclose(group.mapped());
   note(H5Ldelete(_file, name.c_str(), H5P_DEFAULT) >= 0, "write");
 }
 
@@ -223,7 +237,8 @@ void Hdf5File::enter_group(const std::string& name)
 {
   const Quiet quiet;
   leave_group();
-  _group = H5Gopen2(_file, name.c_str(), H5P_DEFAULT);
+  if (const auto group = _ahead.extract(name))
+    _group = group.mapped();
   note(_group >= 0, "write");
 }
 
@@ -231,6 +246,14 @@ void Hdf5File::leave_group()
 {
   if (_group >= 0)
     H5Gclose(std::exchange(_group, -1));
+}
+
+void Hdf5File::leave_all_groups()
+{
+  leave_group();
+  for (const auto& [name, group] : _ahead)
+    H5Gclose(group);
+  _ahead.clear();
 }
 
 template <class T>
@@ -315,7 +338,7 @@ void Hdf5File::close()
   if (_file < 0)
     return;
   const Quiet quiet;
-  leave_group();
+  leave_all_groups();
   flush();
   int rank = 0;
   MPI_Comm_rank(_comm, &rank);

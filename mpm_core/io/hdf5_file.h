@@ -5,6 +5,7 @@
 #include "parallel/agreement.h"
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -41,7 +42,8 @@ public:
   /// Arrays that are written from now on are compressed by deflate, level 1 to 9; 0 stores them as they are.
   void set_compression(int level) { _compression = level; }
 
-  void create_group(const std::string& name);
+  /// @param expected_names  for which the group has room from the start
+  void create_group(const std::string& name, unsigned expected_names = 16);
 
   /// Makes empty groups at once. The list of names in a file is what a kill while it is written spoils for all that is
   /// named in it, so it is better written seldom than often; the groups are in the file before it names them.
@@ -50,7 +52,8 @@ public:
   /// Takes a group away, with all that is in it.
   void remove_group(const std::string& name);
 
-  /// Opens a group for the datasets written from now on, until `leave_group`.
+  /// Lets the datasets written from now on go into a group that `create_groups` made, until `leave_group`.
+  /// @pre it was not entered before
   void enter_group(const std::string& name);
   void leave_group();
 
@@ -78,6 +81,7 @@ public:
   const std::filesystem::path& path() const { return _path; }
 
 private:
+  void leave_all_groups();
   void note(bool succeeded, const char* doing);
   /// Reserves room for more values; if it cannot be had, that is noted and they must not be written.
   bool has_room(std::int64_t bytes);
@@ -86,7 +90,8 @@ private:
   std::filesystem::path _path;
   std::int64_t _file = -1;  ///< hid_t, which is not named here so that only sources of this folder see HDF5
   std::int64_t _group = -1; ///< hid_t of the group that was entered
-  std::string _failure;     ///< what failed first on this rank; empty if nothing did
+  std::map<std::string, std::int64_t> _ahead; ///< those of groups that were made and not yet entered
+  std::string _failure;                       ///< what failed first on this rank; empty if nothing did
   int _compression = 0;
   bool _parallel = false;     ///< several ranks write by MPI; one by itself does without
   std::int64_t _needed = 0;   ///< bytes that the file may have come to need

@@ -12,6 +12,8 @@ const std::array<const char*, 6> component_names = {"xx", "yy", "zz", "xy", "yz"
 
 /// Groups for frames are made so many at a time; a frame itself changes its own group only.
 constexpr int groups_ahead = 64;
+/// Frames that are named without adding room to the list of their names.
+constexpr unsigned frames_expected = 1600;
 
 std::string frame_group(int frame) { return "/frames/" + std::to_string(frame); }
 
@@ -117,7 +119,7 @@ SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::st
 {
   _file.set_compression(storage.compression);
   with_xdmf([&] { return _xdmf.write_without_frames(); });
-  _file.create_group("/frames");
+  _file.create_group("/frames", frames_expected);
 }
 
 void SeriesFile::begin_frame()

@@ -223,6 +223,25 @@ def test_series_are_read_while_the_run_goes_on_and_after_a_kill(tmp_path):
         assert run.returncode == -signal.SIGKILL
 
 
+def test_a_reader_that_keeps_the_file_open_finds_all_frames_that_it_knows_of(tmp_path):
+    fields = {"position": np.zeros((2, 2)), "mass": np.zeros(2)}
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        for step in range(100):
+            output.write(float(step), fields)
+        script = (
+            "import h5py, sys; frames = h5py.File(sys.argv[1])['frames']; assert '90' in frames and '700' not in frames\n"
+            "print('open', flush=True); input()\n"
+            "assert all(frames[f'{k}/mass'].shape == (2,) for k in range(100))"
+        )
+        command = [sys.executable, "-c", script, tmp_path / "particles.h5"]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as reader:
+            assert reader.stdout.readline() == "open\n"
+            for step in range(100, 800):  # the list of frames grows while the reader has read it in part
+                output.write(float(step), fields)
+            reader.communicate("\n", timeout=60)
+    assert reader.returncode == 0
+
+
 def test_missing_folder_is_named(tmp_path):
     with pytest.raises(RunError, match=f"cannot write {tmp_path}/nowhere/particles.h5: No such file or directory"):
         ParticleOutput(tmp_path / "nowhere" / "particles", COMM)
