@@ -52,13 +52,15 @@ void find_cell_strains(const Model<D>& model, const PassOptions& options, const 
   const std::size_t n = batch.last_run - batch.first_run;
   for (std::size_t first = 0; first < n; first += lanes)
   {
-    std::array<std::array<std::array<double, lanes>, D>, D> gradient;
-    for (int l = 0; l < lanes; ++l)
-      for (int a = 0; a < D; ++a)
-        for (int b = 0; b < D; ++b)
-          gradient[a][b][l] = scratch.motion[first + l].displacement.gradient[a][b];
+    static_assert(lanes == 4);
+    const CellMotion<D>* const motion = &scratch.motion[first];
+    std::array<std::array<Lanes, D>, D> gradient;
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b) // in registers: a vector read where single numbers were just written has to wait
+        gradient[a][b] = Lanes{motion[0].displacement.gradient[a][b], motion[1].displacement.gradient[a][b],
+                               motion[2].displacement.gradient[a][b], motion[3].displacement.gradient[a][b]};
     CellStrain<D, Lanes>& strain = scratch.cells[first / lanes];
-    strain = strain_increment<D>(std::bit_cast<std::array<std::array<Lanes, D>, D>>(gradient), 1);
+    strain = strain_increment<D>(gradient, 1);
     if (options.averaged)
     {
       Lanes theta{};
