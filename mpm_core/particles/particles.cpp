@@ -1,6 +1,7 @@
 #include "particles/particles.h"
 
 #include <algorithm>
+#include <string_view>
 #include <tuple>
 
 namespace mpm
@@ -9,10 +10,12 @@ template <int D>
 void resize(Particles<D>& particles, Index size)
 {
   const auto n = static_cast<std::size_t>(size);
-  for_each_column(particles, [n](const char*, int, auto& column) { column.resize(n); });
-  if (!particles.loaded)
-    for (auto& column : particles.traction)
-      column.clear();
+  for_each_column(particles,
+                  [n, &particles](const char* name, int, auto& column)
+                  {
+                    const bool missing = std::string_view(name) == "traction" && !particles.loaded;
+                    column.resize(missing ? 0 : n);
+                  });
 }
 
 template <int D>
