@@ -73,7 +73,7 @@ bool move_particles(Particles<D>& particles, Index first, Index last, const Cell
   const CellShape<D> cell = shape; // copies that no store can alias
   const CellMotion<D> m = motion;
   LaneMask outside{};
-  change_lanes(columns, first, last, [&](Piece<2 * D>& piece) { move_piece<D>(piece, cell, m, outside); });
+  change_lanes<D == 2>(columns, first, last, [&](Piece<2 * D>& piece) { move_piece<D>(piece, cell, m, outside); });
   std::int64_t any = 0;
   for (int l = 0; l < lanes; ++l)
     any |= outside[l];
@@ -84,7 +84,7 @@ template <int D>
 void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation)
 {
   const Matrix<D> r = rotation; // a copy that no store can alias
-  change_lanes(stress, first, last, [&r](Piece<n_symmetric<D>>& piece) { turn<D>(piece, r); });
+  change_lanes<false>(stress, first, last, [&r](Piece<n_symmetric<D>>& piece) { turn<D>(piece, r); });
 }
 
 template <int D>
@@ -98,13 +98,13 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
   columns[S + 1] = particles.deviatoric_strain.data();
   const double growth = 1 + strain.volumetric, increment = strain.deviatoric;
   const Matrix<D> r = strain.rotation; // a copy that no store can alias
-  change_lanes(columns, first, last,
-               [&r, growth, increment](Piece<S + 2>& piece)
-               {
-                 turn<D>(piece, r);
-                 piece[S] *= growth;
-                 piece[S + 1] += increment;
-               });
+  change_lanes<D == 2>(columns, first, last,
+                       [&r, growth, increment](Piece<S + 2>& piece)
+                       {
+                         turn<D>(piece, r);
+                         piece[S] *= growth;
+                         piece[S + 1] += increment;
+                       });
 }
 
 #define INSTANTIATE(D)                                                                                                 \

@@ -24,6 +24,9 @@ using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
 /// -1 where something holds, 0 elsewhere; what the comparison of two `Lanes` gives
 using LaneMask [[gnu::vector_size(lanes * sizeof(double))]] = std::int64_t;
 
+/// How many particles ahead memory is asked for: some more than a batch, whose columns are read one after another.
+inline constexpr int particles_ahead = 320;
+
 /// Entries of N columns
 template <std::size_t N>
 using Piece = std::array<Lanes, N>;
@@ -52,7 +55,10 @@ inline Piece<N> load_few(const std::array<T*, N>& columns, Index first, Index la
 /// Calls `change(piece)` on the entries [first, last) of the columns, piece by piece, and writes them back. The last
 /// piece reaches back over entries that the piece before it changes too: it is read before that, and gives them the
 /// same values once more. (Masked stores would hold up the loads that follow them.)
-template <std::size_t N, class Change>
+/// @tparam asks_ahead  whether entries of a later run are asked for: a processor's own prefetching ends with each 4 KB.
+///   In plane strain whole steps gain 4 % with 640,000 particles and 6 % with 2.5 million; in three dimensions, with
+///   more to compute for each number, they lose 1 %.
+template <bool asks_ahead, std::size_t N, class Change>
 inline void change_lanes(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
 {
   if (last - first < lanes)
@@ -75,6 +81,9 @@ inline void change_lanes(const std::array<double*, N>& columns, Index first, Ind
   for (; i + lanes <= last; i += lanes)
   {
     Piece<N> piece = load(columns, i);
+    if constexpr (asks_ahead)
+      for (std::size_t k = 0; k < N; ++k)
+        __builtin_prefetch(columns[k] + i + particles_ahead, 1);
     change(piece);
     store(piece, i);
   }
