@@ -55,7 +55,7 @@ def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> bool:
 
 
 def coo_matrix(comm: MPI.Comm, sizes: tuple[int, int], blocks: tuple[int, int], places: Any) -> PETSc.Mat:
-    """Matrix with this rank's numbers of rows and columns, for values at (rows, columns); see ``_set_values``."""
+    """Matrix with this rank's numbers of rows and columns, for values at (rows, columns); see ``set_values``."""
     matrix = PETSc.Mat().create(comm)
     matrix.setSizes(((sizes[0], None), (sizes[1], None)))
     matrix.setBlockSizes(*blocks)
