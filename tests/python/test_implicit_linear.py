@@ -26,7 +26,7 @@ def quasi_static_step(model, nmd):
 
 @pytest.mark.parametrize("nmd", [False, True])
 def test_krylov_iterations_grow_by_less_than_half_from_h_to_a_quarter(nmd, monkeypatch):
-    monkeypatch.setattr(linear, "_DIRECT_LIMIT", {2: 0, 3: 0})
+    monkeypatch.setattr(linear, "DIRECT_LIMIT", {2: 0, 3: 0})
     law = mpm.LinearElastic(young=SLOPE_SOIL.young, poisson=SLOPE_SOIL.poisson)
     coarse, fine = (max(krylov_iterations(h, law, nmd)) for h in (0.1, 0.025))
     assert 1 < coarse < 25
@@ -34,7 +34,7 @@ def test_krylov_iterations_grow_by_less_than_half_from_h_to_a_quarter(nmd, monke
 
 
 def test_krylov_iterations_grow_by_less_than_half_in_three_dimensions(monkeypatch):
-    monkeypatch.setattr(linear, "_DIRECT_LIMIT", {2: 0, 3: 0})
+    monkeypatch.setattr(linear, "DIRECT_LIMIT", {2: 0, 3: 0})
 
     def iterations(n):
         model = mpm.Model(box([n] * 3), mpm.LinearElastic(young=1e6, poisson=0.3))
@@ -48,7 +48,7 @@ def test_krylov_iterations_grow_by_less_than_half_in_three_dimensions(monkeypatc
 
 
 def test_multigrid_solves_the_tangent_of_yielding_soil(monkeypatch):
-    monkeypatch.setattr(linear, "_DIRECT_LIMIT", {2: 0, 3: 0})
+    monkeypatch.setattr(linear, "DIRECT_LIMIT", {2: 0, 3: 0})
     assert max(krylov_iterations(0.05, SLOPE_SOIL, False)) < 40
 
 
