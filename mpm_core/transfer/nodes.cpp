@@ -115,15 +115,15 @@ void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const
     std::array<ByVertex<D>, D> sums;
     for (int a = 0; a < D; ++a)
     {
-      const double momentum = cells[c].mass * f.value[a] + dot<D>(f.gradient[a], cells[c].mass_xi);
-      Vector<D> first; // moment of it
+      const double sum = cells[c].mass * f.value[a] + dot<D>(f.gradient[a], cells[c].mass_xi);
+      Vector<D> first; // its first moment
       for (int b = 0; b < D; ++b)
       {
         first[b] = f.value[a] * cells[c].mass_xi[b];
         for (int d = 0; d < D; ++d)
           first[b] += f.gradient[a][d] * cells[c].mass_xixi[symmetric_index<D>(d, b)];
       }
-      sums[a] = at_vertices<D>(momentum, first, gradients);
+      sums[a] = at_vertices<D>(sum, first, gradients);
     }
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
