@@ -5,6 +5,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdint>
 #include <filesystem>
 
 namespace mpm
@@ -13,7 +15,8 @@ namespace mpm
 class Descriptor
 {
 public:
-  Descriptor(const std::filesystem::path& path, int flags) : _file(::open(path.c_str(), flags | O_CLOEXEC)) {}
+  /// @param flags  as of `open`; a file that is made may be read and written by all whom the umask lets
+  Descriptor(const std::filesystem::path& path, int flags) : _file(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
   ~Descriptor()
   {
     if (_file >= 0)
@@ -22,6 +25,37 @@ public:
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int number() const { return _file; }
+
+  /// Reads a part of the file.
+  /// @return whether all was there; if not, errno says why, or is 0 if the file ends before
+  bool get(void* bytes, std::size_t count, std::int64_t at) const
+  {
+    for (std::size_t done = 0; done < count;)
+    {
+      errno = 0;
+      const auto got = ::pread(_file, static_cast<char*>(bytes) + done, count - done,
+                               static_cast<off_t>(at) + static_cast<off_t>(done));
+      if (got <= 0)
+        return false;
+      done += static_cast<std::size_t>(got);
+    }
+    return true;
+  }
+
+  /// Writes into a part of the file.
+  /// @return whether all was written; if not, errno says why
+  bool put(const void* bytes, std::size_t count, std::int64_t at) const
+  {
+    for (std::size_t done = 0; done < count;)
+    {
+      const auto wrote = ::pwrite(_file, static_cast<const char*>(bytes) + done, count - done,
+                                  static_cast<off_t>(at) + static_cast<off_t>(done));
+      if (wrote <= 0)
+        return false;
+      done += static_cast<std::size_t>(wrote);
+    }
+    return true;
+  }
 
 private:
   int _file;

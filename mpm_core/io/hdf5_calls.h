@@ -2,6 +2,8 @@
 /// @file
 /// What the sources that call HDF5 share. Included by them only.
 
+#include "io/hdf5_file.h"
+
 #include <hdf5.h>
 
 #include <cstdint>
@@ -30,17 +32,19 @@ private:
   void* _data = nullptr;
 };
 
-template <class T>
-inline hid_t native_type()
+inline hid_t hdf5_type(Number number)
 {
-  if constexpr (std::is_same_v<T, float>)
+  switch (number)
+  {
+  case Number::float32:
     return H5T_NATIVE_FLOAT;
-  else if constexpr (std::is_same_v<T, double>)
+  case Number::float64:
     return H5T_NATIVE_DOUBLE;
-  else if constexpr (std::is_same_v<T, std::int32_t>)
+  case Number::int32:
     return H5T_NATIVE_INT32;
-  else
+  default:
     return H5T_NATIVE_INT64;
+  }
 }
 
 /// The innermost message of HDF5's error stack, which is the nearest to the cause.

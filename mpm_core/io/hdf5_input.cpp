@@ -77,7 +77,7 @@ std::vector<T> Hdf5Input::read(const std::string& name, const RowSlice& rows, in
     H5Sselect_none(in_file);
   const hid_t transfer = H5Pcreate(H5P_DATASET_XFER);
   H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
-  note(H5Dread(dataset, native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0, "read " + name);
+  note(H5Dread(dataset, hdf5_type(number_of<T>), in_memory, in_file, transfer, values.data()) >= 0, "read " + name);
   H5Pclose(transfer);
   H5Sclose(in_memory);
   H5Sclose(in_file);

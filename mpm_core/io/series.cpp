@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 namespace mpm
 {
@@ -10,18 +12,38 @@ namespace
 {
 const std::array<const char*, 6> component_names = {"xx", "yy", "zz", "xy", "yz", "xz"};
 
-/// Groups for frames are made so many at a time; a frame itself changes its own group only.
-constexpr int groups_ahead = 64;
-/// Frames that are named without adding room to the list of their names.
-constexpr unsigned frames_expected = 1600;
+constexpr std::size_t digits_of_frames = 6;
 
-std::string frame_group(int frame) { return "/frames/" + std::to_string(frame); }
-
-std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix)
+/// Name of a frame's file.
+std::string frame_file(int frame)
 {
-  if (path.extension() == ".h5" || path.extension() == ".xdmf")
-    path.replace_extension();
-  return path += suffix;
+  const std::string number = std::to_string(frame);
+  return std::string(digits_of_frames - std::min(digits_of_frames, number.size()), '0') + number + ".h5";
+}
+
+bool is_frame_file(const std::filesystem::path& path)
+{
+  const std::string stem = path.stem().string();
+  return path.extension() == ".h5" && stem.size() >= digits_of_frames &&
+         std::ranges::all_of(stem, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// Makes the folder of a series, or removes the frames of an earlier one from it.
+/// @return what went wrong; empty if nothing did
+std::string prepared_folder(const std::filesystem::path& folder)
+{
+  std::error_code error;
+  std::filesystem::create_directory(folder, error);
+  const std::filesystem::directory_iterator end;
+  for (std::filesystem::directory_iterator entry(folder, error); !error && entry != end; entry.increment(error))
+    if (is_frame_file(entry->path()))
+      std::filesystem::remove(entry->path(), error);
+  return error ? "cannot write " + folder.string() + ": " + error.message() : "";
+}
+
+std::filesystem::path without_suffix(std::filesystem::path path)
+{
+  return path.extension() == ".h5" || path.extension() == ".xdmf" ? path.replace_extension() : path;
 }
 
 bool is_symmetric_tensor(std::size_t components) { return components == 4 || components == 6; }
@@ -29,21 +51,18 @@ bool is_symmetric_tensor(std::size_t components) { return components == 4 || com
 /// Rows that are converted at once, so that what the components write stays in the cache.
 constexpr std::size_t rows_at_once = 1024;
 
-/// Puts columns side by side into rows, with zeros after them.
+/// Puts columns side by side into rows of a width, with zeros after them.
 template <class T>
-std::span<const T> copied_columns(std::span<const OutputColumn> columns, std::size_t n_rows, int width,
-                                  std::vector<T>& rows)
+void copy_columns(std::span<const OutputColumn> columns, int width, std::span<T> rows)
 {
   const auto w = static_cast<std::size_t>(width);
-  if (columns.size() < w)
-    rows.assign(n_rows * w, T(0));
-  else
-    rows.resize(n_rows * w);
+  const std::size_t n_rows = rows.size() / w;
   for (std::size_t begin = 0; begin < n_rows; begin += rows_at_once)
+  {
+    const std::size_t end = std::min(n_rows, begin + rows_at_once);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const auto [first, stride, minus] = columns[k];
-      const std::size_t end = std::min(n_rows, begin + rows_at_once);
       T* to = rows.data() + k;
       if (minus)
         for (std::size_t row = begin; row < end; ++row)
@@ -54,7 +73,17 @@ std::span<const T> copied_columns(std::span<const OutputColumn> columns, std::si
         for (std::size_t row = begin; row < end; ++row)
           to[row * w] = static_cast<T>(first[row * stride]);
     }
-  return rows;
+    for (std::size_t k = columns.size(); k < w; ++k)
+      for (std::size_t row = begin; row < end; ++row)
+        rows[row * w + k] = T(0);
+  }
+}
+
+template <class T>
+void copy_numbers(const WholeNumbers& numbers, std::span<T> to)
+{
+  std::visit([&](auto values) { std::ranges::transform(values, to.begin(), [](auto v) { return static_cast<T>(v); }); },
+             numbers);
 }
 
 /// What is wrong with a field's name or length; empty if nothing is.
@@ -115,70 +144,85 @@ OutputField row_field(std::string name, std::span<const double> values, int comp
 }
 
 SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage)
-    : _file(comm, with_suffix(path, ".h5")), _xdmf(with_suffix(path, ".xdmf"), std::move(grid)), _storage(storage)
+    : _files(comm, storage.compression), _folder(without_suffix(path)),
+      _xdmf(_folder.string() + ".xdmf", std::move(grid)), _precision(storage.precision)
 {
-  _file.set_compression(storage.compression);
-  with_xdmf([&] { return _xdmf.write_without_frames(); });
-  _file.create_group("/frames", frames_expected);
+  if (!is_same_on_all_ranks(comm, _folder))
+    throw RunError("path is not the same on all ranks; here: " + _folder.string());
+  on_first_rank([&] { return prepared_folder(_folder); });
+  on_first_rank([&] { return _xdmf.write_without_frames(); });
 }
 
-void SeriesFile::begin_frame()
+void SeriesFile::begin(const std::string& file)
 {
-  if (_n_frames == _n_groups)
+  if (_closed)
+    throw RunError("cannot write " + _folder.string() + ": it is closed");
+  _file = file;
+  _parts.clear();
+}
+
+void SeriesFile::begin_frame() { begin(frame_file(_n_frames)); }
+
+XdmfData SeriesFile::add(Part part)
+{
+  const Dataset& dataset = part.dataset;
+  const bool integer = dataset.number == Number::int32 || dataset.number == Number::int64;
+  const std::string address = _folder.filename().string() + "/" + _file + ":/" + dataset.name;
+  const XdmfData data{address, dataset.rows.total, dataset.width, integer, static_cast<int>(bytes_of(dataset.number))};
+  _parts.push_back(std::move(part));
+  return data;
+}
+
+XdmfData SeriesFile::add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns,
+                               int width)
+{
+  const Number number = _precision == Precision::float32 ? Number::float32 : Number::float64;
+  return add({{name, rows, width, number}, columns, {}});
+}
+
+XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values)
+{
+  int small = 1;
+  if (const auto* wide = std::get_if<std::span<const std::int64_t>>(&values))
   {
-    std::vector<std::string> names;
-    names.reserve(groups_ahead);
-    for (int k = 0; k < groups_ahead; ++k)
-      names.push_back(frame_group(_n_groups++));
-    _file.create_groups(names);
+    small = std::ranges::all_of(*wide, [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
+    MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
   }
-  _group = frame_group(_n_frames);
-  _file.enter_group(_group);
+  return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, values});
 }
 
-XdmfData SeriesFile::write_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns,
-                                 int width)
+void SeriesFile::write_parts(const std::filesystem::path& path)
 {
-  // HDF5 would convert by itself, but then each rank writes on its own instead of all together.
-  const bool single = _storage.precision == Precision::float32;
-  const auto n = static_cast<std::size_t>(rows.local);
-  if (single)
-    _file.write<float>(name, rows, width, copied_columns(columns, n, width, _single));
-  else
-    _file.write<double>(name, rows, width, copied_columns(columns, n, width, _double));
-  return {address(name), rows.total, width, false, single ? 4 : 8};
+  std::vector<Dataset> datasets;
+  for (const Part& part : _parts)
+    datasets.push_back(part.dataset);
+  _files.begin(path, std::move(datasets));
+  for (const Part& part : _parts)
+    switch (part.dataset.number)
+    {
+    case Number::float32:
+      copy_columns(part.columns, part.dataset.width, _files.next<float>());
+      break;
+    case Number::float64:
+      copy_columns(part.columns, part.dataset.width, _files.next<double>());
+      break;
+    case Number::int32:
+      copy_numbers(part.whole, _files.next<std::int32_t>());
+      break;
+    case Number::int64:
+      copy_numbers(part.whole, _files.next<std::int64_t>());
+      break;
+    }
+  _files.end();
 }
 
-XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& rows, int width,
-                                    std::span<const std::int64_t> values)
+XdmfData SeriesFile::add_points(const RowSlice& rows, const OutputField& points)
 {
-  int small =
-      std::all_of(values.begin(), values.end(), [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
-  MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
-  if (small)
-  {
-    _integers.assign(values.begin(), values.end());
-    _file.write<std::int32_t>(name, rows, width, _integers);
-  }
-  else
-    _file.write<std::int64_t>(name, rows, width, values);
-  return {address(name), rows.total, width, true, small ? 4 : 8};
+  return add_reals(points.name, rows, points.columns, 3);
 }
 
-XdmfData SeriesFile::write_integers(const std::string& name, const RowSlice& rows, int width,
-                                    std::span<const std::int32_t> values)
-{
-  _file.write<std::int32_t>(name, rows, width, values);
-  return {address(name), rows.total, width, true, 4};
-}
-
-XdmfData SeriesFile::write_points(const RowSlice& rows, const OutputField& points)
-{
-  return write_reals(points.name, rows, points.columns, 3);
-}
-
-std::string SeriesFile::write_fields(const std::string& center, const RowSlice& rows,
-                                     const std::vector<OutputField>& fields)
+std::string SeriesFile::add_fields(const std::string& center, const RowSlice& rows,
+                                   const std::vector<OutputField>& fields)
 {
   std::string text;
   for (const OutputField& field : fields)
@@ -189,64 +233,69 @@ std::string SeriesFile::write_fields(const std::string& center, const RowSlice& 
       for (std::size_t k = 0; k < n; ++k)
       {
         const std::string name = field.name + "_" + component_names[k];
-        text += xdmf_attribute(name, center, write_reals(name, rows, columns.subspan(k, 1), 1));
+        text += xdmf_attribute(name, center, add_reals(name, rows, columns.subspan(k, 1), 1));
       }
     else
     {
       const int width = n == 2 ? 3 : static_cast<int>(n);
-      text += xdmf_attribute(field.name, center, write_reals(field.name, rows, columns, width));
+      text += xdmf_attribute(field.name, center, add_reals(field.name, rows, columns, width));
     }
   }
   return text;
 }
 
-std::string SeriesFile::write_index_fields(const std::string& center, const RowSlice& rows,
-                                           const std::vector<OutputIndexField>& fields)
+std::string SeriesFile::add_index_fields(const std::string& center, const RowSlice& rows,
+                                         const std::vector<OutputIndexField>& fields)
 {
   std::string text;
   for (const OutputIndexField& field : fields)
-    text += std::visit([&](auto values)
-                       { return xdmf_attribute(field.name, center, write_integers(field.name, rows, 1, values)); },
-                       field.values);
+    text += xdmf_attribute(field.name, center, add_integers(field.name, rows, 1, field.values));
   return text;
+}
+
+void SeriesFile::write_file()
+{
+  const std::filesystem::path path = _folder / _file;
+  try
+  {
+    write_parts(path);
+  }
+  catch (const RunError&)
+  {
+    int rank = 0;
+    MPI_Comm_rank(comm(), &rank);
+    std::error_code of_no_consequence;
+    if (rank == 0)
+      std::filesystem::remove(path, of_no_consequence);
+    throw;
+  }
 }
 
 void SeriesFile::end_frame(double time, const std::string& content)
 {
-  _file.leave_group();
-  _file.flush();
-  _file.check();
+  write_file();
   ++_n_frames;
-  with_xdmf([&] { return _xdmf.append(xdmf_frame(time, content)); });
+  on_first_rank([&] { return _xdmf.append(xdmf_frame(time, content)); });
 }
 
-void SeriesFile::write_single(const std::string& content)
+void SeriesFile::end_single(const std::string& content)
 {
-  _file.flush();
-  _file.check();
-  with_xdmf([&] { return _xdmf.write_single(content); });
+  write_file();
+  on_first_rank([&] { return _xdmf.write_single(content); });
 }
 
 void SeriesFile::close()
 {
-  for (; _n_groups > _n_frames; --_n_groups)
-    _file.remove_group(frame_group(_n_groups - 1));
-  _file.close();
-  with_xdmf([&] { return _xdmf.finish(); });
-}
-
-std::string SeriesFile::address(const std::string& name) const
-{
-  return _file.path().filename().string() + ":" + _group + "/" + name;
+  if (!std::exchange(_closed, true))
+    on_first_rank([&] { return _xdmf.finish(); });
 }
 
 template <class F>
-void SeriesFile::with_xdmf(F&& work)
+void SeriesFile::on_first_rank(F&& work)
 {
   int rank = 0;
   MPI_Comm_rank(comm(), &rank);
-  const std::string failure = shared_failure(comm(), rank == 0 ? work() : std::string());
-  if (!failure.empty())
+  if (const std::string failure = shared_failure(comm(), rank == 0 ? work() : ""); !failure.empty())
     throw RunError(failure);
 }
 
@@ -261,22 +310,21 @@ void ParticleSeries::write(double time, const OutputField& position, const std::
   require_frame(comm(), time, fields_error(fields, index_fields, position.rows), {fields}, index_fields);
   const RowSlice rows = row_slice(comm(), position.rows);
   _series.begin_frame();
-  const XdmfData points = _series.write_points(rows, position);
-  if (rows.total != _vertices.rows)
-    _vertices = write_vertices(rows);
+  const XdmfData points = _series.add_points(rows, position);
+  XdmfData vertices = _vertices;
+  std::vector<std::int64_t> numbers;
+  if (rows.total != vertices.rows)
+  {
+    numbers.resize(static_cast<std::size_t>(rows.local));
+    std::iota(numbers.begin(), numbers.end(), rows.before);
+    vertices = _series.add_integers("vertices", rows, 1, numbers);
+  }
   // Named as a field as well: some readers give the points of the first frame only. It costs no space.
-  const std::string content = xdmf_topology("Polyvertex", _vertices) + xdmf_geometry(points) +
-                              xdmf_attribute("position", "Node", points) + _series.write_fields("Node", rows, fields) +
-                              _series.write_index_fields("Node", rows, index_fields);
+  const std::string content = xdmf_topology("Polyvertex", vertices) + xdmf_geometry(points) +
+                              xdmf_attribute("position", "Node", points) + _series.add_fields("Node", rows, fields) +
+                              _series.add_index_fields("Node", rows, index_fields);
   _series.end_frame(time, content);
-}
-
-XdmfData ParticleSeries::write_vertices(const RowSlice& rows)
-{
-  std::vector<std::int64_t> numbers(static_cast<std::size_t>(rows.local));
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    numbers[i] = rows.before + static_cast<std::int64_t>(i);
-  return _series.write_integers("vertices", rows, 1, std::span<const std::int64_t>(numbers));
+  _vertices = vertices;
 }
 
 MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
@@ -288,11 +336,12 @@ MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage
   std::vector<std::int64_t> numbers(cells.begin(), cells.end());
   for (std::int64_t& node : numbers)
     node += _nodes.before;
-  const XdmfData topology =
-      _series.write_integers("cells", _cells, dimension + 1, std::span<const std::int64_t>(numbers));
-  const XdmfData geometry = _series.write_points(_nodes, row_field("points", points, dimension));
+  const OutputField nodes = row_field("points", points, dimension);
+  _series.begin_single("mesh");
+  const XdmfData topology = _series.add_integers("cells", _cells, dimension + 1, numbers);
+  const XdmfData geometry = _series.add_points(_nodes, nodes);
   _grid = xdmf_topology(dimension == 2 ? "Triangle" : "Tetrahedron", topology) + xdmf_geometry(geometry);
-  _series.write_single(_grid);
+  _series.end_single(_grid);
 }
 
 void MeshSeries::write(double time, const std::vector<OutputField>& node_fields,
@@ -304,7 +353,7 @@ void MeshSeries::write(double time, const std::vector<OutputField>& node_fields,
   require_frame(_series.comm(), time, error, {node_fields, cell_fields}, {});
   _series.begin_frame();
   const std::string content =
-      _grid + _series.write_fields("Node", _nodes, node_fields) + _series.write_fields("Cell", _cells, cell_fields);
+      _grid + _series.add_fields("Node", _nodes, node_fields) + _series.add_fields("Cell", _cells, cell_fields);
   _series.end_frame(time, content);
 }
 } // namespace mpm

@@ -1,8 +1,8 @@
 #pragma once
 /// @file
-/// Particles and background mesh over time, in parallel HDF5 with an XDMF file beside it.
+/// Particles and background mesh over time, in HDF5 files with an XDMF file beside them.
 
-#include "io/hdf5_file.h"
+#include "io/frame_files.h"
 #include "io/xdmf.h"
 
 #include <variant>
@@ -29,11 +29,13 @@ struct OutputField
 /// The field of an array (n, components), row-major.
 OutputField row_field(std::string name, std::span<const double> values, int components);
 
+using WholeNumbers = std::variant<std::span<const std::int64_t>, std::span<const std::int32_t>>;
+
 /// Whole numbers to write, one per particle, node or cell.
 struct OutputIndexField
 {
   std::string name;
-  std::variant<std::span<const std::int64_t>, std::span<const std::int32_t>> values;
+  WholeNumbers values;
 };
 
 enum class Precision
@@ -49,8 +51,9 @@ struct Storage
   int compression = 0; ///< level of deflate, 0 (none) to 9
 };
 
-/// The files PATH.h5 and PATH.xdmf of one series. ParaView, VTK and meshio open the XDMF file, also while the run goes
-/// on and after it was killed: each frame is in the HDF5 file before the XDMF file names it.
+/// The file PATH.xdmf of one series, and beside it the folder PATH with an HDF5 file for each frame, NUMBER.h5.
+/// ParaView, VTK and meshio open the XDMF file, also while the run goes on and after it was killed: it names the files
+/// that are whole.
 ///
 /// How fields are stored: 2 components are padded to 3, so that they are vectors to ParaView; 4 and 6 components are a
 /// symmetric tensor in the order of base/types.h and become one dataset for each component, NAME_xx and so on; other
@@ -59,57 +62,65 @@ class SeriesFile
 {
 public:
   /// @param comm  must outlive the object
-  /// @param path  without suffix, or with .h5 or .xdmf; the folder must exist
+  /// @param path  without suffix, or with .h5 or .xdmf; the folder that it is in must exist. What an earlier series
+  /// left
+  ///              under this name is removed.
   /// @param grid  name of the grid in the XDMF file
   /// @throws RunError if the files cannot be written, with path and reason
   SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage);
 
-  /// Starts the group of a frame.
+  /// Starts a frame. What is added to it must live until its end.
   void begin_frame();
 
-  /// Writes points of 2 or 3 coordinates, padded to 3, into the present group.
-  XdmfData write_points(const RowSlice& rows, const OutputField& points);
+  /// Adds points of 2 or 3 coordinates, padded to 3.
+  XdmfData add_points(const RowSlice& rows, const OutputField& points);
 
-  /// Numbers that all fit into 32 bits are stored so.
-  XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
-                          std::span<const std::int64_t> values);
-  XdmfData write_integers(const std::string& name, const RowSlice& rows, int width,
-                          std::span<const std::int32_t> values);
+  /// Adds whole numbers; those that all fit into 32 bits are stored so.
+  XdmfData add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values);
 
-  /// Writes fields that live on nodes or cells into the present group.
+  /// Adds fields that live on nodes or cells.
   /// @return their description in XDMF
-  std::string write_fields(const std::string& center, const RowSlice& rows, const std::vector<OutputField>& fields);
-  std::string write_index_fields(const std::string& center, const RowSlice& rows,
-                                 const std::vector<OutputIndexField>& fields);
+  std::string add_fields(const std::string& center, const RowSlice& rows, const std::vector<OutputField>& fields);
+  std::string add_index_fields(const std::string& center, const RowSlice& rows,
+                               const std::vector<OutputIndexField>& fields);
 
-  /// Puts a frame, whose datasets are written, into the XDMF file.
+  /// Writes a frame, and names it in the XDMF file.
   void end_frame(double time, const std::string& content);
 
-  /// Writes the XDMF file of a grid without time.
-  void write_single(const std::string& content);
+  /// Starts what a series without frames consists of, in a file of this name.
+  void begin_single(const std::string& name) { begin(name + ".h5"); }
+  void end_single(const std::string& content);
 
-  /// Closes both files.
+  /// Closes the XDMF file.
   void close();
-  MPI_Comm comm() const { return _file.comm(); }
+  MPI_Comm comm() const { return _files.comm(); }
 
 private:
-  /// @param width  of the dataset; zeros come after the columns
-  XdmfData write_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
-  /// Where a dataset of the present group is to be found, in XDMF.
-  std::string address(const std::string& name) const;
-  /// Lets the first rank do something with the XDMF file; what goes wrong is an error on all.
+  /// A dataset of the present file, and where its values come from.
+  struct Part
+  {
+    Dataset dataset;
+    std::span<const OutputColumn> columns; ///< of real numbers; zeros come after them
+    WholeNumbers whole;
+  };
+  void begin(const std::string& file);
+  XdmfData add(Part part);
+  XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
+  /// Writes the present file; if that fails, it is removed.
+  void write_file();
+  void write_parts(const std::filesystem::path& path);
+  /// Lets the first rank do something with files; what goes wrong is an error on all.
   template <class F>
-  void with_xdmf(F&& work);
+  void on_first_rank(F&& work);
 
-  Hdf5File _file;
+  FrameFiles _files;
+  std::filesystem::path _folder;
   XdmfSeries _xdmf;
-  Storage _storage;
-  std::string _group; ///< group that datasets go into, without trailing slash
+  Precision _precision;
+  std::string _file; ///< name of the present file
+  std::vector<Part> _parts;
   int _n_frames = 0;
-  int _n_groups = 0;                   ///< groups that are there for frames; those behind the last frame are empty
-  std::vector<std::int32_t> _integers; ///< room for numbers that need no more
-  std::vector<float> _single;          ///< room for a field in single precision
-  std::vector<double> _double;         ///< the same in double precision
+  bool _closed = false;
 };
 
 /// Particles over time. Their number may change, and ranks may have none.
@@ -131,8 +142,6 @@ public:
   void close() { _series.close(); }
 
 private:
-  XdmfData write_vertices(const RowSlice& rows);
-
   SeriesFile _series;
   XdmfData _vertices; ///< the latest topology; written again only when the number of particles changes
 };

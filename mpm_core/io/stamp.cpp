@@ -38,14 +38,8 @@ Sum summed_share(MPI_Comm comm, const std::filesystem::path& path, std::int64_t 
     const auto count = std::min<std::int64_t>(static_cast<std::int64_t>(buffer.size()), last - word);
     const std::int64_t from = stamp_size + 8 * word, bytes = std::min(8 * count, length - from);
     buffer[static_cast<std::size_t>(count) - 1] = 0;
-    for (std::int64_t done = 0; done < bytes;)
-    {
-      const auto got = ::pread(file.number(), reinterpret_cast<char*>(buffer.data()) + done,
-                               static_cast<std::size_t>(bytes - done), from + done);
-      if (got <= 0)
-        return {0, got < 0 ? std::strerror(errno) : "it is truncated"};
-      done += got;
-    }
+    if (!file.get(buffer.data(), static_cast<std::size_t>(bytes), from))
+      return {0, errno != 0 ? std::strerror(errno) : "it is truncated"};
     for (std::int64_t k = 0; k < count; ++k, ++word)
       sum.checksum += mixed(buffer[static_cast<std::size_t>(k)] ^ mixed(static_cast<std::uint64_t>(word)));
   }

@@ -3,11 +3,11 @@
 #include "io/descriptor.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <fstream>
-#include <iomanip>
-#include <sstream>
 
 namespace mpm
 {
@@ -60,38 +60,22 @@ std::string replaced_file(const std::filesystem::path& path, const std::string& 
   std::filesystem::rename(aside, path, error);
   return error ? "cannot write " + path.string() + ": " + error.message() : "";
 }
-
-/// Overwrites a part of a file.
-bool overwritten(int file, const std::string& text, std::size_t at)
-{
-  for (std::size_t done = 0; done < text.size();)
-  {
-    const auto wrote = ::pwrite(file, text.data() + done, text.size() - done, static_cast<off_t>(at + done));
-    if (wrote <= 0)
-      return false;
-    done += static_cast<std::size_t>(wrote);
-  }
-  return true;
-}
 } // namespace
 
 std::string xdmf_data_item(const XdmfData& data)
 {
-  std::ostringstream text;
-  text << "<DataItem Format=\"HDF\" NumberType=\"" << (data.integer ? "Int" : "Float") << "\" Precision=\""
-       << data.bytes << "\" Dimensions=\"" << data.rows;
+  std::string text = "<DataItem Format=\"HDF\" NumberType=\"";
+  text += data.integer ? "Int" : "Float";
+  text += "\" Precision=\"" + std::to_string(data.bytes) + "\" Dimensions=\"" + std::to_string(data.rows);
   if (data.width > 1)
-    text << ' ' << data.width;
-  text << "\">" << data.dataset << "</DataItem>";
-  return text.str();
+    text += ' ' + std::to_string(data.width);
+  return text + "\">" + data.dataset + "</DataItem>";
 }
 
 std::string xdmf_topology(const std::string& type, const XdmfData& cells)
 {
-  std::ostringstream text;
-  text << "<Topology TopologyType=\"" << type << "\" NumberOfElements=\"" << cells.rows << "\" NodesPerElement=\""
-       << cells.width << "\">" << xdmf_data_item(cells) << "</Topology>\n";
-  return text.str();
+  return "<Topology TopologyType=\"" + type + "\" NumberOfElements=\"" + std::to_string(cells.rows) +
+         "\" NodesPerElement=\"" + std::to_string(cells.width) + "\">" + xdmf_data_item(cells) + "</Topology>\n";
 }
 
 std::string xdmf_geometry(const XdmfData& points)
@@ -107,10 +91,10 @@ std::string xdmf_attribute(const std::string& name, const std::string& center, c
 
 std::string xdmf_frame(double time, const std::string& content)
 {
-  std::ostringstream text;
-  text << "<Grid Name=\"frame\" GridType=\"Uniform\">\n<Time Value=\"" << std::setprecision(17) << time << "\"/>\n"
-       << content << "</Grid>\n";
-  return text.str();
+  std::array<char, 32> digits{}; // as many as it takes to read the same number again
+  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), time).ptr;
+  return "<Grid Name=\"frame\" GridType=\"Uniform\">\n<Time Value=\"" +
+         std::string(digits.data(), static_cast<std::size_t>(end - digits.data())) + "\"/>\n" + content + "</Grid>\n";
 }
 
 std::string XdmfSeries::write_single(const std::string& content)
@@ -128,8 +112,9 @@ std::string XdmfSeries::append(const std::string& frame)
     return rewrite(std::max(least_room, _frames.size()));
   errno = 0;
   const Descriptor file(_path, O_WRONLY);
-  if (file.number() < 0 || !overwritten(file.number(), addition, from) ||
-      !overwritten(file.number(), std::string(open_end.size(), ' '), _end))
+  const std::string blank(open_end.size(), ' ');
+  if (file.number() < 0 || !file.put(addition.data(), addition.size(), static_cast<std::int64_t>(from)) ||
+      !file.put(blank.data(), blank.size(), static_cast<std::int64_t>(_end)))
     return "cannot write " + _path.string() + ": " + std::strerror(errno);
   _end = from + frame.size() + spaces;
   return {};

@@ -85,7 +85,7 @@ class Checkpoints:
 def numbered(folder: Path, name: str, restarted: bool) -> Path:
     """A path for a series of files: NAME, or after a restart NAME-2, NAME-3, ..., so that earlier frames stay."""
     number = 1
-    while restarted and (folder / f"{name}{'' if number == 1 else f'-{number}'}.h5").exists():
+    while restarted and (folder / f"{name}{'' if number == 1 else f'-{number}'}.xdmf").exists():
         number += 1
     return folder / (name if number == 1 else f"{name}-{number}")
 

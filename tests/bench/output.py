@@ -1,23 +1,24 @@
-"""What output and checkpoints cost: processor time of frames over that of the steps between them.
+"""What output and checkpoints cost: time of frames over that of the steps between them, on all ranks that this runs on.
 
-Frames of all fields are written every so many explicit steps of the paper's slope, on one rank. Times are the processor's,
-the system's share included; beside them what the system takes to write as many bytes as a frame in single precision to a plain
-file. On a virtual machine that is most of it: memory that the file cache takes from the host costs several times the writing.
+Frames of all fields are written every so many explicit steps of the paper's slope. Beside them stands what the system takes to
+write as many bytes as a frame in single precision to a new plain file. On a virtual machine that can be nearly all of it: memory
+that the file cache takes from the host for the first time costs several times the writing.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
-import time
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
-from steps import slope
+from ranks import sliding_slope
 
-import mpm_core as mpm
+COMM = MPI.COMM_WORLD
 
 FIELDS = ("displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material")
 
@@ -28,70 +29,87 @@ ROUNDS = 3
 """The best counts."""
 
 
-def write_plainly(path: Path, n_bytes: int) -> float:
-    """Seconds of processor time that the system takes to write a file of so many bytes."""
-    data = np.ones(n_bytes // 8)
-    start = time.process_time()
-    with open(path, "wb", buffering=0) as file:
-        file.write(data)
-    return time.process_time() - start
-
-
-def measured(size: float, every: int, frames: int, place: Path | None, options: dict[str, object]) -> dict[str, float]:
-    """Seconds of processor time that steps, frames and checkpoints take, and the bytes of a frame."""
-    soil = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
-    model = slope(size, soil)
+def measured(size: float, every: int, frames: int, folder: Path, options: dict[str, object]) -> dict[str, float]:
+    """Seconds that steps, frames and checkpoints take, and the bytes of a frame."""
+    model, n = sliding_slope(size)
     mesh, p = model.mesh, model.particles
-    spent = {"steps": 0.0, "frames": 0.0, "plain": 0.0, "checkpoint": 0.0}
-    with tempfile.TemporaryDirectory(dir=place) as name:
-        folder = Path(name)
-        with (
-            ParticleOutput(folder / "particles", MPI.COMM_SELF, **options) as particles,
-            MeshOutput(folder / "mesh", MPI.COMM_SELF, mesh.points, mesh.cells, **options) as nodes,
-        ):
-            run = model.explicit(1e9, every_steps=every, damping=0.75)
-            for _ in range(frames):
-                start = time.process_time()
-                report = next(run)
-                stepped = time.process_time()
-                particles.write_particles(report.time, p, FIELDS)
-                nodes.write(
-                    report.time, {field: model.nodal(field) for field in ("mass", "velocity", "internal_force")}
-                )
-                spent["steps"] += stepped - start
-                spent["frames"] += time.process_time() - stepped
-                spent["plain"] += write_plainly(folder / f"plain{report.steps}", BYTES * report.particles)
-        size_of = sum((folder / file).stat().st_size for file in ("particles.h5", "mesh.h5")) / frames
-        start = time.process_time()
-        model.save(folder / "checkpoint.h5")
-        spent["checkpoint"] = time.process_time() - start
-    return {**spent, "bytes": size_of, "particles": report.particles}
+    plain = np.ones(BYTES * n // COMM.size // 8)
+    spent = dict.fromkeys(("steps", "frames", "plain", "checkpoint"), 0.0)
+    start = perf_counter()
+
+    def lap(what: str) -> None:
+        nonlocal start
+        COMM.barrier()
+        spent[what] += perf_counter() - start
+        start = perf_counter()
+
+    with (
+        ParticleOutput(folder / "particles", COMM, **options) as particles,
+        MeshOutput(folder / "mesh", COMM, mesh.points, mesh.cells, **options) as nodes,
+    ):
+        run = model.explicit(1e9, every_steps=every, damping=0.75)
+        next(run)
+        COMM.barrier()
+        start = perf_counter()
+        for frame in range(frames):
+            report = next(run)
+            lap("steps")
+            particles.write_particles(report.time, p, FIELDS)
+            nodes.write(report.time, {field: model.nodal(field) for field in ("mass", "velocity", "internal_force")})
+            lap("frames")
+            with open(folder / f"plain-{COMM.rank}-{frame}", "wb", buffering=0) as file:
+                file.write(plain)
+            lap("plain")
+    size_of = sum(path.stat().st_size for path in folder.glob("*/*.h5")) / frames
+    start = perf_counter()
+    model.save(folder / "checkpoint.h5")
+    lap("checkpoint")
+    return {**spent, "bytes": size_of, "particles": n}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025, 0.01], help="sides of the squares [m]"
+        "--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025, 0.01], help="sides of the cells [m]"
     )
     parser.add_argument("--every", type=int, default=100, help="steps between frames")
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--folder", type=Path, help="where to write, such as /dev/shm (default: the temporary folder)")
     a = parser.parse_args()
     cases = {"float32": {}, "float64": {"float32": False}, "float32, compressed": {"compression": 1}}
-    print(f"one frame in {a.every} steps")
-    print(
+    first = COMM.rank == 0
+
+    def tell(text: str) -> None:
+        if first:
+            print(text, flush=True)
+
+    tell(f"one frame in {a.every} steps, {COMM.size} rank(s)")
+    tell(
         f"{'particles':>9} {'stored as':20} {'frames/steps':>12} {'ms per frame':>12} {'plain write':>12} {'MB per frame':>12} "
         f"{'checkpoint ms':>13}"
     )
-    for size in a.sizes:
-        for name, options in cases.items():
-            m = min(
-                (measured(size, a.every, a.frames, a.folder, options) for _ in range(ROUNDS)),
-                key=lambda m: m["frames"] / m["steps"],
-            )
-            print(f"{m['particles']:9d} {name:20} {m['frames'] / m['steps']:12.1%} {1e3 * m['frames'] / a.frames:12.2f} "
-                  f"{1e3 * m['plain'] / a.frames:12.2f} "
-                  f"{m['bytes'] / 1e6:12.2f} {1e3 * m['checkpoint']:13.1f}", flush=True)  # fmt: skip
+    with tempfile.TemporaryDirectory(dir=a.folder) as own:
+        place = Path(COMM.bcast(own))
+        rounds = 0
+        for size in a.sizes:
+            for name, options in cases.items():
+                best = {"frames": np.inf, "steps": 1.0}
+                for _ in range(ROUNDS):
+                    rounds += 1
+                    folder = place / str(rounds)
+                    if first:
+                        folder.mkdir()
+                    COMM.barrier()
+                    m = measured(size, a.every, a.frames, folder, options)
+                    best = min(best, m, key=lambda m: m["frames"] / m["steps"])
+                    COMM.barrier()
+                    if first:  # a disk is slow to make files where many have just been removed
+                        for path in filter(Path.is_file, folder.glob("**/*")):
+                            os.truncate(path, 0)
+                tell(f"{best['particles']:9d} {name:20} {best['frames'] / best['steps']:12.1%} "
+                     f"{1e3 * best['frames'] / a.frames:12.2f} {1e3 * best['plain'] / a.frames:12.2f} "
+                     f"{best['bytes'] / 1e6:12.2f} {1e3 * best['checkpoint']:13.1f}")  # fmt: skip
+        COMM.barrier()
 
 
 if __name__ == "__main__":

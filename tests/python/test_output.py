@@ -56,15 +56,14 @@ def test_h5py_reads_what_was_written(tmp_path, dimension, float32):
     with ParticleOutput(tmp_path / "particles", COMM, float32) as output:
         for step, fields in enumerate(frames):
             output.write(0.1 * step, fields)
-    with h5py.File(tmp_path / "particles.h5") as file:
-        assert set(file["frames"]) == {"0", "1", "2", "3", "4"}
-        for step, fields in enumerate(frames):
-            group = file[f"frames/{step}"]
+    assert sorted(path.name for path in (tmp_path / "particles").iterdir()) == [f"00000{k}.h5" for k in range(5)]
+    for step, fields in enumerate(frames):
+        with h5py.File(tmp_path / "particles" / f"00000{step}.h5") as file:
             for name, values in stored(fields).items():
                 real = values.dtype.kind == "f"
-                assert group[name].dtype == (np.float32 if real and float32 else np.float64 if real else np.int32)
+                assert file[name].dtype == (np.float32 if real and float32 else np.float64 if real else np.int32)
                 # float32 keeps 24 binary digits
-                np.testing.assert_allclose(group[name][()], values, rtol=2.0**-24 if float32 and real else 0)
+                np.testing.assert_allclose(file[name][()], values, rtol=2.0**-24 if float32 and real else 0)
 
 
 def test_meshio_reads_the_particles_over_time(tmp_path):
@@ -104,7 +103,7 @@ def test_vtk_reads_particles_and_mesh_over_time(tmp_path):
     with ParticleOutput(tmp_path / "particles", COMM) as output:
         for step, fields in enumerate(frames):
             output.write(float(step), fields)
-            # The files are still open.
+            # The series goes on.
             data = read_with_vtk(tmp_path / "particles.xdmf", float(step))
             assert data.GetNumberOfPoints() == len(fields["position"])
     for step, fields in enumerate(frames):
@@ -145,31 +144,30 @@ def test_mesh_fields_over_time(tmp_path):
             np.testing.assert_array_equal(in_cells["pressure"][0], [10.0 * step])
 
 
-def test_both_files_are_valid_while_the_run_goes_on(tmp_path):
+def test_all_files_are_valid_while_the_run_goes_on(tmp_path):
     with ParticleOutput(tmp_path / "particles", COMM) as output:
         for step in range(3):
             output.write(float(step), particle_fields(5, 2))
             tree = ElementTree.parse(tmp_path / "particles.xdmf")
             assert [float(t.get("Value")) for t in tree.iter("Time")] == list(range(step + 1))
-            # Another process, as ParaView is. Empty groups are room for frames to come.
-            read = "import h5py, sys; print(sum(len(g) > 0 for g in h5py.File(sys.argv[1])['frames'].values()))"
-            counted = subprocess.run(
-                [sys.executable, "-c", read, tmp_path / "particles.h5"], capture_output=True, text=True, check=True
-            )
-            assert int(counted.stdout) == step + 1
+            # Another process, as ParaView is.
+            read = "import h5py, sys; print([len(h5py.File(path)['position']) for path in sys.argv[1:]])"
+            files = sorted((tmp_path / "particles").iterdir())
+            lengths = subprocess.run([sys.executable, "-c", read, *files], capture_output=True, text=True, check=True)
+            assert lengths.stdout.strip() == str([5] * (step + 1))
 
 
 def test_a_long_series_is_valid_all_the_time(tmp_path):
-    path, n = tmp_path / "particles.xdmf", 400  # frames, more than room is kept for at once, in both files
+    path, n = tmp_path / "particles.xdmf", 400  # frames, more than room is kept for at once
     with ParticleOutput(path, COMM) as output:
         for step in range(n):
             output.write(float(step), {"position": np.full((2, 2), step), "mass": np.full(2, step)})
             if step % 7 == 0 or step > n - 10:
                 times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
                 assert times == list(range(step + 1))
-    with h5py.File(tmp_path / "particles.h5") as file:
-        assert set(file["frames"]) == {str(step) for step in range(n)}
-        assert all(file[f"frames/{step}/mass"][1] == step for step in range(n))
+    for step in range(n):
+        with h5py.File(tmp_path / "particles" / f"{step:06d}.h5") as file:
+            assert file["mass"][1] == step and file["position"][1, 1] == step
     times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
     assert times == list(range(n)) and path.read_text().endswith("</Xdmf>\n")
 
@@ -200,8 +198,9 @@ def read_all(folder):
             for step in {0, reader.num_steps // 2, reader.num_steps - 1}:
                 t, data, _ = reader.read_data(step)
                 assert t == step and np.all(data["mass"] == step)
-        with h5py.File(folder / f"{name}.h5") as file:
-            assert all(np.all(file[f"frames/{step}/mass"][()] == step) for step in range(counts[-1]))
+        for step in range(counts[-1]):
+            with h5py.File(folder / name / f"{step:06d}.h5") as file:
+                assert np.all(file["mass"][()] == step)
     return counts
 
 
@@ -223,31 +222,54 @@ def test_series_are_read_while_the_run_goes_on_and_after_a_kill(tmp_path):
         assert run.returncode == -signal.SIGKILL
 
 
-def test_a_reader_that_keeps_the_file_open_finds_all_frames_that_it_knows_of(tmp_path):
+def test_a_reader_that_keeps_all_open_goes_on_reading(tmp_path):
     fields = {"position": np.zeros((2, 2)), "mass": np.zeros(2)}
     with ParticleOutput(tmp_path / "particles", COMM) as output:
-        for step in range(100):
-            output.write(float(step), fields)
-        script = (
-            "import h5py, sys; frames = h5py.File(sys.argv[1])['frames']; assert '90' in frames and '700' not in frames\n"
-            "print('open', flush=True); input()\n"
-            "assert all(frames[f'{k}/mass'].shape == (2,) for k in range(100))"
-        )
-        command = [sys.executable, "-c", script, tmp_path / "particles.h5"]
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as reader:
-            assert reader.stdout.readline() == "open\n"
-            for step in range(100, 800):  # the list of frames grows while the reader has read it in part
+        for step in range(20):
+            output.write(float(step), {**fields, "mass": np.full(2, step)})
+        with meshio.xdmf.TimeSeriesReader(tmp_path / "particles.xdmf") as reader:
+            reader.read_points_cells()
+            for step in range(20):
+                for time_of_writer in (20.0 + 2 * step, 21.0 + 2 * step):
+                    output.write(time_of_writer, fields)
+                assert np.all(reader.read_data(step)[1]["mass"] == step)
+
+
+def test_what_an_earlier_series_left_is_removed(tmp_path):
+    for n in (3, 2):
+        with ParticleOutput(tmp_path / "particles", COMM) as output:
+            for step in range(n):
+                output.write(float(step), particle_fields(4, 2))
+        (tmp_path / "particles" / "notes.txt").write_text("not ours")
+    assert sorted(p.name for p in (tmp_path / "particles").iterdir()) == ["000000.h5", "000001.h5", "notes.txt"]
+
+
+def test_the_same_frames_make_the_same_files(tmp_path):
+    frames = [particle_fields(n, 2, seed=step) for step, n in enumerate((5, 5, 5, 4, 4))]
+    for name in ("a", "b"):
+        with ParticleOutput(tmp_path / name, COMM) as output:
+            for step, fields in enumerate(frames):
                 output.write(float(step), fields)
-            reader.communicate("\n", timeout=60)
-    assert reader.returncode == 0
+    for step in range(len(frames)):
+        one, other = (tmp_path / name / f"{step:06d}.h5" for name in ("a", "b"))
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_nothing_is_written_after_the_end(tmp_path):
+    output = ParticleOutput(tmp_path / "particles", COMM)
+    output.close()
+    output.close()
+    with pytest.raises(RunError, match=f"cannot write {tmp_path}/particles: it is closed"):
+        output.write(0.0, particle_fields(3, 2))
 
 
 def test_missing_folder_is_named(tmp_path):
-    with pytest.raises(RunError, match=f"cannot write {tmp_path}/nowhere/particles.h5: No such file or directory"):
+    with pytest.raises(RunError, match=f"cannot write {tmp_path}/nowhere/particles: No such file or directory"):
         ParticleOutput(tmp_path / "nowhere" / "particles", COMM)
 
 
-def test_a_file_that_cannot_grow_is_named(tmp_path):
+@pytest.mark.parametrize("growing", [True, False])  # a file made by HDF5, or from the tables of the one before
+def test_a_file_that_cannot_be_written_is_named(tmp_path, growing):
     # A limit on the size of files stands for a full disk, which a test cannot make without being root.
     script = f"""
 import resource, signal, sys
@@ -256,21 +278,46 @@ from mpi4py import MPI
 from mpm_core import RunError
 from mpm_core.output import ParticleOutput
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))
 output = ParticleOutput({str(tmp_path / "particles")!r}, MPI.COMM_WORLD)
 try:
-    for step in range(10):
-        output.write(step, {{"position": np.zeros((5000, 3))}})
+    for step in range(4):
+        if step == 3:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+        output.write(step, {{"position": np.zeros(({"5000 + step" if growing else "5000"}, 3))}})
 except RunError as error:
     print(error)
     sys.exit(7)
 """
     refused = subprocess.run([sys.executable, "-c", script], timeout=60, capture_output=True, text=True)
     assert refused.returncode == 7, refused.stderr
-    assert refused.stdout.strip() == f"cannot write {tmp_path}/particles.h5: File too large"
-    # What was written before is still there.
-    with h5py.File(tmp_path / "particles.h5") as file:
-        assert file["frames/0/position"].shape == (5000, 3)
+    folder = tmp_path / "particles"
+    assert refused.stdout.strip() == f"cannot write {folder}/000003.h5: File too large"
+    # What was written before is still there, and nothing in part.
+    assert sorted(path.name for path in folder.iterdir()) == ["000000.h5", "000001.h5", "000002.h5"]
+    with h5py.File(folder / "000002.h5") as file:
+        assert len(file["position"]) == (5002 if growing else 5000)
+
+
+@pytest.mark.parametrize("options", [{}, {"float32": False}, {"compression": 1}])
+def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, options):
+    rng = np.random.default_rng(0)
+    frames = [{"position": rng.random((2000, 2)), "velocity": rng.random((2000, 2))} for _ in range(40)]
+    with ParticleOutput(small_disk / "particles", COMM, **options) as output:
+        written = 0
+        with pytest.raises(RunError, match=r"cannot write .*particles/.*\.h5: No space left on device"):
+            for written, fields in enumerate(frames):
+                output.write(float(written), fields)
+        assert written > 3
+        for number in (1, 2):
+            (small_disk / "particles" / f"{number:06d}.h5").unlink()
+        for fields in ({"position": np.zeros((0, 2))}, frames[written]):  # and the run may go on
+            output.write(float(written), fields)
+    kept = sorted((small_disk / "particles").iterdir())
+    assert [int(path.stem) for path in kept] == [0, *range(3, written + 2)]
+    for number in (0, written - 1, written + 1):
+        with h5py.File(small_disk / "particles" / f"{number:06d}.h5") as file:
+            expected = frames[min(number, written)]["velocity"]
+            np.testing.assert_allclose(file["velocity"][:, :2], expected, rtol=2.0**-24)
 
 
 GOOD = particle_fields(3, 2)

@@ -73,7 +73,7 @@ def test_slope_of_any_law_in_any_scheme(name, scheme, own_laws):
 def test_pore_pressures_are_in_the_files_and_pictures(tmp_path):
     assert slope.main([*SMALL, *OTHERS["undrained"], "--initial-unit-weight", "4e3", "--time", "0.05", "--frames", "2",
                        "--output", str(tmp_path)]) == 0  # fmt: skip
-    with h5py.File(tmp_path / "particles.h5") as file:
-        pressure = file["frames/2/excess_pore_pressure"][:]
+    with h5py.File(tmp_path / "particles" / "000002.h5") as file:
+        pressure = file["excess_pore_pressure"][:]
     assert np.isfinite(pressure).all() and pressure.max() > 100.0
     assert (tmp_path / "figure_7_excess_pore_pressure.png").stat().st_size > 0

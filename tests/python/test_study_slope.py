@@ -14,7 +14,7 @@ import pytest
 
 STUDIES = Path(__file__).parents[2] / "studies"
 FILES = ["figure_2_mesh.png", "figure_3_displacement.png", "figure_4_shear_strain.png", "figure_5_vertical_stress.png",
-         "figure_6_crest.png", "particles.h5", "particles.xdmf", "mesh.h5", "mesh.xdmf", "history.csv",
+         "figure_6_crest.png", "particles/000000.h5", "particles.xdmf", "mesh/mesh.h5", "mesh.xdmf", "history.csv",
          "summary.json"]  # fmt: skip
 
 

@@ -1,8 +1,8 @@
-"""Particles and background mesh over time, in parallel HDF5 files with XDMF files beside them.
+"""Particles and background mesh over time, in HDF5 files that all ranks write together, with XDMF files beside them.
 
-ParaView, VTK and meshio open the ``.xdmf`` file, also while the run goes on and after it was killed: it names a frame when all
-of it is in the ``.h5`` file. h5py reads the datasets ``/frames/NUMBER/NAME`` directly; while the run goes on there are empty
-groups too, room for frames to come.
+ParaView, VTK and meshio open the file ``PATH.xdmf``, also while the run goes on and after it was killed. Each frame is a file of
+its own in the folder ``PATH``, ``000012.h5`` and so on, with a dataset for each field, which h5py reads directly; the XDMF file
+names it when it is whole, and it never changes again. The folder of a mesh also has ``mesh.h5``, its points and cells.
 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
 and six components are a symmetric tensor, ``xx yy zz xy`` or ``xx yy zz xy yz xz``, and become one dataset for each
@@ -33,7 +33,8 @@ class ParticleOutput:
         ...     output.write(0.0, {"position": x, "velocity": v, "stress": stress, "id": numbers})
 
     Args:
-        path: of the files, without suffix; the folder must exist. Files of that name are replaced.
+        path: of the XDMF file and of the folder of frames, without suffix; the folder around them must exist. What an
+            earlier series left there is removed.
         comm: communicator whose ranks write together; must not be freed before the output is closed.
         float32: store real numbers in single precision; in double precision if false.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
@@ -105,7 +106,8 @@ class MeshOutput:
     """The background mesh, written once, and frames of fields on its nodes and cells; a context manager.
 
     Args:
-        path: of the files, without suffix; the folder must exist. Files of that name are replaced.
+        path: of the XDMF file and of the folder of frames, without suffix; the folder around them must exist. What an
+            earlier series left there is removed.
         comm: communicator whose ranks write together; must not be freed before the output is closed.
         points: (n, 2) or (n, 3), nodes of this rank's cells, m. A node that several ranks give is stored once for each.
         cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
