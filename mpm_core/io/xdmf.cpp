@@ -1,7 +1,5 @@
 #include "io/xdmf.h"
 
-#include "io/descriptor.h"
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -111,10 +109,9 @@ std::string XdmfSeries::append(const std::string& frame)
   if (from + addition.size() > _room_end)
     return rewrite(std::max(least_room, _frames.size()));
   errno = 0;
-  const Descriptor file(_path, O_WRONLY);
   const std::string blank(open_end.size(), ' ');
-  if (file.number() < 0 || !file.put(addition.data(), addition.size(), static_cast<std::int64_t>(from)) ||
-      !file.put(blank.data(), blank.size(), static_cast<std::int64_t>(_end)))
+  if (!_file->put(addition.data(), addition.size(), static_cast<std::int64_t>(from)) ||
+      !_file->put(blank.data(), blank.size(), static_cast<std::int64_t>(_end)))
     return "cannot write " + _path.string() + ": " + std::strerror(errno);
   _end = from + frame.size() + spaces;
   return {};
@@ -133,6 +130,8 @@ std::string XdmfSeries::rewrite(std::size_t room)
   text += open_end;
   text.append(room, ' ');
   _room_end = text.size();
-  return replaced_file(_path, text + room_end);
+  std::string failure = replaced_file(_path, text + room_end);
+  _file.emplace(_path, O_WRONLY);
+  return failure;
 }
 } // namespace mpm

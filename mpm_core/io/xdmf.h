@@ -3,8 +3,9 @@
 /// The XDMF text beside an HDF5 file, which tells ParaView, VTK and meshio what its datasets are.
 
 #include "base/types.h"
+#include "io/descriptor.h"
 
-#include <filesystem>
+#include <optional>
 #include <string>
 
 namespace mpm
@@ -61,8 +62,9 @@ private:
 
   std::filesystem::path _path;
   std::string _name;
-  std::string _frames;       ///< those so far
-  std::size_t _end = 0;      ///< where the document's end begins in the file
-  std::size_t _room_end = 0; ///< where the spaces end
+  std::string _frames;             ///< those so far
+  std::size_t _end = 0;            ///< where the document's end begins in the file
+  std::size_t _room_end = 0;       ///< where the spaces end
+  std::optional<Descriptor> _file; ///< with room behind the document
 };
 } // namespace mpm
