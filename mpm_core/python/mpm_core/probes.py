@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
 from .collective import collectively
-from .mesh import floats
+from .mesh import Mesh, floats
 from .model import Model
 
 AXES = ("x", "y", "z")
@@ -96,9 +96,10 @@ class ParticleProbe:
     def values(self) -> dict[str, float]:
         """Numbers by name; NaN for a particle that flowed out."""
         p, comm = self.model.particles, self.model.comm
-        here = np.flatnonzero(np.isin(p.id, self.ids))
+        ids = p.id
+        here = np.flatnonzero(ids == self.ids[0] if len(self.ids) == 1 else np.isin(ids, self.ids))
         fields = [p.position, p.displacement, p.velocity, p.stress]
-        mine = {int(p.id[k]): np.concatenate([field[k] for field in fields]) for k in here}
+        mine = {int(ids[k]): np.concatenate([field[k] for field in fields]) for k in here}
         found = {number: row for part in comm.allgather(mine) for number, row in part.items()}
         absent = np.full(len(self._columns), np.nan)
         rows = np.array([found.get(number, absent) for number in self.ids])
@@ -179,10 +180,10 @@ class SectionProbe:
             raise InputError("normal of the section has no length, expected a direction")
         self._normal /= length
         self._box = None if box is None else np.sort(floats("box", box, (2, dim)), axis=0)
+        self._mesh: Mesh | None = None  # whose cells are known to be cut or not
 
-    def values(self) -> dict[str, float]:
-        """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
-        model, mesh, dim = self.model, self.model.mesh, self.model.mesh.dim
+    def _cut(self, mesh: Mesh) -> None:
+        """Finds the cells of this rank that the plane cuts, and the gradient of w in them; the mesh may be cut anew in a run."""
         corners = mesh.points[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
         cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))
@@ -192,12 +193,18 @@ class SectionProbe:
         cells = np.flatnonzero(cut)
         edges = corners[cells, 1:] - corners[cells, :1]
         rising = (before[cells, 1:].astype(float) - before[cells, :1])[..., None]
-        gradient = np.linalg.solve(edges, rising)[..., 0]  # of w
-        p = model.particles
-        inside = np.flatnonzero(cut[p.cell])
-        number = np.searchsorted(cells, p.cell[inside])
+        self._mesh, self._is_cut, self._gradient = mesh, cut, np.zeros((len(cut), mesh.dim))
+        self._gradient[cells] = np.linalg.solve(edges, rising)[..., 0]
+
+    def values(self) -> dict[str, float]:
+        """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
+        model, dim = self.model, self.model.mesh.dim
+        if self._mesh is not model.mesh:
+            self._cut(model.mesh)
+        p, cell = model.particles, model.particles.cell
+        inside = np.flatnonzero(self._is_cut[cell])
         stress = _matrices(p.stress[inside], dim) * p.volume[inside, None, None]
-        mine = np.einsum("pij,pj->i", stress, gradient[number])
+        mine = np.einsum("pij,pj->i", stress, self._gradient[cell[inside]])
         force = np.empty(dim)
         model.comm.Allreduce(mine, force)
         along = {"force_normal_N": float(force @ self._normal)}
