@@ -7,6 +7,7 @@ defaults are those of the paper's section 6; --paper repeats it exactly, with ze
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -70,7 +71,9 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_scheme_options(p)
     add_count(p, "--frames", 120, "times at which particles are stored and drawn")
-    add_count(p, "--frame-steps", None, "steps between further times at which particles are stored (default: none)")
+    add_count(
+        p, "--frame-steps", None, "steps between further times at which particles are stored, not drawn (default: none)"
+    )
     add_output_options(p, FIELDS)
     add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
                above=1)  # fmt: skip
@@ -142,8 +145,10 @@ def slide(
     a, model = case.args, case.model
     loop = {"seconds": 0.0, "stopped": None}
     energy_scale = 0.0
+    drawn = -1  # of the times of --frames, the last one so far; those of --frame-steps are for the files alone
 
     def look(report: mpm.Report) -> None:
+        nonlocal drawn
         fields = watch.fields()
         crest, runout = watch.crest_displacement(fields), watch.runout(fields)
         history.add(
@@ -152,7 +157,10 @@ def slide(
             dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
         files.write(report.time, fields)
-        watch.keep(report.time)
+        reached = math.floor(report.time * a.frames / a.time + 1e-6)
+        if reached > drawn or interrupt.requested():
+            watch.keep(report.time)
+        drawn = reached
         progress.show(report.time, report.steps, crest=f"{crest:.4f} m")
 
     def between_steps() -> bool:

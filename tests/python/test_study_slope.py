@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -60,6 +61,18 @@ def test_a_short_run_writes_all_it_promises(tmp_path):
     assert {"program", "dolfinx", "petsc", "compiler", "git_revision"} <= set(summary["versions"])
     assert summary["parameters"]["unit_weight"] == 80e3 and summary["particle_steps_per_second"] > 0
     assert len(history(tmp_path)["time_s"]) == 4
+
+
+def test_frames_by_steps_are_for_the_files_alone(tmp_path):
+    small = ("--initial", "zero", "--cell-size", "0.2", "--crest", "1.2", "--particles-per-cell", "3")
+    result = slope(tmp_path, *small, "--time", "0.3", "--frames", "4", "--frame-steps", "7")
+    assert result.returncode == 0, result.stderr
+    stored = len(history(tmp_path)["time_s"])
+    steps = json.loads((tmp_path / "summary.json").read_text())["steps"]
+    assert stored > steps // 7 >= 5
+    assert [len(list((tmp_path / name).glob("0*.h5"))) for name in ("particles", "mesh")] == [stored, stored]
+    drawn = re.search(r'"times":(\[[^]]*\])', (tmp_path / "report.html").read_text())
+    assert json.loads(drawn.group(1)) == pytest.approx(np.linspace(0, 0.3, 5))
 
 
 @pytest.mark.parametrize(
