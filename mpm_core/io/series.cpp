@@ -168,7 +168,7 @@ XdmfData SeriesFile::add(Part part)
   const Dataset& dataset = part.dataset;
   const bool integer = dataset.number == Number::int32 || dataset.number == Number::int64;
   const std::string address = _folder.filename().string() + "/" + _file + ":/" + dataset.name;
-  const XdmfData data{address, dataset.rows.total, dataset.width, integer, static_cast<int>(bytes_of(dataset.number))};
+  XdmfData data{address, dataset.rows.total, dataset.width, integer, static_cast<int>(bytes_of(dataset.number))};
   _parts.push_back(std::move(part));
   return data;
 }
