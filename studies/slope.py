@@ -13,12 +13,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
 from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
 from common.history import History
 from common.interrupt import Interrupt
-from common.movie import PORE, Movie, fem_frame
+from common.movie import PORE, Movie, fem_frame, has_pore_pressure
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
 from common.output_options import add_output_options
 from common.page import Page
@@ -118,9 +117,9 @@ class Files:
         }  # fmt: skip
         self.probes = [ProbeFile(folder / f"{name}.csv", probe, keep=restarted) for name, probe in probes.items()]
 
-    def write(self, time: float, fields: dict[str, np.ndarray]) -> None:
-        """Add a frame; ``fields`` are those of `Watch.fields`. Collective."""
-        pore = {PORE: fields[PORE]} if PORE in fields else None
+    def write(self, time: float) -> None:
+        """Add a frame. Collective."""
+        pore = {PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else None
         self.particles.write_particles(time, self.model.particles, self.names, pore)
         nodes = {
             name: self.start.nodal_of(self.model.mesh, self.model.nodal(name))
@@ -149,14 +148,13 @@ def slide(
 
     def look(report: mpm.Report) -> None:
         nonlocal drawn
-        fields = watch.fields()
-        crest, runout = watch.crest_displacement(fields), watch.runout(fields)
+        crest, runout = watch.crest_displacement(), watch.runout()
         history.add(
             time_s=report.time, crest_displacement_m=crest, runout_m=runout, kinetic_energy_J_per_m=report.kinetic_energy,
             unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share,
             dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
-        files.write(report.time, fields)
+        files.write(report.time)
         reached = math.floor(report.time * a.frames / a.time + 1e-6)
         if reached > drawn or interrupt.requested():
             watch.keep(report.time)

@@ -129,7 +129,7 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
             # A report after each implicit step: a shorter interval would shorten the step.
             for report in run_scheme(options, case.model, dt or until / a.frames, lambda: False):
                 run.cpu_seconds += process_time() - started
-                run.curve.append((report.time, watch.crest_displacement(watch.fields())))
+                run.curve.append((report.time, watch.crest_displacement()))
                 run.unbalanced_ratio = report.unbalanced_ratio
                 run.iterations += getattr(report, "iterations", 0)
                 progress.show(report.time, report.steps, crest=f"{run.curve[-1][1]:.4f} m")

@@ -94,6 +94,8 @@ def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | N
 def frame_of(model: mpm.Model, time: float, fields: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
     """Fields of all particles, on the first rank; None on the others. Collective."""
     single = {name: values if name == "id" else values.astype(np.float32) for name, values in fields.items()}
+    if model.comm.size == 1:
+        return {"time": np.float64(time), **single}
     parts = model.comm.gather(single)
     if parts is None:
         return None

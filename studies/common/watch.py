@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from .movie import PORE, has_pore_pressure, particle_frame
+from .movie import particle_frame
 from .slope_case import SlopeCase
 
 
@@ -19,24 +19,18 @@ class Watch:
         self.first_toe = self.model.comm.allreduce(start[:, 0].max(initial=-np.inf), MPI.MAX)
         self.frames: list[dict[str, np.ndarray]] = []
 
-    def fields(self) -> dict[str, np.ndarray]:
-        p = self.model.particles
-        pore = {PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else {}
-        return {
-            "position": p.position, "displacement": p.displacement, "velocity": p.velocity, "stress": p.stress,
-            "deviatoric_strain": p.deviatoric_strain, "plastic_strain": p.plastic_strain, "volume": p.volume,
-            "id": p.id, "material": p.material,
-            **pore,
-        }  # fmt: skip
-
-    def crest_displacement(self, fields: dict[str, np.ndarray]) -> float:
+    def crest_displacement(self) -> float:
         """Length of the displacement of the particle that started at the crest [m]. Collective."""
-        mine = fields["displacement"][fields["id"] == self.crest_id]
-        return self.model.comm.allreduce(float(np.linalg.norm(mine)))
+        p = self.model.particles
+        mine = np.flatnonzero(p.id == self.crest_id)
+        return self.model.comm.allreduce(float(np.linalg.norm(p.displacement[mine])))
 
-    def runout(self, fields: dict[str, np.ndarray]) -> float:
+    def runout(self) -> float:
         """Advance of the farthest particle past where the farthest one started [m]. Collective."""
-        return self.model.comm.allreduce(fields["position"][:, 0].max(initial=-np.inf), MPI.MAX) - self.first_toe
+        return (
+            self.model.comm.allreduce(self.model.particles.position[:, 0].max(initial=-np.inf), MPI.MAX)
+            - self.first_toe
+        )
 
     def keep(self, time: float) -> None:
         """Store a frame for the pictures, on the first rank. Collective."""

@@ -73,7 +73,7 @@ def slide(until, scheme="explicit", cell=0.1, per_cell=10, nmd=False, integratio
     else:
         run = case.model.implicit(until, dt=0.2, **choices)
     for report in run:
-        crest.append((report.time, watch.crest_displacement(watch.fields())))
+        crest.append((report.time, watch.crest_displacement()))
     watch.keep(report.time)
     return case.scene(), watch.frames[-1] if watch.frames else None, np.array(crest)
 
