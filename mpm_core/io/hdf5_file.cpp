@@ -69,8 +69,9 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, in
     : _comm(comm), _path(std::move(path)), _compression(compression)
 {
   MPI_Comm_rank(_comm, &_rank);
-  MPI_Comm_size(_comm, &_size);
-  _by_mpi = _compression > 0 && _size > 1;
+  int size = 1;
+  MPI_Comm_size(_comm, &size);
+  _by_mpi = _compression > 0 && size > 1;
   if (!is_same_on_all_ranks(_comm, _path))
     _failure = "path is not the same on all ranks; here: " + _path.string();
   check();
@@ -86,9 +87,11 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, in
     H5Pclose(access);
   }
   check();
+  if (_compression > 0)
+    return;
   _values.emplace(_path, O_WRONLY);
   if (_values->number() < 0)
-    _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
+    note_obstacle(std::strerror(errno));
   check();
 }
 
@@ -108,14 +111,20 @@ void Hdf5File::note(bool succeeded, const char* doing)
     _failure = std::string("cannot ") + doing + " " + _path.string() + ": " + hdf5_reason();
 }
 
+void Hdf5File::note_obstacle(const std::string& reason)
+{
+  if (_failure.empty())
+    _failure = "cannot write " + _path.string() + ": " + reason;
+}
+
 bool Hdf5File::has_room(std::int64_t bytes)
 {
   _needed += bytes;
   std::string obstacle = _rank == 0 ? reservation_obstacle(_path, _needed) : "";
   if (_by_mpi)
     obstacle = shared_failure(_comm, obstacle);
-  if (!obstacle.empty() && _failure.empty())
-    _failure = "cannot write " + _path.string() + ": " + obstacle;
+  if (!obstacle.empty())
+    note_obstacle(obstacle);
   return obstacle.empty();
 }
 
@@ -169,10 +178,8 @@ void Hdf5File::write(const Dataset& dataset, const void* values)
   if (_compression > 0)
     return write_compressed(dataset, values);
   const std::int64_t place = make({&dataset, 1})[0];
-  if (place < 0 || _values->put(values, dataset.local_bytes(), place + dataset.rows.before * dataset.row_bytes()))
-    return;
-  if (_failure.empty())
-    _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
+  if (place >= 0 && !_values->put(values, dataset.local_bytes(), place + dataset.rows.before * dataset.row_bytes()))
+    note_obstacle(std::strerror(errno));
 }
 
 void Hdf5File::write_compressed(const Dataset& dataset, const void* values)

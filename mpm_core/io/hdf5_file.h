@@ -104,12 +104,15 @@ public:
 
 private:
   void write_compressed(const Dataset& dataset, const void* values);
+  /// Takes note of what HDF5's last call could not do.
   void note(bool succeeded, const char* doing);
+  /// Takes note of what the system refused.
+  void note_obstacle(const std::string& reason);
   /// Reserves room for more bytes; if it cannot be had, that is noted and they must not be written.
   bool has_room(std::int64_t bytes);
 
   MPI_Comm _comm;
-  int _rank = 0, _size = 1;
+  int _rank = 0;
   std::filesystem::path _path;
   int _compression;
   std::int64_t _file = -1; ///< hid_t, which is not named here so that only sources of this folder see HDF5; -1 on ranks

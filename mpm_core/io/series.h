@@ -62,8 +62,7 @@ class SeriesFile
 {
 public:
   /// @param comm  must outlive the object
-  /// @param path  without suffix, or with .h5 or .xdmf; the folder that it is in must exist. What an earlier series
-  /// left
+  /// @param path  without suffix, or with .h5 or .xdmf; the folder around it must exist. What an earlier series left
   ///              under this name is removed.
   /// @param grid  name of the grid in the XDMF file
   /// @throws RunError if the files cannot be written, with path and reason
