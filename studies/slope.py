@@ -107,10 +107,10 @@ class Files:
         a = case.args
         self.names = a.fields.split(",")
         self.particles = ParticleOutput(particles, comm, not a.float64, a.compression)
+        own = slice(mesh.owned_cells)
         self.mesh = MeshOutput(
-            background, comm, mesh.points, mesh.cells[: mesh.owned_cells], not a.float64, a.compression
+            background, comm, mesh.points, mesh.cells[own], not a.float64, a.compression, {"tag": mesh.cell_tags[own]}
         )
-        self.tags = mesh.cell_tags[: mesh.owned_cells]
         probes = {
             "crest": ParticleProbe(self.model, [(a.crest, a.height)]), "totals": TotalsProbe(self.model),
             "section_crest": SectionProbe(self.model, point=(a.crest, 0.0), normal=(1.0, 0.0)),
@@ -121,11 +121,7 @@ class Files:
         """Add a frame. Collective."""
         pore = {PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else None
         self.particles.write_particles(time, self.model.particles, self.names, pore)
-        nodes = {
-            name: self.start.nodal_of(self.model.mesh, self.model.nodal(name))
-            for name in ("mass", "velocity", "internal_force")
-        }
-        self.mesh.write(time, nodes, {"tag": self.tags})
+        self.mesh.write_nodes(time, self.model, ("mass", "velocity", "internal_force"), self.start)
         for probe in self.probes:
             probe.record()
 

@@ -46,11 +46,7 @@ void FrameFiles::begin(const std::filesystem::path& path, std::vector<Dataset> d
     if (rank == 0)
       read_tables();
   }
-  if (rank == 0)
-    _file.emplace(_path, O_WRONLY | O_CREAT | (known ? O_TRUNC : 0));
-  MPI_Barrier(_comm); // the file is there
-  if (rank != 0)
-    _file.emplace(_path, O_WRONLY);
+  _file.emplace(_path, O_WRONLY | O_CREAT); // whichever rank comes first makes it
   note(_file->number() >= 0);
   if (known)
     for (const Piece& piece : _tables)

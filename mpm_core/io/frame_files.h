@@ -19,7 +19,7 @@ public:
   /// @param comm  must outlive the object
   FrameFiles(MPI_Comm comm, int compression) : _comm(comm), _compression(compression) {}
 
-  /// Starts a file; an older one under that name is replaced.
+  /// Starts a file; there must be none under that name.
   /// @throws RunError as `end` does
   void begin(const std::filesystem::path& path, std::vector<Dataset> datasets);
 

@@ -115,21 +115,22 @@ std::string fields_error(const std::vector<OutputField>& fields, const std::vect
 }
 
 /// @note Collective
-void require_frame(MPI_Comm comm, double time, std::string error, const std::vector<std::vector<OutputField>>& fields,
+void require_frame(MPI_Comm comm, double time, std::string error,
+                   std::initializer_list<const std::vector<OutputField>*> fields,
                    const std::vector<OutputIndexField>& index_fields)
 {
   if (error.empty() && !std::isfinite(time))
     error = "time is " + std::to_string(time) + ", expected a finite number of seconds";
-  error = shared_failure(comm, error);
-  if (!error.empty())
-    throw InputError(error);
   std::string names;
-  for (const auto& list : fields)
-    for (const OutputField& field : list)
+  for (const auto* list : fields)
+    for (const OutputField& field : *list)
       names += field.name + ":" + std::to_string(field.columns.size()) + ",";
   for (const OutputIndexField& field : index_fields)
     names += field.name + ",";
-  if (!is_same_on_all_ranks(comm, names))
+  const auto [failure, same] = agreement(comm, error, names);
+  if (!failure.empty())
+    throw InputError(failure);
+  if (!same)
     throw InputError("fields are not the same on all ranks; here: " + names);
 }
 } // namespace
@@ -144,7 +145,7 @@ OutputField row_field(std::string name, std::span<const double> values, int comp
 }
 
 SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage)
-    : _files(comm, storage.compression), _folder(without_suffix(path)),
+    : _files(comm, storage.compression), _folder(without_suffix(path)), _folder_name(_folder.filename()),
       _xdmf(_folder.string() + ".xdmf", std::move(grid)), _precision(storage.precision)
 {
   if (!is_same_on_all_ranks(comm, _folder))
@@ -157,18 +158,24 @@ void SeriesFile::begin(const std::string& file)
 {
   if (_closed)
     throw RunError("cannot write " + _folder.string() + ": it is closed");
-  _file = file;
+  _path = _folder / file;
+  _address = _folder_name + "/" + file + ":/";
   _parts.clear();
+  _description.clear();
 }
 
-void SeriesFile::begin_frame() { begin(frame_file(_n_frames)); }
+void SeriesFile::begin_frame(double time)
+{
+  begin(frame_file(_n_frames));
+  _description = begin_of_frame(time);
+}
 
 XdmfData SeriesFile::add(Part part)
 {
   const Dataset& dataset = part.dataset;
   const bool integer = dataset.number == Number::int32 || dataset.number == Number::int64;
-  const std::string address = _folder.filename().string() + "/" + _file + ":/" + dataset.name;
-  XdmfData data{address, dataset.rows.total, dataset.width, integer, static_cast<int>(bytes_of(dataset.number))};
+  XdmfData data{_address + dataset.name, dataset.rows.total, dataset.width, integer,
+                static_cast<int>(bytes_of(dataset.number))};
   _parts.push_back(std::move(part));
   return data;
 }
@@ -191,12 +198,12 @@ XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows,
   return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, values});
 }
 
-void SeriesFile::write_parts(const std::filesystem::path& path)
+void SeriesFile::write_parts()
 {
   std::vector<Dataset> datasets;
   for (const Part& part : _parts)
     datasets.push_back(part.dataset);
-  _files.begin(path, std::move(datasets));
+  _files.begin(_path, std::move(datasets));
   for (const Part& part : _parts)
     switch (part.dataset.number)
     {
@@ -216,15 +223,21 @@ void SeriesFile::write_parts(const std::filesystem::path& path)
   _files.end();
 }
 
-XdmfData SeriesFile::add_points(const RowSlice& rows, const OutputField& points)
+XdmfData SeriesFile::add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points)
 {
-  return add_reals(points.name, rows, points.columns, 3);
+  XdmfData geometry = add_reals(points.name, rows, points.columns, 3);
+  add_topology(_description, type, cells);
+  add_geometry(_description, geometry);
+  return geometry;
 }
 
-std::string SeriesFile::add_fields(const std::string& center, const RowSlice& rows,
-                                   const std::vector<OutputField>& fields)
+void SeriesFile::add_field(const std::string& name, const char* center, const XdmfData& data)
 {
-  std::string text;
+  add_attribute(_description, name, center, data);
+}
+
+void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields)
+{
   for (const OutputField& field : fields)
   {
     const std::span<const OutputColumn> columns = field.columns;
@@ -233,32 +246,24 @@ std::string SeriesFile::add_fields(const std::string& center, const RowSlice& ro
       for (std::size_t k = 0; k < n; ++k)
       {
         const std::string name = field.name + "_" + component_names[k];
-        text += xdmf_attribute(name, center, add_reals(name, rows, columns.subspan(k, 1), 1));
+        add_field(name, center, add_reals(name, rows, columns.subspan(k, 1), 1));
       }
     else
-    {
-      const int width = n == 2 ? 3 : static_cast<int>(n);
-      text += xdmf_attribute(field.name, center, add_reals(field.name, rows, columns, width));
-    }
+      add_field(field.name, center, add_reals(field.name, rows, columns, n == 2 ? 3 : static_cast<int>(n)));
   }
-  return text;
 }
 
-std::string SeriesFile::add_index_fields(const std::string& center, const RowSlice& rows,
-                                         const std::vector<OutputIndexField>& fields)
+void SeriesFile::add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields)
 {
-  std::string text;
   for (const OutputIndexField& field : fields)
-    text += xdmf_attribute(field.name, center, add_integers(field.name, rows, 1, field.values));
-  return text;
+    add_field(field.name, center, add_integers(field.name, rows, 1, field.values));
 }
 
 void SeriesFile::write_file()
 {
-  const std::filesystem::path path = _folder / _file;
   try
   {
-    write_parts(path);
+    write_parts();
   }
   catch (const RunError&)
   {
@@ -266,22 +271,23 @@ void SeriesFile::write_file()
     MPI_Comm_rank(comm(), &rank);
     std::error_code of_no_consequence;
     if (rank == 0)
-      std::filesystem::remove(path, of_no_consequence);
+      std::filesystem::remove(_path, of_no_consequence);
     throw;
   }
 }
 
-void SeriesFile::end_frame(double time, const std::string& content)
+void SeriesFile::end_frame()
 {
   write_file();
   ++_n_frames;
-  on_first_rank([&] { return _xdmf.append(xdmf_frame(time, content)); });
+  _description += end_of_frame;
+  on_first_rank([&] { return _xdmf.append(_description); });
 }
 
-void SeriesFile::end_single(const std::string& content)
+void SeriesFile::end_single()
 {
   write_file();
-  on_first_rank([&] { return _xdmf.write_single(content); });
+  on_first_rank([&] { return _xdmf.write_single(_description); });
 }
 
 void SeriesFile::close()
@@ -305,12 +311,12 @@ ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path,
 }
 
 void ParticleSeries::write(double time, const OutputField& position, const std::vector<OutputField>& fields,
-                           const std::vector<OutputIndexField>& index_fields)
+                           const std::vector<OutputIndexField>& index_fields, const std::string& failure)
 {
-  require_frame(comm(), time, fields_error(fields, index_fields, position.rows), {fields}, index_fields);
+  require_frame(comm(), time, failure.empty() ? fields_error(fields, index_fields, position.rows) : failure, {&fields},
+                index_fields);
   const RowSlice rows = row_slice(comm(), position.rows);
-  _series.begin_frame();
-  const XdmfData points = _series.add_points(rows, position);
+  _series.begin_frame(time);
   XdmfData vertices = _vertices;
   std::vector<std::int64_t> numbers;
   if (rows.total != vertices.rows)
@@ -319,41 +325,48 @@ void ParticleSeries::write(double time, const OutputField& position, const std::
     std::iota(numbers.begin(), numbers.end(), rows.before);
     vertices = _series.add_integers("vertices", rows, 1, numbers);
   }
+  const XdmfData points = _series.add_grid("Polyvertex", vertices, rows, position);
   // Named as a field as well: some readers give the points of the first frame only. It costs no space.
-  const std::string content = xdmf_topology("Polyvertex", vertices) + xdmf_geometry(points) +
-                              xdmf_attribute("position", "Node", points) + _series.add_fields("Node", rows, fields) +
-                              _series.add_index_fields("Node", rows, index_fields);
-  _series.end_frame(time, content);
+  _series.add_field("position", "Node", points);
+  _series.add_fields("Node", rows, fields);
+  _series.add_index_fields("Node", rows, index_fields);
+  _series.end_frame();
   _vertices = vertices;
 }
 
 MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
-                       std::span<const double> points, std::span<const std::int64_t> cells)
+                       std::span<const double> points, std::span<const std::int64_t> cells,
+                       const std::vector<OutputField>& fixed)
     : _series(comm, path, "mesh", storage),
       _nodes(row_slice(comm, points.size() / static_cast<std::size_t>(dimension))),
       _cells(row_slice(comm, cells.size() / static_cast<std::size_t>(dimension + 1)))
 {
+  require_frame(comm, 0, fields_error(fixed, {}, static_cast<std::size_t>(_cells.local)), {&fixed}, {});
   std::vector<std::int64_t> numbers(cells.begin(), cells.end());
   for (std::int64_t& node : numbers)
     node += _nodes.before;
   const OutputField nodes = row_field("points", points, dimension);
   _series.begin_single("mesh");
   const XdmfData topology = _series.add_integers("cells", _cells, dimension + 1, numbers);
-  const XdmfData geometry = _series.add_points(_nodes, nodes);
-  _grid = xdmf_topology(dimension == 2 ? "Triangle" : "Tetrahedron", topology) + xdmf_geometry(geometry);
-  _series.end_single(_grid);
+  _series.add_grid(dimension == 2 ? "Triangle" : "Tetrahedron", topology, _nodes, nodes);
+  _series.add_fields("Cell", _cells, fixed);
+  _grid = _series.description();
+  _series.end_single();
 }
 
 void MeshSeries::write(double time, const std::vector<OutputField>& node_fields,
-                       const std::vector<OutputField>& cell_fields)
+                       const std::vector<OutputField>& cell_fields, const std::string& failure)
 {
-  std::string error = fields_error(node_fields, {}, static_cast<std::size_t>(_nodes.local));
+  std::string error = failure;
+  if (error.empty())
+    error = fields_error(node_fields, {}, static_cast<std::size_t>(_nodes.local));
   if (error.empty())
     error = fields_error(cell_fields, {}, static_cast<std::size_t>(_cells.local));
-  require_frame(_series.comm(), time, error, {node_fields, cell_fields}, {});
-  _series.begin_frame();
-  const std::string content =
-      _grid + _series.add_fields("Node", _nodes, node_fields) + _series.add_fields("Cell", _cells, cell_fields);
-  _series.end_frame(time, content);
+  require_frame(comm(), time, error, {&node_fields, &cell_fields}, {});
+  _series.begin_frame(time);
+  _series.add_description(_grid);
+  _series.add_fields("Node", _nodes, node_fields);
+  _series.add_fields("Cell", _cells, cell_fields);
+  _series.end_frame();
 }
 } // namespace mpm

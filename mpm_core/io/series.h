@@ -69,26 +69,31 @@ public:
   SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage);
 
   /// Starts a frame. What is added to it must live until its end.
-  void begin_frame();
-
-  /// Adds points of 2 or 3 coordinates, padded to 3.
-  XdmfData add_points(const RowSlice& rows, const OutputField& points);
+  void begin_frame(double time);
 
   /// Adds whole numbers; those that all fit into 32 bits are stored so.
   XdmfData add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values);
 
+  /// Adds the grid: its cells, and points of 2 or 3 coordinates, padded to 3.
+  XdmfData add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points);
+
+  /// Adds a field that is the same data as something else.
+  void add_field(const std::string& name, const char* center, const XdmfData& data);
+
   /// Adds fields that live on nodes or cells.
-  /// @return their description in XDMF
-  std::string add_fields(const std::string& center, const RowSlice& rows, const std::vector<OutputField>& fields);
-  std::string add_index_fields(const std::string& center, const RowSlice& rows,
-                               const std::vector<OutputIndexField>& fields);
+  void add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields);
+  void add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields);
+
+  /// What the XDMF file says of the present file so far; it may be added to later ones.
+  const std::string& description() const { return _description; }
+  void add_description(const std::string& text) { _description += text; }
 
   /// Writes a frame, and names it in the XDMF file.
-  void end_frame(double time, const std::string& content);
+  void end_frame();
 
   /// Starts what a series without frames consists of, in a file of this name.
   void begin_single(const std::string& name) { begin(name + ".h5"); }
-  void end_single(const std::string& content);
+  void end_single();
 
   /// Closes the XDMF file.
   void close();
@@ -107,17 +112,20 @@ private:
   XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
   /// Writes the present file; if that fails, it is removed.
   void write_file();
-  void write_parts(const std::filesystem::path& path);
+  void write_parts();
   /// Lets the first rank do something with files; what goes wrong is an error on all.
   template <class F>
   void on_first_rank(F&& work);
 
   FrameFiles _files;
   std::filesystem::path _folder;
+  std::string _folder_name; ///< as the XDMF file beside it names it
   XdmfSeries _xdmf;
   Precision _precision;
-  std::string _file; ///< name of the present file
+  std::filesystem::path _path; ///< of the present file
+  std::string _address;        ///< of its root, in XDMF
   std::vector<Part> _parts;
+  std::string _description; ///< in XDMF
   int _n_frames = 0;
   bool _closed = false;
 };
@@ -132,9 +140,10 @@ public:
   /// @param time        s, finite
   /// @param position    of this rank's particles, 2 or 3 components; m
   /// @param fields      of as many rows each; the same names on all ranks
-  /// @throws InputError if lengths do not match, names differ between ranks or are no plain words
+  /// @param failure     why this rank has no fields; empty if it has
+  /// @throws InputError if a rank has none, lengths do not match, names differ between ranks or are no plain words
   void write(double time, const OutputField& position, const std::vector<OutputField>& fields,
-             const std::vector<OutputIndexField>& index_fields);
+             const std::vector<OutputIndexField>& index_fields, const std::string& failure = {});
 
   MPI_Comm comm() const { return _series.comm(); }
 
@@ -154,11 +163,17 @@ public:
   /// @param points     (n, dimension) nodes of this rank's cells; m. A node that several ranks give appears once for
   /// each.
   /// @param cells      (m, dimension + 1) rows of `points`, this rank's own cells only
+  /// @param fixed      fields on the cells that are the same in all frames
   MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
-             std::span<const double> points, std::span<const std::int64_t> cells);
+             std::span<const double> points, std::span<const std::int64_t> cells,
+             const std::vector<OutputField>& fixed);
 
   /// Writes a frame of fields on the nodes and cells given at the start.
-  void write(double time, const std::vector<OutputField>& node_fields, const std::vector<OutputField>& cell_fields);
+  /// @param failure  why this rank has no fields; empty if it has
+  void write(double time, const std::vector<OutputField>& node_fields, const std::vector<OutputField>& cell_fields,
+             const std::string& failure = {});
+
+  MPI_Comm comm() const { return _series.comm(); }
 
   void close() { _series.close(); }
 
@@ -166,6 +181,6 @@ private:
   SeriesFile _series;
   RowSlice _nodes;
   RowSlice _cells;
-  std::string _grid; ///< XDMF of topology and geometry
+  std::string _grid; ///< XDMF of topology, geometry and fixed fields
 };
 } // namespace mpm

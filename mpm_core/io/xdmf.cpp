@@ -11,7 +11,7 @@ namespace mpm
 {
 namespace
 {
-std::string attribute_type(int width)
+const char* attribute_type(int width)
 {
   switch (width)
   {
@@ -24,6 +24,23 @@ std::string attribute_type(int width)
   default:
     return "Matrix";
   }
+}
+
+void add_data_item(std::string& text, const XdmfData& data)
+{
+  text += data.integer ? "<DataItem Format=\"HDF\" NumberType=\"Int\" Precision=\""
+                       : "<DataItem Format=\"HDF\" NumberType=\"Float\" Precision=\"";
+  text += std::to_string(data.bytes);
+  text += "\" Dimensions=\"";
+  text += std::to_string(data.rows);
+  if (data.width > 1)
+  {
+    text += ' ';
+    text += std::to_string(data.width);
+  }
+  text += "\">";
+  text += data.dataset;
+  text += "</DataItem>";
 }
 
 const std::string document_head = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n";
@@ -60,39 +77,45 @@ std::string replaced_file(const std::filesystem::path& path, const std::string& 
 }
 } // namespace
 
-std::string xdmf_data_item(const XdmfData& data)
+void add_topology(std::string& text, const char* type, const XdmfData& cells)
 {
-  std::string text = "<DataItem Format=\"HDF\" NumberType=\"";
-  text += data.integer ? "Int" : "Float";
-  text += "\" Precision=\"" + std::to_string(data.bytes) + "\" Dimensions=\"" + std::to_string(data.rows);
-  if (data.width > 1)
-    text += ' ' + std::to_string(data.width);
-  return text + "\">" + data.dataset + "</DataItem>";
+  text += "<Topology TopologyType=\"";
+  text += type;
+  text += "\" NumberOfElements=\"";
+  text += std::to_string(cells.rows);
+  text += "\" NodesPerElement=\"";
+  text += std::to_string(cells.width);
+  text += "\">";
+  add_data_item(text, cells);
+  text += "</Topology>\n";
 }
 
-std::string xdmf_topology(const std::string& type, const XdmfData& cells)
+void add_geometry(std::string& text, const XdmfData& points)
 {
-  return "<Topology TopologyType=\"" + type + "\" NumberOfElements=\"" + std::to_string(cells.rows) +
-         "\" NodesPerElement=\"" + std::to_string(cells.width) + "\">" + xdmf_data_item(cells) + "</Topology>\n";
+  text += "<Geometry GeometryType=\"XYZ\">";
+  add_data_item(text, points);
+  text += "</Geometry>\n";
 }
 
-std::string xdmf_geometry(const XdmfData& points)
+void add_attribute(std::string& text, const std::string& name, const char* center, const XdmfData& data)
 {
-  return "<Geometry GeometryType=\"XYZ\">" + xdmf_data_item(points) + "</Geometry>\n";
+  text += "<Attribute Name=\"";
+  text += name;
+  text += "\" AttributeType=\"";
+  text += attribute_type(data.width);
+  text += "\" Center=\"";
+  text += center;
+  text += "\">";
+  add_data_item(text, data);
+  text += "</Attribute>\n";
 }
 
-std::string xdmf_attribute(const std::string& name, const std::string& center, const XdmfData& data)
-{
-  return "<Attribute Name=\"" + name + "\" AttributeType=\"" + attribute_type(data.width) + "\" Center=\"" + center +
-         "\">" + xdmf_data_item(data) + "</Attribute>\n";
-}
-
-std::string xdmf_frame(double time, const std::string& content)
+std::string begin_of_frame(double time)
 {
   std::array<char, 32> digits{}; // as many as it takes to read the same number again
   const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), time).ptr;
   return "<Grid Name=\"frame\" GridType=\"Uniform\">\n<Time Value=\"" +
-         std::string(digits.data(), static_cast<std::size_t>(end - digits.data())) + "\"/>\n" + content + "</Grid>\n";
+         std::string(digits.data(), static_cast<std::size_t>(end - digits.data())) + "\"/>\n";
 }
 
 std::string XdmfSeries::write_single(const std::string& content)

@@ -20,20 +20,20 @@ struct XdmfData
   int bytes = 8; ///< per value
 };
 
-std::string xdmf_data_item(const XdmfData& data);
-
+/// Each of these adds to a text, which is made for every frame.
 /// @param type   "Polyvertex", "Triangle" or "Tetrahedron"
 /// @param cells  node numbers, one row per cell
-std::string xdmf_topology(const std::string& type, const XdmfData& cells);
+void add_topology(std::string& text, const char* type, const XdmfData& cells);
 
 /// @param points  (n, 3)
-std::string xdmf_geometry(const XdmfData& points);
+void add_geometry(std::string& text, const XdmfData& points);
 
 /// @param center  "Node" or "Cell"
-std::string xdmf_attribute(const std::string& name, const std::string& center, const XdmfData& data);
+void add_attribute(std::string& text, const std::string& name, const char* center, const XdmfData& data);
 
-/// One frame of a series.
-std::string xdmf_frame(double time, const std::string& content);
+/// The beginning of a frame of a series.
+std::string begin_of_frame(double time);
+inline const char* const end_of_frame = "</Grid>\n";
 
 /// The XDMF file of a series. Readers find a whole document in it whenever they look or the run is killed.
 ///
@@ -52,7 +52,7 @@ public:
   std::string write_without_frames() { return rewrite(0); }
   /// Writes one grid without time in place of the series.
   std::string write_single(const std::string& content);
-  /// Adds a frame, made by `xdmf_frame`.
+  /// Adds a frame, from `begin_of_frame` to `end_of_frame`.
   std::string append(const std::string& frame);
   /// Leaves the document without room behind it. Nothing is added after that.
   std::string finish();

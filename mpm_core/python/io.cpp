@@ -2,9 +2,12 @@
 
 #include "io/particle_fields.h"
 #include "parallel/agreement.h"
+#include "parallel/row_carrier.h"
 #include "python/arrays.h"
+#include "python/nodal_field.h"
 #include "steps/run.h"
 
+#include <algorithm>
 #include <memory>
 
 namespace mpm::python
@@ -42,21 +45,78 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 
 /// Writes fields of a model's particles from where they are, and further ones.
 template <int D>
-void write_model(ParticleSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
-                 const RealFields& more, const IntegerFields& more_integers)
+void write_particles(ParticleSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
+                     const RealFields& more, const IntegerFields& more_integers, std::string failure)
 {
   ParticleFields all;
-  collectively(series.comm(), [&] { all = particle_fields<D>(model.particles, names); });
+  if (failure.empty())
+    failure = input_error_of([&] { all = particle_fields<D>(model.particles, names); });
   for (OutputField& field : output_fields(more))
     all.fields.push_back(std::move(field));
   for (OutputIndexField& field : output_fields(more_integers))
     all.index_fields.push_back(std::move(field));
-  series.write(time, all.position, all.fields, all.index_fields);
+  series.write(time, all.position, all.fields, all.index_fields, failure);
+}
+
+/// Nodal fields of a model by name
+template <int D>
+std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<std::string>& names)
+{
+  std::vector<OutputField> fields;
+  for (const std::string& name : names)
+    fields.push_back(nodal_field(model, name));
+  return fields;
+}
+
+/// Writes nodal fields of a model from where they are, or from where they are carried to.
+/// @param carrier  to the nodes of the mesh as it is written; null if the model's is cut in the same way
+template <int D>
+void write_nodes(MeshSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
+                 RowCarrier* carrier)
+{
+  std::vector<OutputField> fields;
+  std::string failure = input_error_of([&] { fields = nodal_fields(model, names); });
+  if (carrier)
+    failure = shared_failure(series.comm(), failure);
+  if (carrier && failure.empty())
+  {
+    std::vector<OutputColumn> columns;
+    for (const OutputField& field : fields)
+      columns.insert(columns.end(), field.columns.begin(), field.columns.end());
+    const std::size_t width = columns.size();
+    const std::span<const double> rows = carrier->carry(width,
+                                                        [&](std::size_t row, double* to)
+                                                        {
+                                                          for (const OutputColumn& column : columns)
+                                                            *to++ = column.first[row * column.stride];
+                                                        });
+    const double* first = rows.data();
+    for (OutputField& field : fields)
+    {
+      field.rows = carrier->n_wanted();
+      for (OutputColumn& column : field.columns)
+        column = {first++, width};
+    }
+  }
+  series.write(time, fields, {}, failure);
 }
 } // namespace
 
 void bind_io(py::module_& m)
 {
+  py::class_<RowCarrier>(m, "RowCarrier")
+      .def(
+          py::init([](std::uintptr_t comm, const IntegerArray& ranks, const IntegerArray& rows)
+                   { return RowCarrier(communicator(comm), values<std::int64_t>(ranks), values<std::int64_t>(rows)); }))
+      .def("carry",
+           [](RowCarrier& carrier, const RealArray& array)
+           {
+             const auto n = static_cast<std::size_t>(width(array));
+             const std::span<const double> rows =
+                 carrier.carry(n, [&](std::size_t row, double* to) { std::copy_n(array.data() + row * n, n, to); });
+             return py::array_t<double>({carrier.n_wanted(), n}, rows.data());
+           });
+
   py::class_<ParticleSeries>(m, "ParticleSeries")
       .def(py::init(
                [](std::uintptr_t comm, const std::string& path, bool float32, int compression)
@@ -65,32 +125,35 @@ void bind_io(py::module_& m)
       .def(
           "write",
           [](ParticleSeries& series, double time, const RealArray& position, const RealFields& fields,
-             const IntegerFields& index_fields)
+             const IntegerFields& index_fields, const std::string& failure)
           {
             series.write(time, row_field("position", values<double>(position), width(position)), output_fields(fields),
-                         output_fields(index_fields));
+                         output_fields(index_fields), failure);
           },
-          py::arg("time"), py::arg("position"), py::arg("fields"), py::arg("index_fields"))
-      .def("write_model", &write_model<2>)
-      .def("write_model", &write_model<3>)
+          py::arg("time"), py::arg("position"), py::arg("fields"), py::arg("index_fields"), py::arg("failure"))
+      .def("write_particles", &write_particles<2>)
+      .def("write_particles", &write_particles<3>)
       .def("close", &ParticleSeries::close);
 
   py::class_<MeshSeries>(m, "MeshSeries")
       .def(py::init(
                [](std::uintptr_t comm, const std::string& path, bool float32, int compression, const RealArray& points,
-                  const IntegerArray& cells)
+                  const IntegerArray& cells, const RealFields& fixed)
                {
                  return std::make_unique<MeshSeries>(communicator(comm), path, storage(float32, compression),
-                                                     width(points), values<double>(points),
-                                                     values<std::int64_t>(cells));
+                                                     width(points), values<double>(points), values<std::int64_t>(cells),
+                                                     output_fields(fixed));
                }),
            py::arg("comm"), py::arg("path"), py::arg("float32"), py::arg("compression"), py::arg("points"),
-           py::arg("cells"))
+           py::arg("cells"), py::arg("fixed"))
       .def(
           "write",
-          [](MeshSeries& series, double time, const RealFields& node_fields, const RealFields& cell_fields)
-          { series.write(time, output_fields(node_fields), output_fields(cell_fields)); },
-          py::arg("time"), py::arg("node_fields"), py::arg("cell_fields"))
+          [](MeshSeries& series, double time, const RealFields& node_fields, const RealFields& cell_fields,
+             const std::string& failure)
+          { series.write(time, output_fields(node_fields), output_fields(cell_fields), failure); },
+          py::arg("time"), py::arg("node_fields"), py::arg("cell_fields"), py::arg("failure"))
+      .def("write_nodes", &write_nodes<2>)
+      .def("write_nodes", &write_nodes<3>)
       .def("close", &MeshSeries::close);
 }
 } // namespace mpm::python

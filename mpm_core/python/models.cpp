@@ -4,6 +4,7 @@
 #include "parallel/partition.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
+#include "python/nodal_field.h"
 #include "steps/mapping.h"
 #include "steps/placement.h"
 #include "steps/rebalance.h"
@@ -60,41 +61,20 @@ void set_rows(const char* name, const py::array& array, C& columns, std::size_t 
   }
 }
 
-/// A copy of the nodal values: (nodes,) for numbers, (nodes, D) for vectors.
-template <int D, class F>
-py::array_t<double> nodal_vectors(const Model<D>& model, F&& value)
-{
-  const std::size_t n = model.mesh.points.size();
-  py::array_t<double> array({n, static_cast<std::size_t>(D)});
-  double* out = array.mutable_data();
-  for (std::size_t i = 0; i < n; ++i)
-  {
-    const Vector<D> v = value(i);
-    std::copy(v.begin(), v.end(), out + i * D);
-  }
-  return array;
-}
-
+/// A copy of a nodal field: (nodes,) for numbers, (nodes, D) for vectors.
 template <int D>
 py::array_t<double> nodal(const Model<D>& model, const std::string& name)
 {
-  const auto& work = model.work;
-  if (!work.ready)
-    throw InputError("nodal values of '" + name + "' are there only after a step");
-  if (name == "velocity")
-    return nodal_vectors(model, [&](std::size_t i) { return work.velocity[i]; });
-  if (name == "acceleration")
-    return nodal_vectors(model, [&](std::size_t i) { return work.acceleration[i]; });
-  if (name == "internal_force")
-    return nodal_vectors(model, [&](std::size_t i) { return work.nodes[i].internal; });
-  if (name == "mass")
-  {
-    py::array_t<double> array(static_cast<py::ssize_t>(work.nodes.size()));
-    for (std::size_t i = 0; i < work.nodes.size(); ++i)
-      array.mutable_data()[i] = work.nodes[i].mass;
-    return array;
-  }
-  throw InputError("nodal field is '" + name + "', expected velocity, acceleration, internal_force or mass");
+  const OutputField field = nodal_field(model, name);
+  const std::size_t width = field.columns.size();
+  std::vector<std::size_t> shape{field.rows};
+  if (width > 1)
+    shape.push_back(width);
+  py::array_t<double> array(shape);
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t i = 0; i < field.rows; ++i)
+      array.mutable_data()[i * width + k] = field.columns[k].first[i * field.columns[k].stride];
+  return array;
 }
 
 template <int D>

@@ -57,7 +57,7 @@ def measured(size: float, every: int, frames: int, folder: Path, options: dict[s
             report = next(run)
             lap("steps")
             particles.write_particles(report.time, p, FIELDS)
-            nodes.write(report.time, {field: model.nodal(field) for field in ("mass", "velocity", "internal_force")})
+            nodes.write_nodes(report.time, model, ("mass", "velocity", "internal_force"))
             lap("frames")
             with open(folder / f"plain-{COMM.rank}-{frame}", "wb", buffering=0) as file:
                 file.write(plain)

@@ -1,8 +1,10 @@
 """The mesh cut anew while soil slides: ranks have about as many particles, and nothing else changes."""
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from mpm_core.output import MeshOutput
 from mpm_core.partition import PARTICLE_WEIGHT, redistributed, take_partition
 from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
 
@@ -165,6 +167,45 @@ def test_nodal_values_of_a_mesh_cut_anew(comm):
     np.testing.assert_array_equal(found, np.column_stack([start.points @ [2.0, -1.0], start.global_nodes]))
     with pytest.raises(mpm.InputError, match="values has shape"):
         start.nodal_of(model.mesh, function[:-1])
+    smaller = spread_box((2, 2), (1.0, 1.0), comm, bands)
+    with pytest.raises(mpm.InputError, match="other is a mesh without node .*, expected this mesh cut otherwise"):
+        start.nodal_of(smaller, np.zeros(len(smaller.points)))
+
+
+def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_path):
+    model = sliding_slope(comm)
+    start = model.mesh
+    names = ("mass", "velocity", "internal_force")
+    with (
+        MeshOutput(
+            shared_path / "copies", comm, start.points, start.cells[: start.owned_cells], float32=False
+        ) as copies,
+        MeshOutput(
+            shared_path / "model", comm, start.points, start.cells[: start.owned_cells], float32=False
+        ) as output,
+    ):
+        with pytest.raises(mpm.InputError, match="'mass' are there only after a step"):
+            output.write_nodes(0.0, model, names)
+        everything = np.arange(start.cell_numbers)
+        cuts = (
+            lambda: None,
+            model.rebalance,
+            lambda: take_partition(model, everything if comm.rank == comm.size - 1 else everything[:0]),
+        )
+        for cut in cuts:
+            cut()
+            *_, report = model.explicit(model.time + 0.05)
+            copies.write(report.time, {name: start.nodal_of(model.mesh, model.nodal(name)) for name in names})
+            output.write_nodes(report.time, model, names, start)
+            assert comm.size == 1 or (model.mesh is start) == (cut is cuts[0])
+            with pytest.raises(mpm.InputError, match="nodal field is 'weight', expected velocity"):
+                output.write_nodes(report.time, model, ["weight"], start)
+    for frame in ("000000.h5", "000001.h5", "000002.h5"):
+        with h5py.File(shared_path / "copies" / frame) as one, h5py.File(shared_path / "model" / frame) as other:
+            assert set(one) == set(other) == set(names)
+            for name in names:
+                np.testing.assert_array_equal(one[name][()], other[name][()])
+            assert np.abs(one["velocity"][()]).max() > 0
 
 
 def test_everything_on_one_rank_and_back(comm):

@@ -119,6 +119,11 @@ def test_vtk_reads_particles_and_mesh_over_time(tmp_path):
     with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES):
         pass
     assert read_with_vtk(tmp_path / "mesh.xdmf", 0.0).GetNumberOfCells() == 2
+    with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES, fixed={"tag": np.array([3, 5])}) as output:
+        output.write(0.0)
+        output.write(1.0)
+    tags = read_with_vtk(tmp_path / "mesh.xdmf", 1.0).GetCellData().GetArray("tag")
+    assert [tags.GetTuple1(k) for k in range(2)] == [3, 5]
 
 
 def test_mesh_without_fields_is_one_grid(tmp_path):
@@ -142,6 +147,22 @@ def test_mesh_fields_over_time(tmp_path):
             assert time == step
             np.testing.assert_array_equal(at_nodes["mass"], np.arange(4.0) + step)
             np.testing.assert_array_equal(in_cells["pressure"][0], [10.0 * step])
+
+
+def test_fixed_fields_are_stored_once_and_are_in_every_frame(tmp_path):
+    with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES, fixed={"tag": np.array([3, 5])}) as output:
+        for step in range(2):
+            output.write(float(step), {"mass": np.full(len(SQUARE), step)})
+    with h5py.File(tmp_path / "mesh/000001.h5") as frame:
+        assert set(frame) == {"mass"}
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "mesh.xdmf") as reader:
+        reader.read_points_cells()
+        for step in range(2):
+            _, at_nodes, in_cells = reader.read_data(step)
+            np.testing.assert_array_equal(at_nodes["mass"], np.full(len(SQUARE), step))
+            np.testing.assert_array_equal(in_cells["tag"][0], [3, 5])
+    with pytest.raises(InputError, match="tag has 3 rows, expected 2"):
+        MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES, fixed={"tag": np.ones(3)})
 
 
 def test_all_files_are_valid_while_the_run_goes_on(tmp_path):

@@ -1,5 +1,7 @@
 """The background mesh."""
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
@@ -7,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .collective import collectively
-from .rows import carried
+from .rows import found
 
 
 def _integers(name: str, values: ArrayLike, dtype: type, width: int | None) -> NDArray:
@@ -128,6 +130,7 @@ class Mesh:
         """Number of each cell over all ranks, shape (cells,); it is the same however the mesh is cut."""
         self.cell_numbers: int = 1 + comm.allreduce(int(self.global_cells.max(initial=-1)), MPI.MAX)
         """One more than the highest number that a cell has over all ranks."""
+        self._carriers: WeakKeyDictionary[Mesh, _core.RowCarrier] = WeakKeyDictionary()
         self._tags = {
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
@@ -155,14 +158,27 @@ class Mesh:
             >>> list(model.explicit(until=1.0, rebalance=1.2))
             >>> start.nodal_of(model.mesh, model.nodal("velocity"))
         """
-        array = np.asarray(values, dtype=np.float64)
+        array = np.ascontiguousarray(values, dtype=np.float64)
         if array.ndim not in (1, 2) or len(array) != len(other.points):
             raise InputError(f"values has shape {array.shape}, expected a row for each of {len(other.points)} nodes")
         if other is self:
             return array
-        known = np.unique(other.cells[: other.owned_cells])
-        rows = array.reshape(len(array), -1)[known]
-        return carried(self.comm, other.global_nodes[known], rows, self.global_nodes).reshape(-1, *array.shape[1:])
+        rows = array.reshape(len(array), *array.shape[1:] or [1])
+        return self._carrier_from(other).carry(rows).reshape(len(self.points), *array.shape[1:])
+
+    def _carrier_from(self, other: "Mesh") -> _core.RowCarrier:
+        """What carries nodal values from the same mesh cut otherwise to the nodes of this one. Collective."""
+        if other not in self._carriers:
+            known = np.unique(other.cells[: other.owned_cells])
+            ranks, rows = found(self.comm, other.global_nodes[known], known, self.global_nodes)
+
+            def require_all() -> None:
+                if absent := self.global_nodes[ranks < 0].tolist():
+                    raise InputError(f"other is a mesh without node {absent[0]}, expected this mesh cut otherwise")
+
+            collectively(self.comm, require_all)
+            self._carriers[other] = _core.RowCarrier(MPI._addressof(self.comm), ranks, rows)
+        return self._carriers[other]
 
     def require_tag(self, kind: str, tag: int) -> int:
         """The tag, where cells or facets (``kind``) with it exist on any rank.

@@ -13,8 +13,9 @@ component, ``NAME_xx`` and so on; other numbers of components are kept as they a
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -22,7 +23,16 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .collective import collectively
+from .mesh import Mesh
+from .model import Model
 from .particles import Particles
+
+T = TypeVar("T")
+Fields = list[tuple[str, np.ndarray]]
+
+# What a rank hands over whose fields are refused.
+NO_FIELDS: tuple[Fields, Fields] = ([], [])
+NO_PARTICLES: tuple[np.ndarray, Fields, Fields] = (np.empty((0, 2)), [], [])
 
 
 class ParticleOutput:
@@ -50,7 +60,6 @@ class ParticleOutput:
     def __init__(
         self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
     ) -> None:
-        self._comm = comm
         self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression))
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
@@ -68,8 +77,8 @@ class ParticleOutput:
                 expected.
             RunError: the frame cannot be written.
         """
-        position, real, whole = collectively(self._comm, lambda: _particle_fields(fields))
-        self._series.write(float(time), position, real, whole)
+        found, failure = _tried(lambda: _particle_fields(fields), NO_PARTICLES)
+        self._series.write(float(time), *found, failure)
 
     def write_particles(
         self, time: float, particles: Particles, names: Sequence[str], more: Mapping[str, np.ndarray] | None = None
@@ -86,8 +95,8 @@ class ParticleOutput:
             InputError: a field that does not exist, or of another length.
             RunError: the frame cannot be written.
         """
-        real, whole = collectively(self._comm, lambda: _split_fields(more or {}))
-        self._series.write_model(float(time), particles._core, list(names), real, whole)
+        further, failure = _tried(lambda: _split_fields(more or {}), NO_FIELDS)
+        self._series.write_particles(float(time), particles._core, list(names), *further, failure)
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
@@ -113,9 +122,11 @@ class MeshOutput:
         cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
         float32: store real numbers in single precision; in double precision if false.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
+        fixed: fields on the cells that are the same in all frames, by name; stored once.
 
     Raises:
-        InputError: ``points`` or ``cells`` have a wrong shape, or a cell names a point that is not there.
+        InputError: ``points`` or ``cells`` have a wrong shape, a cell names a point that is not there, or a field has
+            another length than ``cells``.
         RunError: on all ranks, with path and reason, when the files cannot be written.
 
     Note:
@@ -130,11 +141,11 @@ class MeshOutput:
         cells: np.ndarray,
         float32: bool = True,
         compression: int = 0,
+        fixed: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        self._comm = comm
-        points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
+        points, cells, fields = collectively(comm, lambda: (*_checked_mesh(points, cells), _real_fields(fixed or {})))
         self._series = _core.MeshSeries(
-            MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells
+            MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells, fields
         )
 
     def write(
@@ -154,10 +165,24 @@ class MeshOutput:
             InputError: a field is of another length or not numeric.
             RunError: the frame cannot be written.
         """
-        nodes, cells = collectively(
-            self._comm, lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {}))
-        )
-        self._series.write(float(time), nodes, cells)
+        found, failure = _tried(lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {})), NO_FIELDS)
+        self._series.write(float(time), *found, failure)
+
+    def write_nodes(self, time: float, model: Model, names: Sequence[str], mesh: Mesh | None = None) -> None:
+        """Write a frame of nodal fields of a model's last step, as ``write`` does but without copies of them.
+
+        Args:
+            time: s.
+            model: one whose mesh has the points of this output.
+            names: of nodal fields, as ``Model.nodal`` gives them.
+            mesh: the one that this output was made of, where that of the model may have been cut anew since.
+
+        Raises:
+            InputError: a field that does not exist, or no step was taken yet.
+            RunError: the frame cannot be written.
+        """
+        carrier = None if mesh is None or mesh is model.mesh else mesh._carrier_from(model.mesh)
+        self._series.write_nodes(float(time), model._core, list(names), carrier)
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
@@ -170,6 +195,14 @@ class MeshOutput:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _tried(work: Callable[[], T], otherwise: T) -> tuple[T, str]:
+    """What ``work`` gives, and no failure; or something else, and the message of its InputError, for all ranks to raise."""
+    try:
+        return work(), ""
+    except InputError as error:
+        return otherwise, str(error)
 
 
 def _level(compression: int) -> int:
@@ -187,13 +220,13 @@ def _numeric(name: str, values: np.ndarray) -> np.ndarray:
     return array
 
 
-def _real_fields(fields: Mapping[str, np.ndarray]) -> list[tuple[str, np.ndarray]]:
+def _real_fields(fields: Mapping[str, np.ndarray]) -> Fields:
     return [(name, np.ascontiguousarray(_numeric(name, values), np.float64)) for name, values in fields.items()]
 
 
 def _particle_fields(
     fields: Mapping[str, np.ndarray],
-) -> tuple[np.ndarray, list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
+) -> tuple[np.ndarray, Fields, Fields]:
     """Position, real fields and fields of whole numbers."""
     if "position" not in fields:
         raise InputError(f"fields are {', '.join(fields) or 'none'}, expected 'position' among them")
@@ -209,7 +242,7 @@ def _particle_fields(
 
 def _split_fields(
     fields: Mapping[str, np.ndarray],
-) -> tuple[list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
+) -> tuple[Fields, Fields]:
     """Real fields and fields of whole numbers."""
     others = {name: _numeric(name, values) for name, values in fields.items()}
     whole = {name: values for name, values in others.items() if values.dtype.kind in "iub" and values.ndim == 1}

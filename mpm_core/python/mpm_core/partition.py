@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError
 from .mesh import Mesh
-from .rows import carried, exchanged
+from .rows import exchanged, found
 
 if TYPE_CHECKING:
     from .body import Body
@@ -59,9 +59,8 @@ def cut_anew(body: Body) -> None:
 def take_partition(body: Body, cells: NDArray) -> None:
     """Bring the model to a partition, given by the numbers of the cells that this rank is to own, in their order. Collective."""
     mesh, comm = body.mesh, body.comm
-    place = np.column_stack([np.full(len(cells), comm.rank), np.arange(len(cells))]).astype(np.float64)
-    rank, order = carried(comm, cells, place, mesh.global_cells[: mesh.owned_cells]).T.astype(np.int64)
-    take_mesh(body, redistributed(mesh, rank, order))
+    ranks, order = found(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
+    take_mesh(body, redistributed(mesh, ranks, order))
 
 
 def take_mesh(body: Body, mesh: Mesh) -> None:

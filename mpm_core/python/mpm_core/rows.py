@@ -47,19 +47,32 @@ def answered(comm: MPI.Comm, ranks: NDArray, questions: NDArray, answer: Callabl
     return back
 
 
-def carried(comm: MPI.Comm, numbers: NDArray, values: NDArray, wanted: NDArray) -> NDArray:
-    """Values by number, from whatever rank has them; rank (number mod size) keeps the directory.
+def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> tuple[NDArray, NDArray]:
+    """Where things are, by their number over all ranks; rank (number mod size) keeps the directory.
 
     Args:
-        numbers: of this rank's values over all ranks, shape (n,); a number that several ranks give has the same value on all.
-        values: shape (n, k).
-        wanted: numbers of the values to get, shape (m,); each must be given by some rank.
+        numbers: of what this rank has, shape (n,). What several ranks have is found on the lowest of them.
+        rows: of these things on this rank, shape (n,).
+        wanted: numbers of the things to find, shape (m,).
+
+    Returns:
+        Ranks and rows of the wanted things, shape (m,) each; -1 for what no rank has.
 
     Note:
         Collective.
     """
-    came, _ = exchanged(comm, numbers % comm.size, np.column_stack([numbers.astype(np.float64), values]))
+    entries = np.column_stack([numbers, np.full(len(numbers), comm.rank), rows]).astype(np.int64)
+    came, _ = exchanged(comm, entries[:, 0] % comm.size, entries)
     known, first = np.unique(came[:, 0], return_index=True)
-    kept = came[first, 1:]
-    return answered(comm, wanted % comm.size, wanted[:, None].astype(np.float64),
-                    lambda asked: kept[np.searchsorted(known, asked[:, 0])])  # fmt: skip
+
+    def places(asked: NDArray) -> NDArray:
+        at = np.searchsorted(known, asked[:, 0])
+        there = np.flatnonzero(at < len(known))
+        there = there[known[at[there]] == asked[there, 0]]
+        answer = np.full((len(asked), 2), -1)
+        answer[there] = came[first[at[there]], 1:]
+        return answer
+
+    questions = wanted.astype(np.int64)[:, None]
+    ranks, rows = answered(comm, questions[:, 0] % comm.size, questions, places).T
+    return ranks, rows
