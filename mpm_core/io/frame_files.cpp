@@ -9,8 +9,8 @@ namespace mpm
 {
 namespace
 {
-/// Values are gathered for one write up to about so many bytes, so that they are still in the cache when it comes.
-constexpr std::size_t most_waiting = 1 << 20;
+/// Files up to this length are put together in memory.
+constexpr std::int64_t longest_image = 1 << 22;
 
 bool are_alike(const std::vector<Dataset>& a, const std::vector<Dataset>& b)
 {
@@ -23,10 +23,13 @@ bool are_alike(const std::vector<Dataset>& a, const std::vector<Dataset>& b)
 }
 } // namespace
 
+FrameFiles::FrameFiles(MPI_Comm comm, int compression) : _comm(comm), _compression(compression), _image(comm)
+{
+  MPI_Comm_rank(_comm, &_rank);
+}
+
 void FrameFiles::begin(const std::filesystem::path& path, std::vector<Dataset> datasets)
 {
-  int rank = 0;
-  MPI_Comm_rank(_comm, &rank);
   const bool known = !_places.empty() && are_alike(datasets, _datasets);
   _path = path;
   _datasets = std::move(datasets);
@@ -37,26 +40,26 @@ void FrameFiles::begin(const std::filesystem::path& path, std::vector<Dataset> d
     return;
   }
   if (!known)
-  {
-    _places.clear();
-    Hdf5File file(_comm, _path);
-    std::vector<std::int64_t> places = file.make(_datasets);
-    file.close();
-    _places = std::move(places);
-    if (rank == 0)
-      read_tables();
-  }
+    make();
+  if (_imaged)
+    return;
   _file.emplace(_path, O_WRONLY | O_CREAT); // whichever rank comes first makes it
   note(_file->number() >= 0);
-  if (known)
-    for (const Piece& piece : _tables)
-      std::memcpy(room_at(piece.place, piece.bytes.size(), 1), piece.bytes.data(), piece.bytes.size());
+  for (const Table& table : _tables)
+    put(table.bytes.data(), table.bytes.size(), table.place);
 }
 
-void FrameFiles::note(bool succeeded)
+void FrameFiles::make()
 {
-  if (!succeeded && _failure.empty())
-    _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
+  _places.clear();
+  Hdf5File file(_comm, _path);
+  std::vector<std::int64_t> places = file.make(_datasets);
+  file.close();
+  _places = std::move(places);
+  if (_rank == 0)
+    read_tables();
+  MPI_Bcast(&_length, 1, MPI_INT64_T, 0, _comm);
+  _imaged = can_image();
 }
 
 void FrameFiles::read_tables()
@@ -66,8 +69,9 @@ void FrameFiles::read_tables()
     if (_places[k] >= 0)
       values.emplace_back(_places[k], _places[k] + _datasets[k].rows.total * _datasets[k].row_bytes());
   const Descriptor file(_path, O_RDONLY);
-  const std::int64_t length = ::lseek(file.number(), 0, SEEK_END);
-  values.emplace_back(length, length);
+  _length = ::lseek(file.number(), 0, SEEK_END);
+  note(_length >= 0);
+  values.emplace_back(_length, _length);
   std::ranges::sort(values);
   _tables.clear();
   std::int64_t from = 0;
@@ -75,66 +79,87 @@ void FrameFiles::read_tables()
   {
     if (first > from)
     {
-      Piece piece{from, std::string(static_cast<std::size_t>(first - from), '\0')};
-      note(file.get(piece.bytes.data(), piece.bytes.size(), from));
-      _tables.push_back(std::move(piece));
+      Table table{from, std::string(static_cast<std::size_t>(first - from), '\0')};
+      note(file.get(table.bytes.data(), table.bytes.size(), from));
+      _tables.push_back(std::move(table));
     }
     from = last;
   }
 }
 
+bool FrameFiles::can_image()
+{
+  bool aligned = true;
+  for (std::size_t k = 0; k < _places.size(); ++k)
+    aligned = aligned && (_places[k] < 0 || _places[k] % bytes_of(_datasets[k].number) == 0);
+  if (!aligned || _length < 0 || _length > longest_image || !_image.resize(static_cast<std::size_t>(_length)))
+    return false;
+  for (const Table& table : _tables)
+    std::memcpy(_image.data() + table.place, table.bytes.data(), table.bytes.size());
+  return true;
+}
+
 std::byte* FrameFiles::room()
 {
-  if (_compressed && _next > 0)
-    write_compressed();
-  const Dataset& dataset = _datasets[_next];
-  const std::int64_t place = _compressed ? 0 : _places[_next] + dataset.rows.before * dataset.row_bytes();
-  ++_next;
-  return room_at(place, dataset.local_bytes(), static_cast<std::size_t>(bytes_of(dataset.number)));
+  if (_next > 0)
+    put_values();
+  const Dataset& dataset = _datasets[_next++];
+  if (_imaged)
+    return _image.data() + std::max<std::int64_t>(0, _places[_next - 1]) + dataset.rows.before * dataset.row_bytes();
+  _values.resize(std::max(_values.size(), dataset.local_bytes()));
+  return _values.data();
 }
 
-std::byte* FrameFiles::room_at(std::int64_t place, std::size_t bytes, std::size_t alignment)
+void FrameFiles::put_values()
 {
-  const bool follows = place == _waiting_place + static_cast<std::int64_t>(_n_waiting);
-  if (_n_waiting > 0 && (!follows || _n_waiting > most_waiting || _n_waiting % alignment != 0))
-    put_waiting();
-  if (_n_waiting == 0)
-    _waiting_place = place;
-  const std::size_t first = std::exchange(_n_waiting, _n_waiting + bytes);
-  if (_waiting.size() < _n_waiting)
-    _waiting.resize(_n_waiting);
-  return _waiting.data() + first;
+  const Dataset& dataset = _datasets[_next - 1];
+  if (_compressed)
+    _compressed->write(dataset, _values.data());
+  else if (!_imaged)
+    put(_values.data(), dataset.local_bytes(), _places[_next - 1] + dataset.rows.before * dataset.row_bytes());
 }
 
-void FrameFiles::write_compressed()
+void FrameFiles::put(const void* bytes, std::size_t count, std::int64_t place)
 {
-  _compressed->write(_datasets[_next - 1], _waiting.data());
-  _n_waiting = 0;
+  if (count > 0 && _file->number() >= 0) // else it is known already
+    note(_file->put(bytes, count, place));
 }
 
-void FrameFiles::put_waiting()
+void FrameFiles::note(bool succeeded)
 {
-  if (_file->number() >= 0) // else it is known already
-    note(_file->put(_waiting.data(), _n_waiting, _waiting_place));
-  _n_waiting = 0;
+  if (!succeeded && _failure.empty())
+    _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
 }
 
-void FrameFiles::end()
+std::string FrameFiles::finish()
 {
+  if (_next > 0)
+    put_values();
   if (_compressed)
   {
-    if (_next > 0)
-      write_compressed();
     _compressed->close();
     _compressed.reset();
-    return;
+    return {};
   }
-  put_waiting();
+  if (_imaged)
+    _image.synchronise();
+  if (_imaged && _rank == 0)
+  {
+    _file.emplace(_path, O_WRONLY | O_CREAT);
+    note(_file->number() >= 0);
+    put(_image.data(), static_cast<std::size_t>(_length), 0);
+  }
   _file.reset();
-  const std::string failure = shared_failure(_comm, std::exchange(_failure, {}));
-  if (failure.empty())
+  std::string failure = std::exchange(_failure, {});
+  return _imaged ? failure : shared_failure(_comm, failure);
+}
+
+void FrameFiles::require_success(const std::string& failure)
+{
+  const std::string shared = shared_failure(_comm, failure);
+  if (shared.empty())
     return;
   _places.clear(); // nothing is to be built on a file that may have been read in part
-  throw RunError(failure);
+  throw RunError(shared);
 }
 } // namespace mpm

@@ -3,6 +3,7 @@
 /// Many HDF5 files that differ in their values only.
 
 #include "io/hdf5_file.h"
+#include "parallel/shared_memory.h"
 
 namespace mpm
 {
@@ -12,12 +13,16 @@ namespace mpm
 /// datasets is these tables with other values, without HDF5, whose work on a dozen datasets takes longer than writing
 /// the values of several thousand particles. Compressed files are all made by HDF5.
 ///
+/// Ranks of one machine put a small file together in memory, and the first one writes it: the system lets one rank at a
+/// time write into a file, and many small writes by turns take twice as long. Into other files each rank writes its own
+/// values.
+///
 /// Every function is collective.
 class FrameFiles
 {
 public:
   /// @param comm  must outlive the object
-  FrameFiles(MPI_Comm comm, int compression) : _comm(comm), _compression(compression) {}
+  FrameFiles(MPI_Comm comm, int compression);
 
   /// Starts a file; there must be none under that name.
   /// @throws RunError as `end` does
@@ -32,42 +37,60 @@ public:
   }
 
   /// Finishes the file, which is on disk when this returns.
+  /// @param then  done by the first rank once all values are written; gives what went wrong, or nothing
   /// @throws RunError on all ranks, with path and reason; the file is of no use then
-  void end();
+  template <class F>
+  void end(F&& then)
+  {
+    std::string failure = finish();
+    if (_rank == 0 && failure.empty())
+      failure = then();
+    require_success(failure);
+  }
+
+  /// Gives memory back; nothing can be written after that.
+  void close() { _image.free(); }
 
   MPI_Comm comm() const { return _comm; }
 
 private:
   /// Tables between values, or before or after them.
-  struct Piece
+  struct Table
   {
     std::int64_t place;
     std::string bytes;
   };
-  std::byte* room();
-  /// Room for bytes that belong to a place in the file; they wait until what comes next belongs elsewhere.
-  std::byte* room_at(std::int64_t place, std::size_t bytes, std::size_t alignment);
+  /// Has HDF5 make the file, and keeps its tables.
+  void make();
   /// Reads what HDF5 wrote into the present file.
   void read_tables();
+  /// Whether the file can be put together in memory; if so, the tables are there.
+  bool can_image();
+  std::byte* room();
+  /// Writes the values of the latest dataset.
+  void put_values();
+  void put(const void* bytes, std::size_t count, std::int64_t place);
+  /// Writes what is left.
+  /// @return what went wrong; the first rank knows if anything did on any
+  std::string finish();
+  void require_success(const std::string& failure);
   /// Takes note of what the system's last call could not do.
   void note(bool succeeded);
-  /// Writes the values that are waiting.
-  void put_waiting();
-  /// Writes the values of the latest dataset.
-  void write_compressed();
 
   MPI_Comm _comm;
+  int _rank = 0;
   int _compression;
   std::filesystem::path _path;
   std::vector<Dataset> _datasets;    ///< of the present file, and of the tables
   std::vector<std::int64_t> _places; ///< bytes of the file where their values begin; -1 for those without
-  std::vector<Piece> _tables;        ///< on the first rank
+  std::int64_t _length = 0;          ///< of the file, in bytes
+  std::vector<Table> _tables;        ///< on the first rank
   std::size_t _next = 0;             ///< dataset to be given values next
   std::optional<Hdf5File> _compressed;
   std::optional<Descriptor> _file;
-  std::vector<std::byte> _waiting; ///< values to be written together
-  std::size_t _n_waiting = 0;      ///< bytes
-  std::int64_t _waiting_place = 0; ///< where they belong
+  SharedMemory _image;            ///< the file
+  bool _imaged = false;           ///< this file is put together there
+  std::vector<std::byte> _values; ///< else, of the latest dataset
   std::string _failure;
 };
 } // namespace mpm

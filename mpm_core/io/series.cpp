@@ -198,31 +198,6 @@ XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows,
   return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, values});
 }
 
-void SeriesFile::write_parts()
-{
-  std::vector<Dataset> datasets;
-  for (const Part& part : _parts)
-    datasets.push_back(part.dataset);
-  _files.begin(_path, std::move(datasets));
-  for (const Part& part : _parts)
-    switch (part.dataset.number)
-    {
-    case Number::float32:
-      copy_columns(part.columns, part.dataset.width, _files.next<float>());
-      break;
-    case Number::float64:
-      copy_columns(part.columns, part.dataset.width, _files.next<double>());
-      break;
-    case Number::int32:
-      copy_numbers(part.whole, _files.next<std::int32_t>());
-      break;
-    case Number::int64:
-      copy_numbers(part.whole, _files.next<std::int64_t>());
-      break;
-    }
-  _files.end();
-}
-
 XdmfData SeriesFile::add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points)
 {
   XdmfData geometry = add_reals(points.name, rows, points.columns, 3);
@@ -259,11 +234,32 @@ void SeriesFile::add_index_fields(const char* center, const RowSlice& rows, cons
     add_field(field.name, center, add_integers(field.name, rows, 1, field.values));
 }
 
-void SeriesFile::write_file()
+template <class F>
+void SeriesFile::write_file(F&& then)
 {
   try
   {
-    write_parts();
+    std::vector<Dataset> datasets;
+    for (const Part& part : _parts)
+      datasets.push_back(part.dataset);
+    _files.begin(_path, std::move(datasets));
+    for (const Part& part : _parts)
+      switch (part.dataset.number)
+      {
+      case Number::float32:
+        copy_columns(part.columns, part.dataset.width, _files.next<float>());
+        break;
+      case Number::float64:
+        copy_columns(part.columns, part.dataset.width, _files.next<double>());
+        break;
+      case Number::int32:
+        copy_numbers(part.whole, _files.next<std::int32_t>());
+        break;
+      case Number::int64:
+        copy_numbers(part.whole, _files.next<std::int64_t>());
+        break;
+      }
+    _files.end(then);
   }
   catch (const RunError&)
   {
@@ -278,22 +274,22 @@ void SeriesFile::write_file()
 
 void SeriesFile::end_frame()
 {
-  write_file();
-  ++_n_frames;
   _description += end_of_frame;
-  on_first_rank([&] { return _xdmf.append(_description); });
+  write_file([&] { return _xdmf.append(_description); });
+  ++_n_frames;
 }
 
 void SeriesFile::end_single()
 {
-  write_file();
-  on_first_rank([&] { return _xdmf.write_single(_description); });
+  write_file([&] { return _xdmf.write_single(_description); });
 }
 
 void SeriesFile::close()
 {
-  if (!std::exchange(_closed, true))
-    on_first_rank([&] { return _xdmf.finish(); });
+  if (std::exchange(_closed, true))
+    return;
+  _files.close();
+  on_first_rank([&] { return _xdmf.finish(); });
 }
 
 template <class F>

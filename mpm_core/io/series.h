@@ -110,9 +110,9 @@ private:
   void begin(const std::string& file);
   XdmfData add(Part part);
   XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
-  /// Writes the present file; if that fails, it is removed.
-  void write_file();
-  void write_parts();
+  /// Writes the present file, and then has the first rank name it; if that fails, the file is removed.
+  template <class F>
+  void write_file(F&& then);
   /// Lets the first rank do something with files; what goes wrong is an error on all.
   template <class F>
   void on_first_rank(F&& work);

@@ -128,14 +128,20 @@ std::string XdmfSeries::append(const std::string& frame)
 {
   const std::size_t from = _end + open_end.size(), spaces = spaces_before_end(from + frame.size());
   const std::string addition = frame + std::string(spaces, ' ') + open_end;
-  _frames += frame;
   if (from + addition.size() > _room_end)
-    return rewrite(std::max(least_room, _frames.size()));
+  {
+    _frames += frame;
+    std::string failure = rewrite(std::max(least_room, _frames.size()));
+    if (!failure.empty())
+      _frames.resize(_frames.size() - frame.size());
+    return failure;
+  }
   errno = 0;
   const std::string blank(open_end.size(), ' ');
   if (!_file->put(addition.data(), addition.size(), static_cast<std::int64_t>(from)) ||
       !_file->put(blank.data(), blank.size(), static_cast<std::int64_t>(_end)))
     return "cannot write " + _path.string() + ": " + std::strerror(errno);
+  _frames += frame;
   _end = from + frame.size() + spaces;
   return {};
 }
@@ -149,12 +155,15 @@ std::string XdmfSeries::rewrite(std::size_t room)
   if (room == 0)
     return replaced_file(_path, text + series_end);
   text.append(spaces_before_end(text.size()), ' ');
-  _end = text.size();
+  const std::size_t end = text.size();
   text += open_end;
   text.append(room, ' ');
-  _room_end = text.size();
   std::string failure = replaced_file(_path, text + room_end);
+  if (!failure.empty())
+    return failure;
+  _end = end;
+  _room_end = text.size();
   _file.emplace(_path, O_WRONLY);
-  return failure;
+  return {};
 }
 } // namespace mpm

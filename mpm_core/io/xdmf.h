@@ -52,7 +52,7 @@ public:
   std::string write_without_frames() { return rewrite(0); }
   /// Writes one grid without time in place of the series.
   std::string write_single(const std::string& content);
-  /// Adds a frame, from `begin_of_frame` to `end_of_frame`.
+  /// Adds a frame, from `begin_of_frame` to `end_of_frame`; if that fails, all is as before.
   std::string append(const std::string& frame);
   /// Leaves the document without room behind it. Nothing is added after that.
   std::string finish();

@@ -11,11 +11,12 @@ import mpm_core as mpm
 from mpm_core import InputError, RunError
 
 
-def test_shares_are_stored_by_rising_rank(comm, shared_path):
-    # Rank r has r particles, so the first has none; in the second frame all have two, in the third none has any.
-    # In the last two there are as many as in the first, where other ranks have them, and the same again.
-    rising = list(range(comm.size))
-    counts = [rising, [2] * comm.size, [0] * comm.size, rising[::-1], rising]
+@pytest.mark.parametrize("some", [1, 200_000])  # in files that ranks put together in memory, and in longer ones
+def test_shares_are_stored_by_rising_rank(comm, shared_path, some):
+    # Rank r has r times some particles, so the first has none; in the second frame all have twice as many, in the third none has
+    # any. In the last two there are as many as in the first, where other ranks have them, and the same again.
+    rising = [some * rank for rank in range(comm.size)]
+    counts = [rising, [2 * some] * comm.size, [0] * comm.size, rising[::-1], rising]
     with ParticleOutput(shared_path / "particles", comm, float32=False) as output:
         for step, count in enumerate(counts):
             n = count[comm.rank]
@@ -23,7 +24,7 @@ def test_shares_are_stored_by_rising_rank(comm, shared_path):
             output.write(float(step), {"position": position, "id": 100 * comm.rank + np.arange(n)})
     for step, count in enumerate(counts):
         ranks = np.repeat(np.arange(comm.size), count)
-        numbers = [100 * rank + i for rank in range(comm.size) for i in range(count[rank])]
+        numbers = np.concatenate([100 * rank + np.arange(count[rank]) for rank in range(comm.size)])
         with h5py.File(shared_path / "particles" / f"00000{step}.h5") as file:
             np.testing.assert_array_equal(file["position"][:, 0], ranks)
             np.testing.assert_array_equal(file["id"][()], numbers)

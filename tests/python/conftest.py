@@ -7,14 +7,17 @@ import pytest
 
 
 @pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 600 kB."""
+def small_disk(tmp_path, request):
+    """A file system of 600 kB, or of the size that a test asks for."""
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = shutil.which("mount")
     if (
         mount is None
-        or subprocess.run([mount, "-t", "tmpfs", "-o", "size=600k", "tmpfs", disk], capture_output=True).returncode
+        or subprocess.run(
+            [mount, "-t", "tmpfs", "-o", f"size={getattr(request, 'param', '600k')}", "tmpfs", disk],
+            capture_output=True,
+        ).returncode
     ):
         pytest.skip("needs the right to mount a file system")
     yield disk

@@ -265,8 +265,9 @@ def test_what_an_earlier_series_left_is_removed(tmp_path):
     assert sorted(p.name for p in (tmp_path / "particles").iterdir()) == ["000000.h5", "000001.h5", "notes.txt"]
 
 
-def test_the_same_frames_make_the_same_files(tmp_path):
-    frames = [particle_fields(n, 2, seed=step) for step, n in enumerate((5, 5, 5, 4, 4))]
+@pytest.mark.parametrize("some", [1, 20_000])  # in files that are put together in memory, and in longer ones
+def test_the_same_frames_make_the_same_files(tmp_path, some):
+    frames = [particle_fields(n * some, 2, seed=step) for step, n in enumerate((5, 5, 5, 4, 4))]
     for name in ("a", "b"):
         with ParticleOutput(tmp_path / name, COMM) as output:
             for step, fields in enumerate(frames):
@@ -274,6 +275,9 @@ def test_the_same_frames_make_the_same_files(tmp_path):
     for step in range(len(frames)):
         one, other = (tmp_path / name / f"{step:06d}.h5" for name in ("a", "b"))
         assert one.read_bytes() == other.read_bytes()
+        with h5py.File(one) as file:
+            for name, values in stored(frames[step]).items():
+                np.testing.assert_array_equal(file[name][()], values.astype(file[name].dtype))
 
 
 def test_nothing_is_written_after_the_end(tmp_path):
@@ -289,8 +293,9 @@ def test_missing_folder_is_named(tmp_path):
         ParticleOutput(tmp_path / "nowhere" / "particles", COMM)
 
 
+@pytest.mark.parametrize("rows", [5000, 400_000])  # a file that is put together in memory, and a longer one
 @pytest.mark.parametrize("growing", [True, False])  # a file made by HDF5, or from the tables of the one before
-def test_a_file_that_cannot_be_written_is_named(tmp_path, growing):
+def test_a_file_that_cannot_be_written_is_named(tmp_path, growing, rows):
     # A limit on the size of files stands for a full disk, which a test cannot make without being root.
     script = f"""
 import resource, signal, sys
@@ -303,8 +308,8 @@ output = ParticleOutput({str(tmp_path / "particles")!r}, MPI.COMM_WORLD)
 try:
     for step in range(4):
         if step == 3:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
-        output.write(step, {{"position": np.zeros(({"5000 + step" if growing else "5000"}, 3))}})
+            resource.setrlimit(resource.RLIMIT_FSIZE, (10 * {rows}, 10 * {rows}))
+        output.write(step, {{"position": np.zeros(({f"{rows} + step" if growing else rows}, 3))}})
 except RunError as error:
     print(error)
     sys.exit(7)
@@ -316,13 +321,19 @@ except RunError as error:
     # What was written before is still there, and nothing in part.
     assert sorted(path.name for path in folder.iterdir()) == ["000000.h5", "000001.h5", "000002.h5"]
     with h5py.File(folder / "000002.h5") as file:
-        assert len(file["position"]) == (5002 if growing else 5000)
+        assert len(file["position"]) == (rows + 2 if growing else rows)
 
 
-@pytest.mark.parametrize("options", [{}, {"float32": False}, {"compression": 1}])
-def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, options):
+FULL_DISKS = [
+    ("600k", 2000, {}), ("600k", 2000, {"float32": False}), ("600k", 2000, {"compression": 1}), ("24M", 200_000, {})
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("small_disk, rows, options", FULL_DISKS, indirect=["small_disk"])
+def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, rows, options):
     rng = np.random.default_rng(0)
-    frames = [{"position": rng.random((2000, 2)), "velocity": rng.random((2000, 2))} for _ in range(40)]
+    n = 40 if rows == 2000 else 8
+    frames = [{"position": rng.random((rows, 2)), "velocity": rng.random((rows, 2))} for _ in range(n)]
     with ParticleOutput(small_disk / "particles", COMM, **options) as output:
         written = 0
         with pytest.raises(RunError, match=r"cannot write .*particles/.*\.h5: No space left on device"):
@@ -339,6 +350,24 @@ def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, options):
         with h5py.File(small_disk / "particles" / f"{number:06d}.h5") as file:
             expected = frames[min(number, written)]["velocity"]
             np.testing.assert_allclose(file["velocity"][:, :2], expected, rtol=2.0**-24)
+
+
+def test_a_description_that_cannot_be_renewed_leaves_all_as_it_was(tmp_path):
+    aside = tmp_path / "particles.xdmf.part"
+    step = 0
+    with ParticleOutput(tmp_path / "particles", COMM) as output:
+        output.write(0.0, particle_fields(4, 2))
+        aside.mkdir()
+        with pytest.raises(RunError, match=f"cannot write {aside}: Is a directory"):
+            for step in range(1, 200):
+                output.write(float(step), particle_fields(4, 2))
+        assert step > 3 and len(list((tmp_path / "particles").iterdir())) == step
+        aside.rmdir()
+        for later in (step, step + 1):
+            output.write(float(later), particle_fields(4, 2))
+    times = [float(t.get("Value")) for t in ElementTree.parse(tmp_path / "particles.xdmf").iter("Time")]
+    assert times == list(range(step + 2))
+    assert len(list((tmp_path / "particles").iterdir())) == step + 2
 
 
 GOOD = particle_fields(3, 2)
