@@ -12,6 +12,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from common.animation import Frame, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
@@ -128,9 +129,9 @@ class Files:
     def __enter__(self) -> Files:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: Any) -> None:
         for file in (self.particles, self.mesh, *self.probes):
-            file.close()
+            file.__exit__(*error)
 
 
 def slide(

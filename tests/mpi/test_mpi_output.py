@@ -101,6 +101,19 @@ def test_a_bad_field_on_one_rank_is_raised_on_all(comm, shared_path):
             output.write(0.0, {"position": np.zeros((2, 2)), "mass": np.zeros(3 if last else 2)})
 
 
+def test_an_error_on_one_rank_waits_for_no_other(comm, shared_path):
+    with ParticleOutput(shared_path / "particles", comm) as output:
+        output.write(0.0, {"position": np.zeros((2, 2))})
+        try:
+            with output:
+                if comm.rank == comm.size - 1:
+                    raise ArithmeticError
+                comm.barrier()  # whereas the last one is on its way out
+        except ArithmeticError:
+            comm.barrier()
+    assert (shared_path / "particles.xdmf").read_text().endswith("</Xdmf>\n")
+
+
 def test_different_names_are_refused_on_all_ranks(comm, shared_path):
     if comm.size == 1:
         pytest.skip("needs two ranks")

@@ -112,11 +112,29 @@ def test_bad_intervals_are_named(tmp_path, value):
     assert "expected a number of steps such as 500, or of minutes such as 5min" in result.stderr
 
 
-def test_an_error_that_nothing_catches_ends_all_ranks(tmp_path):
-    script = (
-        "import sys, time; from mpi4py import MPI; from studies.common.ranks import end_all_on_error\n"
-        "end_all_on_error()\nassert MPI.COMM_WORLD.rank == 0, 'this rank fails'\nMPI.COMM_WORLD.barrier()"
-    )
+BARE = """
+from mpi4py import MPI
+from studies.common.ranks import end_all_on_error
+end_all_on_error()
+assert MPI.COMM_WORLD.rank == 0, "this rank fails"
+MPI.COMM_WORLD.barrier()
+"""
+SLIDING = """
+import sys
+sys.path.insert(0, {studies!r})
+import slope
+add = slope.History.add
+def fail(history, time_s, **values):
+    assert time_s < 0.2 or slope.comm.rank == 0, "this rank fails"
+    add(history, time_s=time_s, **values)
+slope.History.add = fail
+slope.run_study(lambda: slope.main({options!r}))
+"""
+
+
+@pytest.mark.parametrize("script", [BARE, SLIDING], ids=["bare", "sliding"])  # in the latter files are open
+def test_an_error_that_nothing_catches_ends_all_ranks(tmp_path, script):
+    script = script.format(studies=str(STUDIES), options=[*SMALL, "--output", str(tmp_path / "slope")])
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     result = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", sys.executable, "-c", script],
                             capture_output=True, text=True, timeout=60, env={**os.environ, **root})  # fmt: skip

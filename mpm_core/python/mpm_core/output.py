@@ -60,6 +60,7 @@ class ParticleOutput:
     def __init__(
         self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
     ) -> None:
+        self._alone = comm.size == 1
         self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression))
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
@@ -108,7 +109,8 @@ class ParticleOutput:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None or self._alone:  # after an error other ranks may not come here; the files are good as they are
+            self.close()
 
 
 class MeshOutput:
@@ -144,6 +146,7 @@ class MeshOutput:
         fixed: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         points, cells, fields = collectively(comm, lambda: (*_checked_mesh(points, cells), _real_fields(fixed or {})))
+        self._alone = comm.size == 1
         self._series = _core.MeshSeries(
             MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells, fields
         )
@@ -194,7 +197,8 @@ class MeshOutput:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None or self._alone:  # after an error other ranks may not come here; the files are good as they are
+            self.close()
 
 
 def _tried(work: Callable[[], T], otherwise: T) -> tuple[T, str]:
