@@ -3,7 +3,7 @@
 /// Memory for arrays that are streamed through in every step.
 
 #include <cstddef>
-#include <cstdlib>
+#include <cstdint>
 #include <memory>
 #include <new>
 
@@ -34,22 +34,39 @@ struct HugePages
     const std::size_t bytes = n * sizeof(T);
     if (bytes < page)
       return std::allocator<T>().allocate(n);
-    void* const memory = std::aligned_alloc(page, (bytes + page - 1) / page * page);
-    if (!memory)
-      throw std::bad_alloc();
 #ifdef __linux__
+    // Not from the heap, which keeps what is freed: sorting takes such arrays for a moment.
+    void* const wide = mmap(nullptr, mapped(bytes) + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (wide == MAP_FAILED)
+      throw std::bad_alloc();
+    const auto begin = reinterpret_cast<std::uintptr_t>(wide);
+    const std::uintptr_t first = (begin + page - 1) / page * page;
+    char* const memory = static_cast<char*>(wide) + (first - begin);
+    if (first > begin)
+      munmap(wide, first - begin);
+    if (first < begin + page)
+      munmap(memory + mapped(bytes), begin + page - first);
     madvise(memory, bytes / page * page, MADV_HUGEPAGE); // what is left of the last page stays small
+    return reinterpret_cast<T*>(memory);
+#else
+    return std::allocator<T>().allocate(n);
 #endif
-    return static_cast<T*>(memory);
   }
 
   void deallocate(T* memory, std::size_t n)
   {
-    if (n * sizeof(T) < page)
-      std::allocator<T>().deallocate(memory, n);
-    else
-      std::free(memory);
+#ifdef __linux__
+    if (n * sizeof(T) >= page)
+    {
+      munmap(memory, mapped(n * sizeof(T)));
+      return;
+    }
+#endif
+    std::allocator<T>().deallocate(memory, n);
   }
+
+  /// Bytes of address space; those behind the array are never used.
+  static std::size_t mapped(std::size_t bytes) { return (bytes + page - 1) / page * page; }
 
   friend bool operator==(const HugePages&, const HugePages&) = default;
 };
