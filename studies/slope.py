@@ -39,7 +39,7 @@ from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope
 from common.summary import OutputError, results_folder, write_summary
 from common.watch import Watch
 from mpi4py import MPI
-from mpm_core.output import MeshOutput, ParticleOutput
+from mpm_core.output import PARTICLE_FIELDS, ModelOutput
 from mpm_core.probes import ParticleProbe, ProbeFile, SectionProbe, TotalsProbe
 
 import mpm_core as mpm
@@ -48,11 +48,6 @@ comm = MPI.COMM_WORLD
 COLUMNS = [
     "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unbalanced_ratio", "plastic_share", "dt_s"
 ]  # fmt: skip
-FIELDS = (
-    "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
-)  # fmt: skip
-
-
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
@@ -74,7 +69,7 @@ def parser() -> ArgumentParser:
     add_count(
         p, "--frame-steps", None, "steps between further times at which particles are stored, not drawn (default: none)"
     )
-    add_output_options(p, FIELDS)
+    add_output_options(p, PARTICLE_FIELDS)
     add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
                above=1)  # fmt: skip
     add_checkpoint_options(p)
@@ -102,15 +97,11 @@ class Files:
 
     def __init__(self, case: SlopeCase, folder: Path) -> None:
         self.model = case.model
-        self.start = mesh = case.model.mesh  # of which the files tell, however the mesh is cut later
         restarted = case.args.restart is not None
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
         a = case.args
-        self.names = a.fields.split(",")
-        self.particles = ParticleOutput(particles, comm, not a.float64, a.compression)
-        own = slice(mesh.owned_cells)
-        self.mesh = MeshOutput(
-            background, comm, mesh.points, mesh.cells[own], not a.float64, a.compression, {"tag": mesh.cell_tags[own]}
+        self.frames = ModelOutput(
+            self.model, particles, background, a.fields.split(","), float32=not a.float64, compression=a.compression
         )
         probes = {
             "crest": ParticleProbe(self.model, [(a.crest, a.height)]), "totals": TotalsProbe(self.model),
@@ -118,11 +109,9 @@ class Files:
         }  # fmt: skip
         self.probes = [ProbeFile(folder / f"{name}.csv", probe, keep=restarted) for name, probe in probes.items()]
 
-    def write(self, time: float) -> None:
+    def write(self) -> None:
         """Add a frame. Collective."""
-        pore = {PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else None
-        self.particles.write_particles(time, self.model.particles, self.names, pore)
-        self.mesh.write_nodes(time, self.model, ("mass", "velocity", "internal_force"), self.start)
+        self.frames.write({PORE: self.model.state(PORE)} if has_pore_pressure(self.model) else None)
         for probe in self.probes:
             probe.record()
 
@@ -130,7 +119,7 @@ class Files:
         return self
 
     def __exit__(self, *error: Any) -> None:
-        for file in (self.particles, self.mesh, *self.probes):
+        for file in (self.frames, *self.probes):
             file.__exit__(*error)
 
 
@@ -151,7 +140,7 @@ def slide(
             unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share,
             dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
-        files.write(report.time)
+        files.write()
         reached = math.floor(report.time * a.frames / a.time + 1e-6)
         if reached > drawn or interrupt.requested():
             watch.keep(report.time)

@@ -23,7 +23,8 @@ bool are_alike(const std::vector<Dataset>& a, const std::vector<Dataset>& b)
 }
 } // namespace
 
-FrameFiles::FrameFiles(MPI_Comm comm, int compression) : _comm(comm), _compression(compression), _image(comm)
+FrameFiles::FrameFiles(MPI_Comm comm, int compression, int writer)
+    : _comm(comm), _writer(writer), _compression(compression), _image(comm)
 {
   MPI_Comm_rank(_comm, &_rank);
 }
@@ -58,6 +59,8 @@ void FrameFiles::make()
   _places = std::move(places);
   if (_rank == 0)
     read_tables();
+  if (const std::string failure = shared_failure(_comm, _failure); !failure.empty())
+    throw RunError(failure);
   MPI_Bcast(&_length, 1, MPI_INT64_T, 0, _comm);
   _imaged = can_image();
 }
@@ -131,7 +134,7 @@ void FrameFiles::note(bool succeeded)
     _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
 }
 
-std::string FrameFiles::finish()
+void FrameFiles::complete()
 {
   if (_next > 0)
     put_values();
@@ -139,27 +142,33 @@ std::string FrameFiles::finish()
   {
     _compressed->close();
     _compressed.reset();
-    return {};
   }
-  if (_imaged)
+  else if (_imaged)
     _image.synchronise();
-  if (_imaged && _rank == 0)
+  else
+  {
+    _file.reset();
+    _failure = shared_failure(_comm, _failure);
+  }
+}
+
+std::string FrameFiles::write()
+{
+  if (_imaged && is_writer())
   {
     _file.emplace(_path, O_WRONLY | O_CREAT);
     note(_file->number() >= 0);
     put(_image.data(), static_cast<std::size_t>(_length), 0);
+    _file.reset();
   }
-  _file.reset();
-  std::string failure = std::exchange(_failure, {});
-  return _imaged ? failure : shared_failure(_comm, failure);
+  return std::exchange(_failure, {});
 }
 
-void FrameFiles::require_success(const std::string& failure)
+void FrameFiles::forget()
 {
-  const std::string shared = shared_failure(_comm, failure);
-  if (shared.empty())
-    return;
-  _places.clear(); // nothing is to be built on a file that may have been read in part
-  throw RunError(shared);
+  _places.clear();
+  _failure.clear();
+  _file.reset();
+  _compressed.reset();
 }
 } // namespace mpm

@@ -13,19 +13,20 @@ namespace mpm
 /// datasets is these tables with other values, without HDF5, whose work on a dozen datasets takes longer than writing
 /// the values of several thousand particles. Compressed files are all made by HDF5.
 ///
-/// Ranks of one machine put a small file together in memory, and the first one writes it: the system lets one rank at a
+/// Ranks of one machine put a small file together in memory, and one of them writes it: the system lets one rank at a
 /// time write into a file, and many small writes by turns take twice as long. Into other files each rank writes its own
 /// values.
 ///
-/// Every function is collective.
+/// Functions are collective unless they say otherwise.
 class FrameFiles
 {
 public:
-  /// @param comm  must outlive the object
-  FrameFiles(MPI_Comm comm, int compression);
+  /// @param comm    must outlive the object
+  /// @param writer  the rank that writes files which ranks put together
+  FrameFiles(MPI_Comm comm, int compression, int writer);
 
   /// Starts a file; there must be none under that name.
-  /// @throws RunError as `end` does
+  /// @throws RunError on all ranks, with path and reason; the file is of no use then
   void begin(const std::filesystem::path& path, std::vector<Dataset> datasets);
 
   /// Room for this rank's values of the next dataset, in the order given to `begin`, (rows.local, width) row-major; to
@@ -36,22 +37,22 @@ public:
     return {reinterpret_cast<T*>(room()), _datasets[_next - 1].local_bytes() / sizeof(T)};
   }
 
-  /// Finishes the file, which is on disk when this returns.
-  /// @param then  done by the first rank once all values are written; gives what went wrong, or nothing
-  /// @throws RunError on all ranks, with path and reason; the file is of no use then
-  template <class F>
-  void end(F&& then)
-  {
-    std::string failure = finish();
-    if (_rank == 0 && failure.empty())
-      failure = then();
-    require_success(failure);
-  }
+  /// Waits until all ranks have given all values; then the file is written, or it is there for the writer to write.
+  /// @throws RunError as `begin` does, if the file is compressed
+  void complete();
+
+  /// Writes the file, where that is still to be done; it is on disk when this returns on the writer. Not collective.
+  /// @return what went wrong; empty if nothing did
+  std::string write();
+
+  /// Is to be called after a failure: what the present file consists of must not be built on.
+  void forget();
 
   /// Gives memory back; nothing can be written after that.
   void close() { _image.free(); }
 
   MPI_Comm comm() const { return _comm; }
+  bool is_writer() const { return _rank == _writer; }
 
 private:
   /// Tables between values, or before or after them.
@@ -70,15 +71,12 @@ private:
   /// Writes the values of the latest dataset.
   void put_values();
   void put(const void* bytes, std::size_t count, std::int64_t place);
-  /// Writes what is left.
-  /// @return what went wrong; the first rank knows if anything did on any
-  std::string finish();
-  void require_success(const std::string& failure);
   /// Takes note of what the system's last call could not do.
   void note(bool succeeded);
 
   MPI_Comm _comm;
   int _rank = 0;
+  int _writer;
   int _compression;
   std::filesystem::path _path;
   std::vector<Dataset> _datasets;    ///< of the present file, and of the tables

@@ -7,14 +7,7 @@
 
 namespace mpm
 {
-/// What a frame of particles consists of. The fields point into the particles' columns.
-struct ParticleFields
-{
-  OutputField position;
-  std::vector<OutputField> fields;
-  std::vector<OutputIndexField> index_fields;
-};
-
+/// Fields that point into the particles' columns.
 /// @param names  columns of the particles, `displacement` (position minus initial position) or `plastic_strain` (the
 ///               first state variable); the position is there anyway
 /// @throws InputError for a field that there is not

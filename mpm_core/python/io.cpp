@@ -43,22 +43,7 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
   return output;
 }
 
-/// Writes fields of a model's particles from where they are, and further ones.
-template <int D>
-void write_particles(ParticleSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
-                     const RealFields& more, const IntegerFields& more_integers, std::string failure)
-{
-  ParticleFields all;
-  if (failure.empty())
-    failure = input_error_of([&] { all = particle_fields<D>(model.particles, names); });
-  for (OutputField& field : output_fields(more))
-    all.fields.push_back(std::move(field));
-  for (OutputIndexField& field : output_fields(more_integers))
-    all.index_fields.push_back(std::move(field));
-  series.write(time, all.position, all.fields, all.index_fields, failure);
-}
-
-/// Nodal fields of a model by name
+/// Nodal fields of a model by name.
 template <int D>
 std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<std::string>& names)
 {
@@ -68,37 +53,82 @@ std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<s
   return fields;
 }
 
-/// Writes nodal fields of a model from where they are, or from where they are carried to.
-/// @param carrier  to the nodes of the mesh as it is written; null if the model's is cut in the same way
-template <int D>
-void write_nodes(MeshSeries& series, double time, const Model<D>& model, const std::vector<std::string>& names,
-                 RowCarrier* carrier)
+/// Has fields take their values from where they are carried to.
+void carry(RowCarrier& carrier, std::vector<OutputField>& fields)
 {
-  std::vector<OutputField> fields;
-  std::string failure = input_error_of([&] { fields = nodal_fields(model, names); });
-  if (carrier)
-    failure = shared_failure(series.comm(), failure);
-  if (carrier && failure.empty())
+  std::vector<OutputColumn> columns;
+  for (const OutputField& field : fields)
+    columns.insert(columns.end(), field.columns.begin(), field.columns.end());
+  const std::size_t width = columns.size();
+  const double* first = carrier
+                            .carry(width,
+                                   [&](std::size_t row, double* to)
+                                   {
+                                     for (const OutputColumn& column : columns)
+                                       *to++ = column.first[row * column.stride];
+                                   })
+                            .data();
+  for (OutputField& field : fields)
   {
-    std::vector<OutputColumn> columns;
-    for (const OutputField& field : fields)
-      columns.insert(columns.end(), field.columns.begin(), field.columns.end());
-    const std::size_t width = columns.size();
-    const std::span<const double> rows = carrier->carry(width,
-                                                        [&](std::size_t row, double* to)
-                                                        {
-                                                          for (const OutputColumn& column : columns)
-                                                            *to++ = column.first[row * column.stride];
-                                                        });
-    const double* first = rows.data();
-    for (OutputField& field : fields)
-    {
-      field.rows = carrier->n_wanted();
-      for (OutputColumn& column : field.columns)
-        column = {first++, width};
-    }
+    field.rows = carrier.n_wanted();
+    for (OutputColumn& column : field.columns)
+      column = {first++, width};
   }
-  series.write(time, fields, {}, failure);
+}
+
+/// What a model's frames consist of; the same on all ranks.
+struct ModelFields
+{
+  std::vector<std::string> particles, nodes;
+};
+
+/// @throws InputError on all ranks for a field that does not exist, or names that are not the same on all
+template <int D>
+ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector<std::string> particles,
+                         std::vector<std::string> nodes)
+{
+  ModelFields names{std::move(particles), std::move(nodes)};
+  const std::string error = input_error_of(
+      [&]
+      {
+        particle_fields<D>(model.particles, names.particles);
+        std::ranges::for_each(names.nodes, require_nodal_field);
+      });
+  std::string text;
+  for (const std::string& name : names.particles)
+    text += name + ",";
+  text += ";";
+  for (const std::string& name : names.nodes)
+    text += name + ",";
+  require_same_fields(communicator(comm), error, text);
+  return names;
+}
+
+/// Writes fields of a model from where they are.
+/// @param particles  null if none are written
+/// @param more       further fields of the particles
+/// @param mesh       null if it is not written
+/// @param carrier    to the nodes of the mesh as it is written; null if the model's is cut in the same way
+template <int D>
+void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& names, ParticleSeries* particles,
+                 const RealFields& more, const IntegerFields& more_integers, MeshSeries* mesh, RowCarrier* carrier,
+                 std::string failure)
+{
+  Frame frame{.time = model.time, .particles = particles, .mesh = mesh, .failure = std::move(failure)};
+  if (mesh)
+  {
+    frame.mesh_fields.nodes = nodal_fields(model, names.nodes); // raises errors on all ranks or on none
+    if (carrier)
+      carry(*carrier, frame.mesh_fields.nodes);
+  }
+  if (particles && frame.failure.empty())
+    frame.failure =
+        input_error_of([&] { frame.particle_fields = particle_fields<D>(model.particles, names.particles); });
+  for (OutputField& field : output_fields(more))
+    frame.particle_fields.fields.push_back(std::move(field));
+  for (OutputIndexField& field : output_fields(more_integers))
+    frame.particle_fields.index_fields.push_back(std::move(field));
+  write(communicator(comm), frame);
 }
 } // namespace
 
@@ -127,13 +157,15 @@ void bind_io(py::module_& m)
           [](ParticleSeries& series, double time, const RealArray& position, const RealFields& fields,
              const IntegerFields& index_fields, const std::string& failure)
           {
-            series.write(time, row_field("position", values<double>(position), width(position)), output_fields(fields),
-                         output_fields(index_fields), failure);
+            write(series.file().comm(),
+                  {.time = time,
+                   .particles = &series,
+                   .particle_fields = {row_field("position", values<double>(position), width(position)),
+                                       output_fields(fields), output_fields(index_fields)},
+                   .failure = failure});
           },
           py::arg("time"), py::arg("position"), py::arg("fields"), py::arg("index_fields"), py::arg("failure"))
-      .def("write_particles", &write_particles<2>)
-      .def("write_particles", &write_particles<3>)
-      .def("close", &ParticleSeries::close);
+      .def("close", [](ParticleSeries& series) { series.file().close(); });
 
   py::class_<MeshSeries>(m, "MeshSeries")
       .def(py::init(
@@ -150,10 +182,19 @@ void bind_io(py::module_& m)
           "write",
           [](MeshSeries& series, double time, const RealFields& node_fields, const RealFields& cell_fields,
              const std::string& failure)
-          { series.write(time, output_fields(node_fields), output_fields(cell_fields), failure); },
+          {
+            write(series.file().comm(), {.time = time,
+                                         .mesh = &series,
+                                         .mesh_fields = {output_fields(node_fields), output_fields(cell_fields)},
+                                         .failure = failure});
+          },
           py::arg("time"), py::arg("node_fields"), py::arg("cell_fields"), py::arg("failure"))
-      .def("write_nodes", &write_nodes<2>)
-      .def("write_nodes", &write_nodes<3>)
-      .def("close", &MeshSeries::close);
+      .def("close", [](MeshSeries& series) { series.file().close(); });
+
+  py::class_<ModelFields>(m, "ModelFields");
+  m.def("model_fields", &model_fields<2>);
+  m.def("model_fields", &model_fields<3>);
+  m.def("write_model", &write_model<2>);
+  m.def("write_model", &write_model<3>);
 }
 } // namespace mpm::python

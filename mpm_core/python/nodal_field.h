@@ -15,11 +15,21 @@ const auto& first_of(const Values& values)
   return values.empty() ? none : values[0];
 }
 
-/// A nodal field of the last step, where it is: `velocity`, `acceleration`, `internal_force` or `mass`.
-/// @throws InputError before the first step, or for another name
+/// @throws InputError for a name that no nodal field has
+inline void require_nodal_field(const std::string& name)
+{
+  for (const char* known : {"velocity", "acceleration", "internal_force", "mass"})
+    if (name == known)
+      return;
+  throw InputError("nodal field is '" + name + "', expected velocity, acceleration, internal_force or mass");
+}
+
+/// A nodal field of the last step, where it is.
+/// @throws InputError for another name than those above, and before the first step
 template <int D>
 OutputField nodal_field(const Model<D>& model, const std::string& name)
 {
+  require_nodal_field(name);
   const auto& work = model.work;
   if (!work.ready)
     throw InputError("nodal values of '" + name + "' are there only after a step");
@@ -36,10 +46,8 @@ OutputField nodal_field(const Model<D>& model, const std::string& name)
     add(first_of(work.acceleration)[0], D, sizeof(Vector<D>));
   else if (name == "internal_force")
     add(first_of(work.nodes).internal[0], D, sizeof(NodeSums<D>));
-  else if (name == "mass")
-    add(first_of(work.nodes).mass, 1, sizeof(NodeSums<D>));
   else
-    throw InputError("nodal field is '" + name + "', expected velocity, acceleration, internal_force or mass");
+    add(first_of(work.nodes).mass, 1, sizeof(NodeSums<D>));
   return field;
 }
 } // namespace mpm::python

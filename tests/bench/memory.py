@@ -16,8 +16,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from mpi4py import MPI
-from mpm_core.output import ParticleOutput
-from output import FIELDS
+from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -49,14 +48,14 @@ def slope(cell_size: float) -> mpm.Model:
 
 def measured(model: mpm.Model, steps: int, every: int) -> tuple[np.ndarray, float]:
     """Rows of steps done and memory of each rank [MB]; and the processor time of all ranks [s]. Collective."""
-    p, rows = model.particles, []
+    rows = []
     started = time.process_time()
     with tempfile.TemporaryDirectory() as name:
-        with ParticleOutput(Path(comm.bcast(name)) / "particles", comm) as output:
-            output.write_particles(0.0, p, FIELDS)
+        with ModelOutput(model, Path(comm.bcast(name)) / "particles") as output:
+            output.write()
             for report in model.explicit(1e9, every_steps=every, damping=0.75):
                 if report.steps % FRAME == 0:
-                    output.write_particles(report.time, p, FIELDS)
+                    output.write()
                 rows.append([report.steps, *comm.allgather(resident_memory())])
                 if report.steps >= steps:
                     break

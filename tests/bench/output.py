@@ -15,12 +15,10 @@ from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.output import MeshOutput, ParticleOutput
+from mpm_core.output import ModelOutput
 from ranks import sliding_slope
 
 COMM = MPI.COMM_WORLD
-
-FIELDS = ("displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material")
 
 BYTES = 78
 """What a frame in single precision takes for each particle."""
@@ -34,7 +32,6 @@ ROUNDS = 3
 def measured(size: float, every: int, frames: int, folder: Path, options: dict[str, object]) -> dict[str, float]:
     """Seconds that steps, frames and checkpoints take, and the bytes of a frame."""
     model, n = sliding_slope(size)
-    mesh, p = model.mesh, model.particles
     plain = np.ones(BYTES * n // COMM.size // 8)
     spent = dict.fromkeys(("steps", "frames", "plain", "checkpoint"), 0.0)
     start = perf_counter()
@@ -45,19 +42,15 @@ def measured(size: float, every: int, frames: int, folder: Path, options: dict[s
         spent[what] += perf_counter() - start
         start = perf_counter()
 
-    with (
-        ParticleOutput(folder / "particles", COMM, **options) as particles,
-        MeshOutput(folder / "mesh", COMM, mesh.points, mesh.cells, **options) as nodes,
-    ):
+    with ModelOutput(model, folder / "particles", folder / "mesh", **options) as output:
         run = model.explicit(1e9, every_steps=every, damping=0.75)
         next(run)
         COMM.barrier()
         start = perf_counter()
         for frame in range(frames):
-            report = next(run)
+            next(run)
             lap("steps")
-            particles.write_particles(report.time, p, FIELDS)
-            nodes.write_nodes(report.time, model, ("mass", "velocity", "internal_force"))
+            output.write()
             lap("frames")
             with open(folder / f"plain-{COMM.rank}-{frame}", "wb", buffering=0) as file:
                 file.write(plain)

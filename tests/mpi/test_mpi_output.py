@@ -4,7 +4,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from mpm_core.output import MeshOutput, ParticleOutput
+from mpm_core.output import MeshOutput, ModelOutput, ParticleOutput
 from partitions import one_does_all, scattered, spread_box
 
 import mpm_core as mpm
@@ -40,23 +40,99 @@ def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path,
     model.seed(density=2000.0, per_cell=1)
     model.set_gravity((0, -9.81, 0)[:dim])
     *_, report = model.explicit(0.01)
-    p = model.particles
+    p, own = model.particles, slice(mesh.owned_cells)
     names = ["displacement", "velocity", "stress", "state", "plastic_strain", "volume", "id", "material", "cell"]
     more = {"pore": 2.0 * p.volume, "number": 3 * p.id}
-    with ParticleOutput(shared_path / "a", comm, float32) as output:
-        output.write(0.0, {name: getattr(p, name) for name in ("position", *names)} | more)
-    with ParticleOutput(shared_path / "b", comm, float32) as output:
-        output.write_particles(0.0, p, names, more)
-        with pytest.raises(InputError, match="particle field is 'weight', which does not exist"):
-            output.write_particles(0.0, p, ["weight"])
-        with pytest.raises(InputError, match="'traction', but no particle carries one"):
-            output.write_particles(0.0, p, ["traction"])
-    with h5py.File(shared_path / "a/000000.h5") as one, h5py.File(shared_path / "b/000000.h5") as other:
-        assert set(one) == set(other) and len(one["id"]) == report.particles > 0
-        for name, values in one.items():
-            assert values.dtype == other[name].dtype
-            np.testing.assert_array_equal(values[()], other[name][()], err_msg=name)
-        assert np.abs(one["displacement"][:, 1]).max() > 0
+    nodal = ["internal_force", "acceleration"]
+    for folder in ("copies", "model"):
+        (shared_path / folder).mkdir(exist_ok=True)
+    with (
+        ParticleOutput(shared_path / "copies/particles", comm, float32) as particles,
+        MeshOutput(
+            shared_path / "copies/mesh", comm, mesh.points, mesh.cells[own], float32, fixed={"tag": mesh.cell_tags[own]}
+        ) as nodes,
+    ):
+        particles.write(report.time, {name: getattr(p, name) for name in ("position", *names)} | more)
+        nodes.write(report.time, {name: model.nodal(name) for name in nodal})
+    with ModelOutput(
+        model, shared_path / "model/particles", shared_path / "model/mesh", names, nodal, float32
+    ) as output:
+        output.write(more)
+    for series in ("particles", "mesh"):
+        texts = [(shared_path / folder / f"{series}.xdmf").read_text() for folder in ("copies", "model")]
+        assert texts[0] == texts[1]
+        files = [f"{series}/{name}.h5" for name in ("000000", "mesh")[: 1 if series == "particles" else 2]]
+        for name in files:
+            with h5py.File(shared_path / "copies" / name) as one, h5py.File(shared_path / "model" / name) as other:
+                assert set(one) == set(other)
+                for field, values in one.items():
+                    assert values.dtype == other[field].dtype
+                    np.testing.assert_array_equal(values[()], other[field][()], err_msg=field)
+    with h5py.File(shared_path / "model/particles/000000.h5") as file:
+        assert len(file["id"]) == report.particles > 0 and np.abs(file["displacement"][:, 1]).max() > 0
+
+
+def small_model(comm):
+    model = mpm.Model(spread_box((4, 2), (2.0, 1.0), comm), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=1)
+    return model
+
+
+def test_wrong_fields_of_a_model_are_named_before_files_are_made(comm, shared_path):
+    model = small_model(comm)
+    particles, mesh = shared_path / "particles", shared_path / "mesh"
+    wrong = [
+        ({}, "particles and mesh are None, expected a path for one of them at least"),
+        ({"particles": particles, "particle_fields": ["weight"]}, "particle field is 'weight', which does not exist"),
+        ({"particles": particles, "particle_fields": ["traction"]}, "'traction', but no particle carries one"),
+        ({"mesh": mesh, "nodal_fields": ["weight"]}, "nodal field is 'weight', expected velocity"),
+    ]
+    if comm.size > 1:
+        names = ["mass"] if comm.rank == 0 else ["velocity"]
+        wrong.append(
+            ({"mesh": mesh, "nodal_fields": names}, "fields are not the same on all ranks; here: .*;" + names[0])
+        )
+    for arguments, message in wrong:
+        with pytest.raises(InputError, match=message):
+            ModelOutput(model, **arguments)
+    comm.barrier()
+    assert not list(shared_path.iterdir())
+
+
+def test_a_further_field_of_wrong_length_on_one_rank_is_raised_on_all(comm, shared_path):
+    model = small_model(comm)
+    with ModelOutput(model, shared_path / "particles") as output:
+        with pytest.raises(InputError, match="pore has [0-9]+ rows, expected"):
+            output.write({"pore": np.zeros(len(model.particles) + (comm.rank == comm.size - 1))})
+        output.write({"pore": np.zeros(len(model.particles))})
+
+
+@pytest.mark.parametrize("refused, other", [("particles", "mesh"), ("mesh", "particles")])
+@pytest.mark.parametrize("compression", [0, 1])
+def test_a_model_is_written_on_after_one_of_its_files_could_not_be(comm, shared_path, refused, other, compression):
+    model = small_model(comm)
+    model.set_gravity((0.0, -9.81))
+    with ModelOutput(model, shared_path / "particles", shared_path / "mesh", compression=compression) as output:
+        for step in range(4):
+            list(model.explicit(0.01 * (step + 1)))
+            if step == 2:  # a folder in the place of the file
+                if comm.rank == 0:
+                    (shared_path / refused / "000002.h5").mkdir()
+                comm.barrier()
+                with pytest.raises(RunError, match=f"cannot (write|create) .*/{refused}/000002.h5"):
+                    output.write()
+            else:
+                output.write()
+    for series in (refused, other):
+        with meshio.xdmf.TimeSeriesReader(shared_path / f"{series}.xdmf") as reader:
+            reader.read_points_cells()
+            read = [reader.read_data(k) for k in range(reader.num_steps)]
+        times = [time for time, *_ in read]
+        # A compressed file fails before any is named, so that neither has this frame.
+        expected = [0.01, 0.02, 0.04] if series == refused or compression else [0.01, 0.02, 0.03, 0.04]
+        np.testing.assert_allclose(times, expected)
+        for time, data, _ in read:  # free fall
+            assert data["velocity"][:, 1].min() == pytest.approx(-9.81 * time, rel=1e-5)
 
 
 @pytest.mark.parametrize("compression", [1, 9])

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
-from mpm_core.output import MeshOutput
+from mpm_core.output import MeshOutput, ModelOutput
 from mpm_core.partition import PARTICLE_WEIGHT, redistributed, take_partition
 from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
 
@@ -180,12 +180,10 @@ def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_
         MeshOutput(
             shared_path / "copies", comm, start.points, start.cells[: start.owned_cells], float32=False
         ) as copies,
-        MeshOutput(
-            shared_path / "model", comm, start.points, start.cells[: start.owned_cells], float32=False
-        ) as output,
+        ModelOutput(model, mesh=shared_path / "model", nodal_fields=names, float32=False) as output,
     ):
         with pytest.raises(mpm.InputError, match="'mass' are there only after a step"):
-            output.write_nodes(0.0, model, names)
+            output.write()
         everything = np.arange(start.cell_numbers)
         cuts = (
             lambda: None,
@@ -196,10 +194,8 @@ def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_
             cut()
             *_, report = model.explicit(model.time + 0.05)
             copies.write(report.time, {name: start.nodal_of(model.mesh, model.nodal(name)) for name in names})
-            output.write_nodes(report.time, model, names, start)
+            output.write()
             assert comm.size == 1 or (model.mesh is start) == (cut is cuts[0])
-            with pytest.raises(mpm.InputError, match="nodal field is 'weight', expected velocity"):
-                output.write_nodes(report.time, model, ["weight"], start)
     for frame in ("000000.h5", "000001.h5", "000002.h5"):
         with h5py.File(shared_path / "copies" / frame) as one, h5py.File(shared_path / "model" / frame) as other:
             assert set(one) == set(other) == set(names)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -23,12 +23,18 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .collective import collectively
-from .mesh import Mesh
 from .model import Model
-from .particles import Particles
 
 T = TypeVar("T")
 Fields = list[tuple[str, np.ndarray]]
+
+PARTICLE_FIELDS = (
+    "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
+)  # fmt: skip
+"""What is told of a model's particles, beside the position, where nothing else is asked for."""
+
+NODAL_FIELDS = ("mass", "velocity", "internal_force")
+"""What is told of its nodes."""
 
 # What a rank hands over whose fields are refused.
 NO_FIELDS: tuple[Fields, Fields] = ([], [])
@@ -80,24 +86,6 @@ class ParticleOutput:
         """
         found, failure = _tried(lambda: _particle_fields(fields), NO_PARTICLES)
         self._series.write(float(time), *found, failure)
-
-    def write_particles(
-        self, time: float, particles: Particles, names: Sequence[str], more: Mapping[str, np.ndarray] | None = None
-    ) -> None:
-        """Write a frame of fields of a model's particles, as ``write`` does but without copies of them.
-
-        Args:
-            time: s.
-            particles: of a model.
-            names: attributes of ``particles``, such as ``velocity``; the position is always written.
-            more: further fields by name, one row per particle.
-
-        Raises:
-            InputError: a field that does not exist, or of another length.
-            RunError: the frame cannot be written.
-        """
-        further, failure = _tried(lambda: _split_fields(more or {}), NO_FIELDS)
-        self._series.write_particles(float(time), particles._core, list(names), *further, failure)
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
@@ -171,22 +159,6 @@ class MeshOutput:
         found, failure = _tried(lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {})), NO_FIELDS)
         self._series.write(float(time), *found, failure)
 
-    def write_nodes(self, time: float, model: Model, names: Sequence[str], mesh: Mesh | None = None) -> None:
-        """Write a frame of nodal fields of a model's last step, as ``write`` does but without copies of them.
-
-        Args:
-            time: s.
-            model: one whose mesh has the points of this output.
-            names: of nodal fields, as ``Model.nodal`` gives them.
-            mesh: the one that this output was made of, where that of the model may have been cut anew since.
-
-        Raises:
-            InputError: a field that does not exist, or no step was taken yet.
-            RunError: the frame cannot be written.
-        """
-        carrier = None if mesh is None or mesh is model.mesh else mesh._carrier_from(model.mesh)
-        self._series.write_nodes(float(time), model._core, list(names), carrier)
-
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
         self._series.close()
@@ -199,6 +171,96 @@ class MeshOutput:
     ) -> None:
         if kind is None or self._alone:  # after an error other ranks may not come here; the files are good as they are
             self.close()
+
+
+class ModelOutput:
+    """Frames of a model's particles and of nodal fields on its background mesh; a context manager.
+
+    Values are written from where they are, without copies, and particles and mesh at the same time, by different ranks.
+
+    Example:
+        >>> with ModelOutput(model, "results/particles", "results/mesh") as output:
+        ...     for report in model.explicit(1.0, every_steps=100):
+        ...         output.write()
+
+    Args:
+        model: whose particles and nodes are written. Its mesh may be cut anew later; the nodes are written as they are now.
+        particles: path of the files of particles, as for `ParticleOutput`; None if none are to be written.
+        mesh: path of the files of the mesh, as for `MeshOutput`, with the tags of cells as the field ``tag``; None if it is not to
+            be written.
+        particle_fields: attributes of ``model.particles``, such as ``velocity``, and ``displacement``, ``plastic_strain``; the
+            position is always written.
+        nodal_fields: as ``Model.nodal`` gives them.
+        float32: store real numbers in single precision; in double precision if false.
+        compression: level of deflate, 1 to 9; 0 stores values as they are.
+
+    Raises:
+        InputError: neither path is given, or a field does not exist or is not the same on all ranks.
+        RunError: on all ranks, with path and reason, when the files cannot be written.
+
+    Note:
+        Collective: construction, ``write`` and ``close`` are called by all ranks.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        particles: str | os.PathLike[str] | None = None,
+        mesh: str | os.PathLike[str] | None = None,
+        particle_fields: Sequence[str] = PARTICLE_FIELDS,
+        nodal_fields: Sequence[str] = NODAL_FIELDS,
+        float32: bool = True,
+        compression: int = 0,
+    ) -> None:
+        if particles is None and mesh is None:
+            raise InputError("particles and mesh are None, expected a path for one of them at least")
+        self._model = model
+        self._start = start = model.mesh
+        self._comm = MPI._addressof(start.comm)
+        self._fields = _core.model_fields(self._comm, model._core, list(particle_fields), list(nodal_fields))
+        own = slice(start.owned_cells)
+        self._particles = None if particles is None else ParticleOutput(particles, start.comm, float32, compression)
+        self._mesh = (
+            None
+            if mesh is None
+            else MeshOutput(
+                mesh, start.comm, start.points, start.cells[own], float32, compression, {"tag": start.cell_tags[own]}
+            )
+        )
+
+    def write(self, more: Mapping[str, np.ndarray] | None = None) -> None:
+        """Write a frame of the model as it is now, which is on disk when this returns.
+
+        Args:
+            more: further fields of the particles by name, a row for each.
+
+        Raises:
+            InputError: a further field is of another length or not numeric; or no step was taken yet, without which nodes have
+                no values.
+            RunError: the frame cannot be written.
+        """
+        further, failure = _tried(lambda: _split_fields(more), NO_FIELDS) if more else (NO_FIELDS, "")
+        mesh, carrier = None, None
+        if self._mesh is not None:
+            mesh = self._mesh._series
+            if self._model.mesh is not self._start:
+                carrier = self._start._carrier_from(self._model.mesh)
+        particles = None if self._particles is None else self._particles._series
+        _core.write_model(self._comm, self._model._core, self._fields, particles, *further, mesh, carrier, failure)
+
+    def close(self) -> None:
+        """Close the files; nothing can be written after that."""
+        for output in (self._particles, self._mesh):
+            if output is not None:
+                output.close()
+
+    def __enter__(self) -> ModelOutput:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        for output in (self._particles, self._mesh):
+            if output is not None:
+                output.__exit__(*error)
 
 
 def _tried(work: Callable[[], T], otherwise: T) -> tuple[T, str]:

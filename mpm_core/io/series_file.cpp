@@ -1,0 +1,279 @@
+#include "io/series_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace mpm
+{
+namespace
+{
+const std::array<const char*, 6> component_names = {"xx", "yy", "zz", "xy", "yz", "xz"};
+
+constexpr std::size_t digits_of_frames = 6;
+
+/// Name of a frame's file.
+std::string frame_file(int frame)
+{
+  const std::string number = std::to_string(frame);
+  return std::string(digits_of_frames - std::min(digits_of_frames, number.size()), '0') + number + ".h5";
+}
+
+bool is_frame_file(const std::filesystem::path& path)
+{
+  const std::string stem = path.stem().string();
+  return path.extension() == ".h5" && stem.size() >= digits_of_frames &&
+         std::ranges::all_of(stem, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// Makes the folder of a series, or removes the frames of an earlier one from it.
+/// @return what went wrong; empty if nothing did
+std::string prepared_folder(const std::filesystem::path& folder)
+{
+  std::error_code error;
+  std::filesystem::create_directory(folder, error);
+  const std::filesystem::directory_iterator end;
+  for (std::filesystem::directory_iterator entry(folder, error); !error && entry != end; entry.increment(error))
+    if (is_frame_file(entry->path()))
+      std::filesystem::remove(entry->path(), error);
+  return error ? "cannot write " + folder.string() + ": " + error.message() : "";
+}
+
+std::filesystem::path without_suffix(std::filesystem::path path)
+{
+  return path.extension() == ".h5" || path.extension() == ".xdmf" ? path.replace_extension() : path;
+}
+
+bool is_symmetric_tensor(std::size_t components) { return components == 4 || components == 6; }
+
+/// Rows that are converted at once, so that what the components write stays in the cache.
+constexpr std::size_t rows_at_once = 1024;
+
+/// Puts columns side by side into rows of a width, with zeros after them.
+template <class T>
+void copy_columns(std::span<const OutputColumn> columns, int width, std::span<T> rows)
+{
+  const auto w = static_cast<std::size_t>(width);
+  const std::size_t n_rows = rows.size() / w;
+  for (std::size_t begin = 0; begin < n_rows; begin += rows_at_once)
+  {
+    const std::size_t end = std::min(n_rows, begin + rows_at_once);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+    {
+      const auto [first, stride, minus] = columns[k];
+      T* to = rows.data() + k;
+      if (minus)
+        for (std::size_t row = begin; row < end; ++row)
+          to[row * w] = static_cast<T>(first[row * stride] - minus[row * stride]);
+      else if (w == 1 && stride == 1)
+        std::transform(first + begin, first + end, to + begin, [](double v) { return static_cast<T>(v); });
+      else
+        for (std::size_t row = begin; row < end; ++row)
+          to[row * w] = static_cast<T>(first[row * stride]);
+    }
+    for (std::size_t k = columns.size(); k < w; ++k)
+      for (std::size_t row = begin; row < end; ++row)
+        rows[row * w + k] = T(0);
+  }
+}
+
+template <class T>
+void copy_numbers(const WholeNumbers& numbers, std::span<T> to)
+{
+  std::visit([&](auto values) { std::ranges::transform(values, to.begin(), [](auto v) { return static_cast<T>(v); }); },
+             numbers);
+}
+} // namespace
+
+OutputField row_field(std::string name, std::span<const double> values, int components)
+{
+  const auto width = static_cast<std::size_t>(components);
+  OutputField field{std::move(name), width == 0 ? 0 : values.size() / width, {}};
+  for (std::size_t k = 0; k < width; ++k)
+    field.columns.push_back({values.data() + k, width});
+  return field;
+}
+
+SeriesFile::SeriesFile(MPI_Comm comm, const std::filesystem::path& path, std::string grid, Storage storage, int writer)
+    : _files(comm, storage.compression, writer), _folder(without_suffix(path)), _folder_name(_folder.filename()),
+      _xdmf(_folder.string() + ".xdmf", std::move(grid)), _precision(storage.precision)
+{
+  if (!is_same_on_all_ranks(comm, _folder))
+    throw RunError("path is not the same on all ranks; here: " + _folder.string());
+  on_writer([&] { return prepared_folder(_folder); });
+  on_writer([&] { return _xdmf.write_without_frames(); });
+}
+
+void SeriesFile::begin(const std::string& file)
+{
+  if (_closed)
+    throw RunError("cannot write " + _folder.string() + ": it is closed");
+  _path = _folder / file;
+  _address = _folder_name + "/" + file + ":/";
+  _parts.clear();
+  _description.clear();
+}
+
+void SeriesFile::begin_frame(double time)
+{
+  begin(frame_file(_n_frames));
+  _single = false;
+  _description = begin_of_frame(time);
+}
+
+void SeriesFile::begin_single(const std::string& name)
+{
+  begin(name + ".h5");
+  _single = true;
+}
+
+XdmfData SeriesFile::add(Part part)
+{
+  const Dataset& dataset = part.dataset;
+  const bool integer = dataset.number == Number::int32 || dataset.number == Number::int64;
+  XdmfData data{_address + dataset.name, dataset.rows.total, dataset.width, integer,
+                static_cast<int>(bytes_of(dataset.number))};
+  _parts.push_back(std::move(part));
+  return data;
+}
+
+XdmfData SeriesFile::add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns,
+                               int width)
+{
+  const Number number = _precision == Precision::float32 ? Number::float32 : Number::float64;
+  return add({{name, rows, width, number}, columns, {}});
+}
+
+XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values)
+{
+  int small = 1;
+  if (const auto* wide = std::get_if<std::span<const std::int64_t>>(&values))
+  {
+    small = std::ranges::all_of(*wide, [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
+    MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
+  }
+  return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, values});
+}
+
+XdmfData SeriesFile::add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points)
+{
+  XdmfData geometry = add_reals(points.name, rows, points.columns, 3);
+  add_topology(_description, type, cells);
+  add_geometry(_description, geometry);
+  return geometry;
+}
+
+void SeriesFile::add_field(const std::string& name, const char* center, const XdmfData& data)
+{
+  add_attribute(_description, name, center, data);
+}
+
+void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields)
+{
+  for (const OutputField& field : fields)
+  {
+    const std::span<const OutputColumn> columns = field.columns;
+    const std::size_t n = columns.size();
+    if (is_symmetric_tensor(n))
+      for (std::size_t k = 0; k < n; ++k)
+      {
+        const std::string name = field.name + "_" + component_names[k];
+        add_field(name, center, add_reals(name, rows, columns.subspan(k, 1), 1));
+      }
+    else
+      add_field(field.name, center, add_reals(field.name, rows, columns, n == 2 ? 3 : static_cast<int>(n)));
+  }
+}
+
+void SeriesFile::add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields)
+{
+  for (const OutputIndexField& field : fields)
+    add_field(field.name, center, add_integers(field.name, rows, 1, field.values));
+}
+
+void SeriesFile::fill()
+{
+  std::vector<Dataset> datasets;
+  for (const Part& part : _parts)
+    datasets.push_back(part.dataset);
+  _files.begin(_path, std::move(datasets));
+  for (const Part& part : _parts)
+    switch (part.dataset.number)
+    {
+    case Number::float32:
+      copy_columns(part.columns, part.dataset.width, _files.next<float>());
+      break;
+    case Number::float64:
+      copy_columns(part.columns, part.dataset.width, _files.next<double>());
+      break;
+    case Number::int32:
+      copy_numbers(part.whole, _files.next<std::int32_t>());
+      break;
+    case Number::int64:
+      copy_numbers(part.whole, _files.next<std::int64_t>());
+      break;
+    }
+  _files.complete();
+}
+
+std::string SeriesFile::finish()
+{
+  std::string failure = _files.write();
+  if (!failure.empty() || !_files.is_writer())
+    return failure;
+  return _single ? _xdmf.write_single(_description) : _xdmf.append(_description + end_of_frame);
+}
+
+void SeriesFile::discard()
+{
+  _files.forget();
+  std::error_code of_no_consequence;
+  if (_files.is_writer())
+    std::filesystem::remove(_path, of_no_consequence);
+}
+
+void SeriesFile::write(const std::vector<SeriesFile*>& series)
+{
+  try
+  {
+    for (SeriesFile* file : series)
+      file->fill();
+  }
+  catch (const RunError&)
+  {
+    for (SeriesFile* file : series)
+      file->discard();
+    throw;
+  }
+  std::vector<std::string> failures;
+  for (SeriesFile* file : series)
+    failures.push_back(file->finish());
+  const auto first = std::ranges::find_if(failures, [](const std::string& failure) { return !failure.empty(); });
+  const MPI_Comm comm = series[0]->comm();
+  const std::string shared = shared_failure(comm, first == failures.end() ? "" : *first);
+  for (std::size_t k = 0; k < series.size(); ++k)
+    if (shared.empty() || shared_failure(comm, failures[k]).empty())
+      series[k]->_n_frames += series[k]->_single ? 0 : 1;
+    else
+      series[k]->discard();
+  if (!shared.empty())
+    throw RunError(shared);
+}
+
+void SeriesFile::close()
+{
+  if (std::exchange(_closed, true))
+    return;
+  _files.close();
+  on_writer([&] { return _xdmf.finish(); });
+}
+
+template <class F>
+void SeriesFile::on_writer(F&& work)
+{
+  if (const std::string failure = shared_failure(comm(), _files.is_writer() ? work() : ""); !failure.empty())
+    throw RunError(failure);
+}
+} // namespace mpm
