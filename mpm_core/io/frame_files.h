@@ -5,6 +5,8 @@
 #include "io/hdf5_file.h"
 #include "parallel/shared_memory.h"
 
+#include <algorithm>
+
 namespace mpm
 {
 /// Writes one HDF5 file after another.
@@ -35,6 +37,18 @@ public:
   std::span<T> next()
   {
     return {reinterpret_cast<T*>(room()), _datasets[_next - 1].local_bytes() / sizeof(T)};
+  }
+
+  /// Room for all ranks' values of the dataset that `next` gave room for, (rows.total, width) row-major, where ranks
+  /// put the file together in memory; else empty. Each row is to be filled in by one rank, whichever has it.
+  template <class T>
+  std::span<T> whole() const
+  {
+    const Dataset& dataset = _datasets[_next - 1];
+    if (!_imaged)
+      return {};
+    return {reinterpret_cast<T*>(_image.data() + std::max<std::int64_t>(0, _places[_next - 1])),
+            static_cast<std::size_t>(dataset.rows.total * dataset.width)};
   }
 
   /// Waits until all ranks have given all values; then the file is written, or it is there for the writer to write.

@@ -79,6 +79,20 @@ void copy_columns(std::span<const OutputColumn> columns, int width, std::span<T>
   }
 }
 
+/// Puts rows that ranks want, here or elsewhere, where they belong among all ranks' rows.
+template <class T>
+void scatter_columns(std::span<const OutputColumn> columns, std::span<const RowCarrier::Given> given, int width,
+                     std::span<T> rows)
+{
+  for (const auto& [row, wanted_as] : given)
+  {
+    T* to = rows.data() + wanted_as * width;
+    for (const OutputColumn& column : columns)
+      *to++ = static_cast<T>(column[static_cast<std::size_t>(row)]);
+    std::fill(to, rows.data() + (wanted_as + 1) * width, T(0));
+  }
+}
+
 template <class T>
 void copy_numbers(const WholeNumbers& numbers, std::span<T> to)
 {
@@ -120,13 +134,19 @@ void SeriesFile::begin_frame(double time)
 {
   begin(frame_file(_n_frames));
   _single = false;
-  _description = begin_of_frame(time);
+  add_description(begin_of_frame(time));
 }
 
 void SeriesFile::begin_single(const std::string& name)
 {
   begin(name + ".h5");
   _single = true;
+}
+
+void SeriesFile::add_description(const std::string& text)
+{
+  if (_files.is_writer())
+    _description += text;
 }
 
 XdmfData SeriesFile::add(Part part)
@@ -140,10 +160,10 @@ XdmfData SeriesFile::add(Part part)
 }
 
 XdmfData SeriesFile::add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns,
-                               int width)
+                               int width, RowCarrier* carrier)
 {
   const Number number = _precision == Precision::float32 ? Number::float32 : Number::float64;
-  return add({{name, rows, width, number}, columns, {}});
+  return add({{name, rows, width, number}, columns, carrier});
 }
 
 XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values)
@@ -154,20 +174,24 @@ XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows,
     small = std::ranges::all_of(*wide, [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
     MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
   }
-  return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, values});
+  return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, nullptr, values});
 }
 
 XdmfData SeriesFile::add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points)
 {
   XdmfData geometry = add_reals(points.name, rows, points.columns, 3);
-  add_topology(_description, type, cells);
-  add_geometry(_description, geometry);
+  if (_files.is_writer())
+  {
+    add_topology(_description, type, cells);
+    add_geometry(_description, geometry);
+  }
   return geometry;
 }
 
 void SeriesFile::add_field(const std::string& name, const char* center, const XdmfData& data)
 {
-  add_attribute(_description, name, center, data);
+  if (_files.is_writer())
+    add_attribute(_description, name, center, data);
 }
 
 void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields)
@@ -180,10 +204,11 @@ void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std:
       for (std::size_t k = 0; k < n; ++k)
       {
         const std::string name = field.name + "_" + component_names[k];
-        add_field(name, center, add_reals(name, rows, columns.subspan(k, 1), 1));
+        add_field(name, center, add_reals(name, rows, columns.subspan(k, 1), 1, field.carrier));
       }
     else
-      add_field(field.name, center, add_reals(field.name, rows, columns, n == 2 ? 3 : static_cast<int>(n)));
+      add_field(field.name, center,
+                add_reals(field.name, rows, columns, n == 2 ? 3 : static_cast<int>(n), field.carrier));
   }
 }
 
@@ -191,6 +216,24 @@ void SeriesFile::add_index_fields(const char* center, const RowSlice& rows, cons
 {
   for (const OutputIndexField& field : fields)
     add_field(field.name, center, add_integers(field.name, rows, 1, field.values));
+}
+
+template <class T>
+void SeriesFile::copy_reals(const Part& part)
+{
+  const std::span<T> rows = _files.next<T>(), all = _files.whole<T>();
+  const std::size_t n = part.columns.size();
+  if (!part.carrier)
+    copy_columns(part.columns, part.dataset.width, rows);
+  else if (!all.empty())
+    scatter_columns(part.columns, part.carrier->given(), part.dataset.width, all);
+  else
+  {
+    const auto pack = [&](std::size_t row, double* to)
+    { std::ranges::transform(part.columns, to, [&](const OutputColumn& column) { return column[row]; }); };
+    const OutputField carried = row_field({}, part.carrier->carry(n, pack), static_cast<int>(n));
+    copy_columns(std::span<const OutputColumn>(carried.columns), part.dataset.width, rows);
+  }
 }
 
 void SeriesFile::fill()
@@ -203,10 +246,10 @@ void SeriesFile::fill()
     switch (part.dataset.number)
     {
     case Number::float32:
-      copy_columns(part.columns, part.dataset.width, _files.next<float>());
+      copy_reals<float>(part);
       break;
     case Number::float64:
-      copy_columns(part.columns, part.dataset.width, _files.next<double>());
+      copy_reals<double>(part);
       break;
     case Number::int32:
       copy_numbers(part.whole, _files.next<std::int32_t>());
@@ -223,7 +266,10 @@ std::string SeriesFile::finish()
   std::string failure = _files.write();
   if (!failure.empty() || !_files.is_writer())
     return failure;
-  return _single ? _xdmf.write_single(_description) : _xdmf.append(_description + end_of_frame);
+  if (_single)
+    return _xdmf.write_single(_description);
+  _description += end_of_frame;
+  return _xdmf.append(_description);
 }
 
 void SeriesFile::discard()

@@ -4,6 +4,7 @@
 
 #include "io/frame_files.h"
 #include "io/xdmf.h"
+#include "parallel/row_carrier.h"
 
 #include <variant>
 #include <vector>
@@ -16,6 +17,8 @@ struct OutputColumn
   const double* first;
   std::size_t stride = 1;
   const double* minus = nullptr; ///< what is taken away from each, with the same stride; nothing if null
+
+  double operator[](std::size_t row) const { return first[row * stride] - (minus ? minus[row * stride] : 0.0); }
 };
 
 /// Real values to write, one row per particle, node or cell.
@@ -24,6 +27,7 @@ struct OutputField
   std::string name;
   std::size_t rows;
   std::vector<OutputColumn> columns; ///< one per component
+  RowCarrier* carrier = nullptr; ///< brings the rows from ranks whose columns have them; null: they are in order here
 };
 
 /// The field of an array (n, components), row-major.
@@ -85,9 +89,9 @@ public:
   void add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields);
   void add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields);
 
-  /// What the XDMF file says of the present file so far; it may be added to later ones.
+  /// What the XDMF file says of the present file so far, as the writer knows; it may be added to later ones.
   const std::string& description() const { return _description; }
-  void add_description(const std::string& text) { _description += text; }
+  void add_description(const std::string& text);
 
   /// Starts what a series without frames consists of, in a file of this name.
   void begin_single(const std::string& name);
@@ -109,7 +113,8 @@ private:
   {
     Dataset dataset;
     std::span<const OutputColumn> columns; ///< of real numbers; zeros come after them
-    WholeNumbers whole;
+    RowCarrier* carrier = nullptr;
+    WholeNumbers whole = {};
   };
   void begin(const std::string& file);
   /// Gives values to the present file.
@@ -120,7 +125,10 @@ private:
   /// Removes the present file.
   void discard();
   XdmfData add(Part part);
-  XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width);
+  XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width,
+                     RowCarrier* carrier = nullptr);
+  template <class T>
+  void copy_reals(const Part& part);
   /// Lets the writer do something with files; what goes wrong is an error on all.
   template <class F>
   void on_writer(F&& work);

@@ -35,11 +35,20 @@ RowCarrier::RowCarrier(MPI_Comm comm, std::span<const std::int64_t> ranks, std::
   MPI_Alltoall(_n_taken.data(), 1, MPI_INT, _n_given.data(), 1, MPI_INT, comm);
   std::iota(_order.begin(), _order.end(), std::size_t{0});
   std::ranges::stable_sort(_order, {}, [&](std::size_t i) { return ranks[i]; });
-  std::vector<std::int64_t> asked(rows.size());
-  std::ranges::transform(_order, asked.begin(), [&](std::size_t i) { return rows[i]; });
+  const auto n_wanted = static_cast<std::int64_t>(_order.size());
+  std::int64_t up_to_here = 0;
+  MPI_Scan(&n_wanted, &up_to_here, 1, MPI_INT64_T, MPI_SUM, comm);
+  const std::int64_t before = up_to_here - n_wanted;
+  std::vector<Given> asked(rows.size());
+  std::ranges::transform(_order, asked.begin(),
+                         [&](std::size_t i) {
+                           return Given{rows[i], before + static_cast<std::int64_t>(i)};
+                         });
   _given.resize(static_cast<std::size_t>(std::reduce(_n_given.begin(), _n_given.end())));
-  MPI_Alltoallv(asked.data(), _n_taken.data(), starts(_n_taken).data(), MPI_INT64_T, _given.data(), _n_given.data(),
-                starts(_n_given).data(), MPI_INT64_T, comm);
+  static_assert(sizeof(Given) == 2 * sizeof(std::int64_t));
+  const std::vector<int> taken = times(_n_taken, 2), given = times(_n_given, 2);
+  MPI_Alltoallv(asked.data(), taken.data(), starts(taken).data(), MPI_INT64_T, _given.data(), given.data(),
+                starts(given).data(), MPI_INT64_T, comm);
 }
 
 void RowCarrier::exchange(std::size_t width)

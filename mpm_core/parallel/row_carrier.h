@@ -22,6 +22,14 @@ public:
 
   std::size_t n_wanted() const { return _order.size(); } ///< rows
 
+  /// A row of this rank's values that a rank wants.
+  struct Given
+  {
+    std::int64_t row;
+    std::int64_t wanted_as; ///< its number among the wanted rows of all ranks, by rising rank
+  };
+  std::span<const Given> given() const { return _given; }
+
   /// @param width  numbers per row
   /// @param pack   puts a row of this rank's values somewhere: (row, first of `width` numbers)
   /// @return the wanted rows, row-major; valid until the next call
@@ -31,7 +39,7 @@ public:
   {
     _sent.resize(_given.size() * width);
     for (std::size_t i = 0; i < _given.size(); ++i)
-      pack(static_cast<std::size_t>(_given[i]), _sent.data() + i * width);
+      pack(static_cast<std::size_t>(_given[i].row), _sent.data() + i * width);
     exchange(width);
     return _wanted;
   }
@@ -41,7 +49,7 @@ private:
 
   MPI_Comm _comm;
   std::vector<int> _n_given, _n_taken; ///< rows to and from each rank
-  std::vector<std::int64_t> _given;    ///< rows to send, by rising rank
+  std::vector<Given> _given;           ///< rows to send, by rising rank
   std::vector<std::size_t> _order;     ///< which of the wanted ones come, likewise
   std::vector<double> _sent, _came, _wanted;
 };

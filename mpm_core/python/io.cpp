@@ -44,36 +44,19 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 }
 
 /// Nodal fields of a model by name.
+/// @param carrier  to the nodes of the mesh as it is written; null if the model's is cut in the same way
 template <int D>
-std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<std::string>& names)
+std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<std::string>& names, RowCarrier* carrier)
 {
   std::vector<OutputField> fields;
   for (const std::string& name : names)
-    fields.push_back(nodal_field(model, name));
-  return fields;
-}
-
-/// Has fields take their values from where they are carried to.
-void carry(RowCarrier& carrier, std::vector<OutputField>& fields)
-{
-  std::vector<OutputColumn> columns;
-  for (const OutputField& field : fields)
-    columns.insert(columns.end(), field.columns.begin(), field.columns.end());
-  const std::size_t width = columns.size();
-  const double* first = carrier
-                            .carry(width,
-                                   [&](std::size_t row, double* to)
-                                   {
-                                     for (const OutputColumn& column : columns)
-                                       *to++ = column.first[row * column.stride];
-                                   })
-                            .data();
-  for (OutputField& field : fields)
   {
-    field.rows = carrier.n_wanted();
-    for (OutputColumn& column : field.columns)
-      column = {first++, width};
+    OutputField& field = fields.emplace_back(nodal_field(model, name));
+    field.carrier = carrier;
+    if (carrier)
+      field.rows = carrier->n_wanted();
   }
+  return fields;
 }
 
 /// What a model's frames consist of; the same on all ranks.
@@ -108,7 +91,7 @@ ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector
 /// @param particles  null if none are written
 /// @param more       further fields of the particles
 /// @param mesh       null if it is not written
-/// @param carrier    to the nodes of the mesh as it is written; null if the model's is cut in the same way
+/// @param carrier    as `nodal_fields` takes it
 template <int D>
 void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& names, ParticleSeries* particles,
                  const RealFields& more, const IntegerFields& more_integers, MeshSeries* mesh, RowCarrier* carrier,
@@ -116,11 +99,7 @@ void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& 
 {
   Frame frame{.time = model.time, .particles = particles, .mesh = mesh, .failure = std::move(failure)};
   if (mesh)
-  {
-    frame.mesh_fields.nodes = nodal_fields(model, names.nodes); // raises errors on all ranks or on none
-    if (carrier)
-      carry(*carrier, frame.mesh_fields.nodes);
-  }
+    frame.mesh_fields.nodes = nodal_fields(model, names.nodes, carrier); // raises errors on all ranks or on none
   if (particles && frame.failure.empty())
     frame.failure =
         input_error_of([&] { frame.particle_fields = particle_fields<D>(model.particles, names.particles); });
