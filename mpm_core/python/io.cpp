@@ -89,12 +89,12 @@ ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector
 
 /// Writes fields of a model from where they are.
 /// @param particles  null if none are written
-/// @param more       further fields of the particles
 /// @param mesh       null if it is not written
 /// @param carrier    as `nodal_fields` takes it
+/// @param more       further fields of the particles
 template <int D>
 void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& names, ParticleSeries* particles,
-                 const RealFields& more, const IntegerFields& more_integers, MeshSeries* mesh, RowCarrier* carrier,
+                 MeshSeries* mesh, RowCarrier* carrier, const RealFields& more, const IntegerFields& more_integers,
                  std::string failure)
 {
   Frame frame{.time = model.time, .particles = particles, .mesh = mesh, .failure = std::move(failure)};

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -186,8 +187,8 @@ class ModelOutput:
     Args:
         model: whose particles and nodes are written. Its mesh may be cut anew later; the nodes are written as they are now.
         particles: path of the files of particles, as for `ParticleOutput`; None if none are to be written.
-        mesh: path of the files of the mesh, as for `MeshOutput`, with the tags of cells as the field ``tag``; None if it is not to
-            be written.
+        mesh: path of the files of the mesh, as for `MeshOutput`, with the tags of cells as the field ``tag``; None if none are
+            to be written.
         particle_fields: attributes of ``model.particles``, such as ``velocity``, and ``displacement``, ``plastic_strain``; the
             position is always written.
         nodal_fields: as ``Model.nodal`` gives them.
@@ -215,18 +216,22 @@ class ModelOutput:
         if particles is None and mesh is None:
             raise InputError("particles and mesh are None, expected a path for one of them at least")
         self._model = model
-        self._start = start = model.mesh
+        self._start = self._cut = start = model.mesh
+        self._carrier: _core.RowCarrier | None = None
         self._comm = MPI._addressof(start.comm)
         self._fields = _core.model_fields(self._comm, model._core, list(particle_fields), list(nodal_fields))
         own = slice(start.owned_cells)
-        self._particles = None if particles is None else ParticleOutput(particles, start.comm, float32, compression)
-        self._mesh = (
-            None
-            if mesh is None
-            else MeshOutput(
-                mesh, start.comm, start.points, start.cells[own], float32, compression, {"tag": start.cell_tags[own]}
-            )
-        )
+        tags = {"tag": start.cell_tags[own]}
+        self._outputs: list[ParticleOutput | MeshOutput] = []
+        self._particles, self._mesh = None, None
+        if particles is not None:
+            particle_output = ParticleOutput(particles, start.comm, float32, compression)
+            self._particles = particle_output._series
+            self._outputs.append(particle_output)
+        if mesh is not None:
+            mesh_output = MeshOutput(mesh, start.comm, start.points, start.cells[own], float32, compression, tags)
+            self._mesh = mesh_output._series
+            self._outputs.append(mesh_output)
 
     def write(self, more: Mapping[str, np.ndarray] | None = None) -> None:
         """Write a frame of the model as it is now, which is on disk when this returns.
@@ -239,28 +244,33 @@ class ModelOutput:
                 no values.
             RunError: the frame cannot be written.
         """
-        further, failure = _tried(lambda: _split_fields(more), NO_FIELDS) if more else (NO_FIELDS, "")
-        mesh, carrier = None, None
-        if self._mesh is not None:
-            mesh = self._mesh._series
-            if self._model.mesh is not self._start:
-                carrier = self._start._carrier_from(self._model.mesh)
-        particles = None if self._particles is None else self._particles._series
-        _core.write_model(self._comm, self._model._core, self._fields, particles, *further, mesh, carrier, failure)
+        (real, whole), failure = (NO_FIELDS, "") if more is None else _tried(partial(_split_fields, more), NO_FIELDS)
+        if self._mesh is not None and self._model.mesh is not self._cut:
+            self._cut = self._model.mesh
+            self._carrier = None if self._cut is self._start else self._start._carrier_from(self._cut)
+        _core.write_model(
+            self._comm,
+            self._model._core,
+            self._fields,
+            self._particles,
+            self._mesh,
+            self._carrier,
+            real,
+            whole,
+            failure,
+        )
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
-        for output in (self._particles, self._mesh):
-            if output is not None:
-                output.close()
+        for output in self._outputs:
+            output.close()
 
     def __enter__(self) -> ModelOutput:
         return self
 
     def __exit__(self, *error: Any) -> None:
-        for output in (self._particles, self._mesh):
-            if output is not None:
-                output.__exit__(*error)
+        for output in self._outputs:
+            output.__exit__(*error)
 
 
 def _tried(work: Callable[[], T], otherwise: T) -> tuple[T, str]:
