@@ -7,7 +7,6 @@
 
 #include <cerrno>
 #include <cstdint>
-#include <filesystem>
 
 namespace mpm
 {
@@ -16,7 +15,7 @@ class Descriptor
 {
 public:
   /// @param flags  as of `open`; a file that is made may be read and written by all whom the umask lets
-  Descriptor(const std::filesystem::path& path, int flags) : _file(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
+  Descriptor(const char* path, int flags) : _file(::open(path, flags | O_CLOEXEC, 0666)) {}
   ~Descriptor()
   {
     if (_file >= 0)

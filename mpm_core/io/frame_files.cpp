@@ -29,25 +29,26 @@ FrameFiles::FrameFiles(MPI_Comm comm, int compression, int writer)
   MPI_Comm_rank(_comm, &_rank);
 }
 
-void FrameFiles::begin(const std::filesystem::path& path, std::vector<Dataset> datasets)
+const std::vector<Dataset>& FrameFiles::begin(std::string path, std::vector<Dataset> datasets)
 {
   const bool known = !_places.empty() && are_alike(datasets, _datasets);
-  _path = path;
+  _path = std::move(path);
   _datasets = std::move(datasets);
   _next = 0;
   if (_compression > 0)
   {
     _compressed.emplace(_comm, _path, 0, _compression);
-    return;
+    return _datasets;
   }
   if (!known)
     make();
   if (_imaged)
-    return;
-  _file.emplace(_path, O_WRONLY | O_CREAT); // whichever rank comes first makes it
+    return _datasets;
+  _file.emplace(_path.c_str(), O_WRONLY | O_CREAT); // whichever rank comes first makes it
   note(_file->number() >= 0);
   for (const Table& table : _tables)
     put(table.bytes.data(), table.bytes.size(), table.place);
+  return _datasets;
 }
 
 void FrameFiles::make()
@@ -71,7 +72,7 @@ void FrameFiles::read_tables()
   for (std::size_t k = 0; k < _places.size(); ++k)
     if (_places[k] >= 0)
       values.emplace_back(_places[k], _places[k] + _datasets[k].rows.total * _datasets[k].row_bytes());
-  const Descriptor file(_path, O_RDONLY);
+  const Descriptor file(_path.c_str(), O_RDONLY);
   _length = ::lseek(file.number(), 0, SEEK_END);
   note(_length >= 0);
   values.emplace_back(_length, _length);
@@ -131,7 +132,7 @@ void FrameFiles::put(const void* bytes, std::size_t count, std::int64_t place)
 void FrameFiles::note(bool succeeded)
 {
   if (!succeeded && _failure.empty())
-    _failure = "cannot write " + _path.string() + ": " + std::strerror(errno);
+    _failure = "cannot write " + _path + ": " + std::strerror(errno);
 }
 
 void FrameFiles::complete()
@@ -156,7 +157,7 @@ std::string FrameFiles::write()
 {
   if (_imaged && is_writer())
   {
-    _file.emplace(_path, O_WRONLY | O_CREAT);
+    _file.emplace(_path.c_str(), O_WRONLY | O_CREAT);
     note(_file->number() >= 0);
     put(_image.data(), static_cast<std::size_t>(_length), 0);
     _file.reset();

@@ -28,8 +28,9 @@ public:
   FrameFiles(MPI_Comm comm, int compression, int writer);
 
   /// Starts a file; there must be none under that name.
+  /// @return the datasets
   /// @throws RunError on all ranks, with path and reason; the file is of no use then
-  void begin(const std::filesystem::path& path, std::vector<Dataset> datasets);
+  const std::vector<Dataset>& begin(std::string path, std::vector<Dataset> datasets);
 
   /// Room for this rank's values of the next dataset, in the order given to `begin`, (rows.local, width) row-major; to
   /// be filled in before the next call.
@@ -92,7 +93,7 @@ private:
   int _rank = 0;
   int _writer;
   int _compression;
-  std::filesystem::path _path;
+  std::string _path;
   std::vector<Dataset> _datasets;    ///< of the present file, and of the tables
   std::vector<std::int64_t> _places; ///< bytes of the file where their values begin; -1 for those without
   std::int64_t _length = 0;          ///< of the file, in bytes

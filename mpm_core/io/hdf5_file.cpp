@@ -24,7 +24,7 @@ constexpr std::int64_t table_block = 1 << 13;
 /// @return why it cannot be had; empty if it can
 std::string reservation_obstacle(const std::filesystem::path& path, std::int64_t bytes)
 {
-  const Descriptor file(path, O_WRONLY | O_CREAT);
+  const Descriptor file(path.c_str(), O_WRONLY | O_CREAT);
   if (file.number() < 0)
     return std::strerror(errno);
 #ifdef __linux__
@@ -89,7 +89,7 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, in
   check();
   if (_compression > 0)
     return;
-  _values.emplace(_path, O_WRONLY);
+  _values.emplace(_path.c_str(), O_WRONLY);
   if (_values->number() < 0)
     note_obstacle(std::strerror(errno));
   check();

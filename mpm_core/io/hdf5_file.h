@@ -5,6 +5,7 @@
 #include "io/descriptor.h"
 #include "parallel/agreement.h"
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numeric>
-#include <utility>
+#include <tuple>
 
 namespace mpm
 {
@@ -76,6 +78,71 @@ std::string names_of(const std::vector<OutputIndexField>& fields)
   return names;
 }
 
+std::string other_fields(const std::string& names) { return "fields are not the same on all ranks; here: " + names; }
+
+bool is_wide(const OutputIndexField& field)
+{
+  const auto fits = [](auto v) { return v == static_cast<std::int32_t>(v); };
+  return !std::visit([&](auto values) { return std::ranges::all_of(values, fits); }, field.values);
+}
+
+Number narrowest(std::int64_t largest)
+{
+  return largest > std::numeric_limits<std::int32_t>::max() ? Number::int64 : Number::int32;
+}
+
+/// What a rank tells the others before a frame is written.
+struct Notice
+{
+  std::uint64_t failed, names, particles;
+  std::uint64_t wide; ///< a bit for each index field, by turns where there are more
+};
+
+/// What ranks know of each other then.
+struct Notices
+{
+  RowSlice particles;
+  std::vector<bool> wide; ///< index fields with values that do not fit into 32 bits, on any rank
+};
+
+/// Tells everything by one exchange, since there are many frames.
+/// @throws InputError as `write` does
+Notices noticed(MPI_Comm comm, const Frame& frame)
+{
+  int rank = 0, size = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  const auto& [particles, mesh] = std::tie(frame.particle_fields, frame.mesh_fields);
+  const auto bit = [](std::size_t k) { return std::uint64_t{1} << k % 64; };
+  const std::string error = error_of(frame), names = names_of(particles.fields) + names_of(particles.index_fields) +
+                                                     names_of(mesh.nodes) + names_of(mesh.cells);
+  Notice own{!error.empty(), std::hash<std::string>{}(names), particles.position.rows, 0};
+  for (std::size_t k = 0; k < particles.index_fields.size(); ++k)
+    own.wide |= is_wide(particles.index_fields[k]) ? bit(k) : 0;
+  static_assert(sizeof(Notice) == 4 * sizeof(std::uint64_t));
+  std::vector<Notice> all(static_cast<std::size_t>(size), own);
+  if (size > 1) // alone, it is not worth getting MPI's code into the cache
+    MPI_Allgather(&own, 4, MPI_UINT64_T, all.data(), 4, MPI_UINT64_T, comm);
+  std::uint64_t wide = 0;
+  bool failed = false, same = true;
+  Notices notices{.particles = {.local = static_cast<GlobalIndex>(own.particles)}, .wide = {}};
+  for (const Notice& notice : all)
+  {
+    failed = failed || notice.failed;
+    same = same && notice.names == own.names;
+    wide |= notice.wide;
+    notices.particles.before += &notice - all.data() < rank ? static_cast<GlobalIndex>(notice.particles) : 0;
+    notices.particles.total += static_cast<GlobalIndex>(notice.particles);
+  }
+  if (failed)
+    throw InputError(shared_failure(comm, error));
+  if (!same)
+    throw InputError(other_fields(names));
+  for (std::size_t k = 0; k < particles.index_fields.size(); ++k)
+    notices.wide.push_back(wide & bit(k));
+  return notices;
+}
+
 int last_rank(MPI_Comm comm)
 {
   int size = 1;
@@ -90,7 +157,7 @@ void require_same_fields(MPI_Comm comm, const std::string& error, const std::str
   if (!failure.empty())
     throw InputError(failure);
   if (!same)
-    throw InputError("fields are not the same on all ranks; here: " + names);
+    throw InputError(other_fields(names));
 }
 
 // Particles and mesh are written by different ranks, at the same time.
@@ -100,22 +167,26 @@ ParticleSeries::ParticleSeries(MPI_Comm comm, const std::filesystem::path& path,
 {
 }
 
-void ParticleSeries::begin(double time, const ParticleFields& fields)
+void ParticleSeries::begin(double time, const ParticleFields& fields, const RowSlice& rows,
+                           const std::vector<bool>& wide)
 {
-  const RowSlice rows = row_slice(_file.comm(), fields.position.rows);
   _file.begin_frame(time);
   if (rows.total != _vertices.rows || _vertices_in == _file.n_frames()) // that frame was not written
   {
     _numbers.resize(static_cast<std::size_t>(rows.local));
     std::iota(_numbers.begin(), _numbers.end(), rows.before);
-    _vertices = _file.add_integers("vertices", rows, 1, _numbers);
+    _vertices = _file.add_integers("vertices", rows, 1, narrowest(rows.total), _numbers);
     _vertices_in = _file.n_frames();
   }
   const XdmfData points = _file.add_grid("Polyvertex", _vertices, rows, fields.position);
   // Named as a field as well: some readers give the points of the first frame only. It costs no space.
   _file.add_field("position", "Node", points);
   _file.add_fields("Node", rows, fields.fields);
-  _file.add_index_fields("Node", rows, fields.index_fields);
+  for (std::size_t k = 0; k < wide.size(); ++k)
+  {
+    const auto& [name, values] = fields.index_fields[k];
+    _file.add_field(name, "Node", _file.add_integers(name, rows, 1, wide[k] ? Number::int64 : Number::int32, values));
+  }
 }
 
 MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage storage, int dimension,
@@ -131,7 +202,7 @@ MeshSeries::MeshSeries(MPI_Comm comm, const std::filesystem::path& path, Storage
     node += _nodes.before;
   const OutputField nodes = row_field("points", points, dimension);
   _file.begin_single("mesh");
-  const XdmfData topology = _file.add_integers("cells", _cells, dimension + 1, numbers);
+  const XdmfData topology = _file.add_integers("cells", _cells, dimension + 1, narrowest(_nodes.total), numbers);
   _file.add_grid(dimension == 2 ? "Triangle" : "Tetrahedron", topology, _nodes, nodes);
   _file.add_fields("Cell", _cells, fixed);
   _grid = _file.description();
@@ -148,19 +219,16 @@ void MeshSeries::begin(double time, const MeshFields& fields)
 
 void write(MPI_Comm comm, const Frame& frame)
 {
-  const auto& [particles, mesh] = std::tie(frame.particle_fields, frame.mesh_fields);
-  require_same_fields(comm, error_of(frame),
-                      names_of(particles.fields) + names_of(particles.index_fields) + names_of(mesh.nodes) +
-                          names_of(mesh.cells));
+  const Notices notices = noticed(comm, frame);
   std::vector<SeriesFile*> files;
   if (frame.particles)
   {
-    frame.particles->begin(frame.time, particles);
+    frame.particles->begin(frame.time, frame.particle_fields, notices.particles, notices.wide);
     files.push_back(&frame.particles->file());
   }
   if (frame.mesh)
   {
-    frame.mesh->begin(frame.time, mesh);
+    frame.mesh->begin(frame.time, frame.mesh_fields);
     files.push_back(&frame.mesh->file());
   }
   SeriesFile::write(files);

@@ -29,7 +29,8 @@ public:
 
   /// Starts a frame.
   /// @param fields  must live until it is written
-  void begin(double time, const ParticleFields& fields);
+  /// @param wide    whether an index field has values that do not fit into 32 bits, on any rank
+  void begin(double time, const ParticleFields& fields, const RowSlice& rows, const std::vector<bool>& wide);
 
   SeriesFile& file() { return _file; }
 

@@ -124,9 +124,10 @@ void SeriesFile::begin(const std::string& file)
 {
   if (_closed)
     throw RunError("cannot write " + _folder.string() + ": it is closed");
-  _path = _folder / file;
+  _path = _folder.native() + "/" + file; // quicker than by the library's paths
   _address = _folder_name + "/" + file + ":/";
-  _parts.clear();
+  _datasets.clear();
+  _sources.clear();
   _description.clear();
 }
 
@@ -134,7 +135,8 @@ void SeriesFile::begin_frame(double time)
 {
   begin(frame_file(_n_frames));
   _single = false;
-  add_description(begin_of_frame(time));
+  if (_files.is_writer())
+    _description += begin_of_frame(time);
 }
 
 void SeriesFile::begin_single(const std::string& name)
@@ -149,13 +151,13 @@ void SeriesFile::add_description(const std::string& text)
     _description += text;
 }
 
-XdmfData SeriesFile::add(Part part)
+XdmfData SeriesFile::add(Dataset dataset, Source source)
 {
-  const Dataset& dataset = part.dataset;
   const bool integer = dataset.number == Number::int32 || dataset.number == Number::int64;
   XdmfData data{_address + dataset.name, dataset.rows.total, dataset.width, integer,
                 static_cast<int>(bytes_of(dataset.number))};
-  _parts.push_back(std::move(part));
+  _datasets.push_back(std::move(dataset));
+  _sources.push_back(source);
   return data;
 }
 
@@ -163,18 +165,13 @@ XdmfData SeriesFile::add_reals(const std::string& name, const RowSlice& rows, st
                                int width, RowCarrier* carrier)
 {
   const Number number = _precision == Precision::float32 ? Number::float32 : Number::float64;
-  return add({{name, rows, width, number}, columns, carrier});
+  return add({name, rows, width, number}, {columns, carrier, {}});
 }
 
-XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values)
+XdmfData SeriesFile::add_integers(const std::string& name, const RowSlice& rows, int width, Number number,
+                                  const WholeNumbers& values)
 {
-  int small = 1;
-  if (const auto* wide = std::get_if<std::span<const std::int64_t>>(&values))
-  {
-    small = std::ranges::all_of(*wide, [](std::int64_t v) { return v == static_cast<std::int32_t>(v); });
-    MPI_Allreduce(MPI_IN_PLACE, &small, 1, MPI_INT, MPI_MIN, comm());
-  }
-  return add({{name, rows, width, small ? Number::int32 : Number::int64}, {}, nullptr, values});
+  return add({name, rows, width, number}, {{}, nullptr, values});
 }
 
 XdmfData SeriesFile::add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points)
@@ -212,50 +209,42 @@ void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std:
   }
 }
 
-void SeriesFile::add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields)
-{
-  for (const OutputIndexField& field : fields)
-    add_field(field.name, center, add_integers(field.name, rows, 1, field.values));
-}
-
 template <class T>
-void SeriesFile::copy_reals(const Part& part)
+void SeriesFile::copy_reals(const Dataset& dataset, const Source& source)
 {
   const std::span<T> rows = _files.next<T>(), all = _files.whole<T>();
-  const std::size_t n = part.columns.size();
-  if (!part.carrier)
-    copy_columns(part.columns, part.dataset.width, rows);
+  const auto& [columns, carrier, whole] = source;
+  const std::size_t n = columns.size();
+  if (!carrier)
+    copy_columns(columns, dataset.width, rows);
   else if (!all.empty())
-    scatter_columns(part.columns, part.carrier->given(), part.dataset.width, all);
+    scatter_columns(columns, carrier->given(), dataset.width, all);
   else
   {
     const auto pack = [&](std::size_t row, double* to)
-    { std::ranges::transform(part.columns, to, [&](const OutputColumn& column) { return column[row]; }); };
-    const OutputField carried = row_field({}, part.carrier->carry(n, pack), static_cast<int>(n));
-    copy_columns(std::span<const OutputColumn>(carried.columns), part.dataset.width, rows);
+    { std::ranges::transform(columns, to, [&](const OutputColumn& column) { return column[row]; }); };
+    const OutputField carried = row_field({}, carrier->carry(n, pack), static_cast<int>(n));
+    copy_columns(std::span<const OutputColumn>(carried.columns), dataset.width, rows);
   }
 }
 
 void SeriesFile::fill()
 {
-  std::vector<Dataset> datasets;
-  for (const Part& part : _parts)
-    datasets.push_back(part.dataset);
-  _files.begin(_path, std::move(datasets));
-  for (const Part& part : _parts)
-    switch (part.dataset.number)
+  const std::vector<Dataset>& datasets = _files.begin(_path, std::move(_datasets));
+  for (std::size_t k = 0; k < datasets.size(); ++k)
+    switch (datasets[k].number)
     {
     case Number::float32:
-      copy_reals<float>(part);
+      copy_reals<float>(datasets[k], _sources[k]);
       break;
     case Number::float64:
-      copy_reals<double>(part);
+      copy_reals<double>(datasets[k], _sources[k]);
       break;
     case Number::int32:
-      copy_numbers(part.whole, _files.next<std::int32_t>());
+      copy_numbers(_sources[k].whole, _files.next<std::int32_t>());
       break;
     case Number::int64:
-      copy_numbers(part.whole, _files.next<std::int64_t>());
+      copy_numbers(_sources[k].whole, _files.next<std::int64_t>());
       break;
     }
   _files.complete();

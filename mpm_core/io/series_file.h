@@ -76,8 +76,9 @@ public:
   /// Starts a frame. What is added to it must live until its end.
   void begin_frame(double time);
 
-  /// Adds whole numbers; those that all fit into 32 bits are stored so.
-  XdmfData add_integers(const std::string& name, const RowSlice& rows, int width, const WholeNumbers& values);
+  /// Adds whole numbers.
+  XdmfData add_integers(const std::string& name, const RowSlice& rows, int width, Number number,
+                        const WholeNumbers& values);
 
   /// Adds the grid: its cells, and points of 2 or 3 coordinates, padded to 3.
   XdmfData add_grid(const char* type, const XdmfData& cells, const RowSlice& rows, const OutputField& points);
@@ -85,9 +86,8 @@ public:
   /// Adds a field that is the same data as something else.
   void add_field(const std::string& name, const char* center, const XdmfData& data);
 
-  /// Adds fields that live on nodes or cells.
+  /// Adds fields of real numbers.
   void add_fields(const char* center, const RowSlice& rows, const std::vector<OutputField>& fields);
-  void add_index_fields(const char* center, const RowSlice& rows, const std::vector<OutputIndexField>& fields);
 
   /// What the XDMF file says of the present file so far, as the writer knows; it may be added to later ones.
   const std::string& description() const { return _description; }
@@ -108,10 +108,9 @@ public:
   MPI_Comm comm() const { return _files.comm(); }
 
 private:
-  /// A dataset of the present file, and where its values come from.
-  struct Part
+  /// Where the values of a dataset of the present file come from.
+  struct Source
   {
-    Dataset dataset;
     std::span<const OutputColumn> columns; ///< of real numbers; zeros come after them
     RowCarrier* carrier = nullptr;
     WholeNumbers whole = {};
@@ -124,11 +123,11 @@ private:
   std::string finish();
   /// Removes the present file.
   void discard();
-  XdmfData add(Part part);
+  XdmfData add(Dataset dataset, Source source);
   XdmfData add_reals(const std::string& name, const RowSlice& rows, std::span<const OutputColumn> columns, int width,
                      RowCarrier* carrier = nullptr);
   template <class T>
-  void copy_reals(const Part& part);
+  void copy_reals(const Dataset& dataset, const Source& source);
   /// Lets the writer do something with files; what goes wrong is an error on all.
   template <class F>
   void on_writer(F&& work);
@@ -138,9 +137,10 @@ private:
   std::string _folder_name; ///< as the XDMF file beside it names it
   XdmfSeries _xdmf;
   Precision _precision;
-  std::filesystem::path _path; ///< of the present file
-  std::string _address;        ///< of its root, in XDMF
-  std::vector<Part> _parts;
+  std::string _path;    ///< of the present file
+  std::string _address; ///< of its root, in XDMF
+  std::vector<Dataset> _datasets;
+  std::vector<Source> _sources;
   std::string _description; ///< in XDMF
   bool _single = false;     ///< the present file is no frame
   int _n_frames = 0;

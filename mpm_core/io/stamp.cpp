@@ -28,7 +28,7 @@ Sum summed_share(MPI_Comm comm, const std::filesystem::path& path, std::int64_t 
   MPI_Comm_size(comm, &size);
   const std::int64_t words = (length - stamp_size + 7) / 8;
   const std::int64_t first = words * rank / size, last = words * (rank + 1) / size;
-  const Descriptor file(path, O_RDONLY);
+  const Descriptor file(path.c_str(), O_RDONLY);
   if (file.number() < 0)
     return {0, std::strerror(errno)};
   Sum sum;
@@ -75,7 +75,7 @@ constexpr char stamp_pattern[] = "talus checkpoint\nformat %d\nbytes %" SCNd64 "
 
 std::string read_stamp(const std::filesystem::path& path, Stamp& stamp)
 {
-  const Descriptor file(path, O_RDONLY);
+  const Descriptor file(path.c_str(), O_RDONLY);
   if (file.number() < 0)
     return std::strerror(errno);
   char text[stamp_size + 1] = {};
@@ -109,7 +109,7 @@ void stamp_file(MPI_Comm comm, const std::filesystem::path& path)
   std::string failure;
   {
     // Every rank flushes what it wrote: on a parallel file system its data may wait on its own node.
-    const Descriptor file(path, O_RDWR);
+    const Descriptor file(path.c_str(), O_RDWR);
     char text[stamp_size] = {};
     std::snprintf(text, sizeof(text), stamp_text, checkpoint_format, length, sum);
     if (file.number() < 0 || (rank == 0 && ::pwrite(file.number(), text, sizeof(text), 0) != stamp_size) ||

@@ -48,6 +48,7 @@ const std::string document_end = "</Domain>\n</Xdmf>\n";
 const std::string series_end = "</Grid>\n" + document_end;
 /// The end of a series that has room behind it; and the end of that room.
 const std::string open_end = series_end + "<?room ", room_end = "?>\n";
+const std::string blank(open_end.size(), ' ');
 
 constexpr std::size_t least_room = 1 << 16;
 
@@ -127,43 +128,45 @@ std::string XdmfSeries::write_single(const std::string& content)
 std::string XdmfSeries::append(const std::string& frame)
 {
   const std::size_t from = _end + open_end.size(), spaces = spaces_before_end(from + frame.size());
-  const std::string addition = frame + std::string(spaces, ' ') + open_end;
-  if (from + addition.size() > _room_end)
-  {
-    _frames += frame;
-    std::string failure = rewrite(std::max(least_room, _frames.size()));
-    if (!failure.empty())
-      _frames.resize(_frames.size() - frame.size());
-    return failure;
-  }
+  if (from + frame.size() + spaces + open_end.size() > _room_end)
+    return rewrite(frame, true);
+  _addition.assign(frame).append(spaces, ' ').append(open_end);
   errno = 0;
-  const std::string blank(open_end.size(), ' ');
-  if (!_file->put(addition.data(), addition.size(), static_cast<std::int64_t>(from)) ||
+  if (!_file->put(_addition.data(), _addition.size(), static_cast<std::int64_t>(from)) ||
       !_file->put(blank.data(), blank.size(), static_cast<std::int64_t>(_end)))
     return "cannot write " + _path.string() + ": " + std::strerror(errno);
-  _frames += frame;
   _end = from + frame.size() + spaces;
   return {};
 }
 
-std::string XdmfSeries::finish() { return _frames.empty() ? "" : rewrite(0); }
+std::string XdmfSeries::finish() { return _file ? rewrite({}, false) : ""; }
 
-std::string XdmfSeries::rewrite(std::size_t room)
+std::string XdmfSeries::rewrite(const std::string& frame, bool with_room)
 {
   std::string text =
-      document_head + "<Grid Name=\"" + _name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n" + _frames;
-  if (room == 0)
+      document_head + "<Grid Name=\"" + _name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+  const std::size_t frames = text.size();
+  if (_file)
+  {
+    std::string before(_end - _frames, '\0');
+    if (!_file->get(before.data(), before.size(), static_cast<std::int64_t>(_frames)))
+      return "cannot read " + _path.string() + ": " + std::strerror(errno);
+    text += before;
+  }
+  text += frame;
+  if (!with_room)
     return replaced_file(_path, text + series_end);
   text.append(spaces_before_end(text.size()), ' ');
   const std::size_t end = text.size();
   text += open_end;
-  text.append(room, ' ');
+  text.append(std::max(least_room, end), ' ');
   std::string failure = replaced_file(_path, text + room_end);
   if (!failure.empty())
     return failure;
+  _frames = frames;
   _end = end;
   _room_end = text.size();
-  _file.emplace(_path, O_WRONLY);
+  _file.emplace(_path.c_str(), O_RDWR);
   return {};
 }
 } // namespace mpm

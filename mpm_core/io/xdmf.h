@@ -5,6 +5,7 @@
 #include "base/types.h"
 #include "io/descriptor.h"
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -49,7 +50,7 @@ public:
   /// @param name  of the grid
   XdmfSeries(std::filesystem::path path, std::string name) : _path(std::move(path)), _name(std::move(name)) {}
 
-  std::string write_without_frames() { return rewrite(0); }
+  std::string write_without_frames() { return rewrite({}, false); }
   /// Writes one grid without time in place of the series.
   std::string write_single(const std::string& content);
   /// Adds a frame, from `begin_of_frame` to `end_of_frame`; if that fails, all is as before.
@@ -58,13 +59,15 @@ public:
   std::string finish();
 
 private:
-  std::string rewrite(std::size_t room);
+  /// @param frame  is added to those that the file has
+  std::string rewrite(const std::string& frame, bool with_room);
 
   std::filesystem::path _path;
   std::string _name;
-  std::string _frames;             ///< those so far
-  std::size_t _end = 0;            ///< where the document's end begins in the file
+  std::size_t _frames = 0;         ///< where frames begin in the file
+  std::size_t _end = 0;            ///< where the document's end begins
   std::size_t _room_end = 0;       ///< where the spaces end
   std::optional<Descriptor> _file; ///< with room behind the document
+  std::string _addition;
 };
 } // namespace mpm
