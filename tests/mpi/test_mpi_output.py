@@ -30,6 +30,21 @@ def test_shares_are_stored_by_rising_rank(comm, shared_path, some):
             np.testing.assert_array_equal(file["id"][()], numbers)
 
 
+def test_whole_numbers_are_as_wide_as_those_of_any_rank_need(comm, shared_path):
+    last = comm.rank == comm.size - 1
+    frames = [{"some": 2**31 if last else -1, "others": -(2**31)}, {"some": 5, "others": -(2**31) - last}]
+    with ParticleOutput(shared_path / "particles", comm) as output:
+        for step, frame in enumerate(frames):
+            fields = {name: np.full(2, value) for name, value in frame.items()}
+            output.write(float(step), {"position": np.zeros((2, 2)), **fields})
+    for step, widths in enumerate([{"some": 8, "others": 4}, {"some": 4, "others": 8}]):
+        with h5py.File(shared_path / "particles" / f"00000{step}.h5") as file:
+            for name, width in widths.items():
+                assert file[name].dtype.itemsize == width
+                expected = np.repeat(comm.allgather(frames[step][name]), 2)
+                np.testing.assert_array_equal(file[name][()], expected)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("float32", [True, False])
 def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path, dim, float32):

@@ -172,7 +172,8 @@ def test_nodal_values_of_a_mesh_cut_anew(comm):
         start.nodal_of(smaller, np.zeros(len(smaller.points)))
 
 
-def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_path):
+@pytest.mark.parametrize("compression", [0, 1])  # compressed values are not put together in shared memory
+def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_path, compression):
     model = sliding_slope(comm)
     start = model.mesh
     names = ("mass", "velocity", "internal_force")
@@ -180,7 +181,9 @@ def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_
         MeshOutput(
             shared_path / "copies", comm, start.points, start.cells[: start.owned_cells], float32=False
         ) as copies,
-        ModelOutput(model, mesh=shared_path / "model", nodal_fields=names, float32=False) as output,
+        ModelOutput(
+            model, mesh=shared_path / "model", nodal_fields=names, float32=False, compression=compression
+        ) as output,
     ):
         with pytest.raises(mpm.InputError, match="'mass' are there only after a step"):
             output.write()
