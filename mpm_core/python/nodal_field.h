@@ -32,7 +32,7 @@ OutputField nodal_field(const Model<D>& model, const std::string& name)
   require_nodal_field(name);
   const auto& work = model.work;
   if (!work.ready)
-    throw InputError("nodal values of '" + name + "' are there only after a step");
+    throw InputError("nodal values of '" + name + "' are there only after a step or a report");
   OutputField field{name, work.nodes.size(), {}};
   const auto add = [&](const auto& first, std::size_t components, std::size_t bytes_apart)
   {

@@ -1,6 +1,7 @@
 #include "steps/model.h"
 
 #include "parallel/agreement.h"
+#include "steps/mapping.h"
 
 #include <algorithm>
 #include <cmath>
@@ -132,6 +133,10 @@ void prepare(Model<D>& model)
   MPI_Allreduce(MPI_IN_PLACE, &work.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
   model.inventory = taken_inventory(model);
   work.ready = true;
+
+  map_to_nodes(model); // what nodes are at the start may be looked at before a step
+  find_start_velocity(model);
+  work.velocity = work.start_velocity;
 }
 
 template void prepare(Model<2>&);

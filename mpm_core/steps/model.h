@@ -155,8 +155,8 @@ inline Vector<D> current_gravity(const Model<D>& model)
   return gravity_at(model, model.time);
 }
 
-/// Sorts the particles, and gathers runs and moments; needed after anything but a step has changed the particles.
-/// Does nothing when they are up to date.
+/// Sorts the particles, gathers runs and moments, and gives nodes the sums and velocities at the start; needed after
+/// anything but a step has changed the particles. Does nothing when they are up to date.
 /// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive
 /// @note Collective
 template <int D>

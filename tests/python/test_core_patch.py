@@ -54,3 +54,22 @@ def test_stretched_block_is_strained_evenly(dim, nmd):
     start, moved = by_id(model, "initial_position"), by_id(model, "displacement")
     assert np.abs(moved[:, 0] - strain * start[:, 0]).max() < strain**2
     assert np.abs(moved[:, 1:]).max() < strain**2
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_nodes_have_values_before_the_first_step(dim):
+    # A body in a larger box, moving as a whole, without stress: all of its weight is out of balance.
+    low, high = np.full(dim, 0.25), np.full(dim, 0.75)
+    model = mpm.Model(box([4] * dim, body=(low, high)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=1000.0, per_cell=dim + 1, cell_tag=1)
+    velocity = np.arange(1.0, dim + 1)
+    model.particles.set("velocity", np.tile(velocity, (len(model.particles), 1)))
+    model.set_gravity([0.0] * (dim - 1) + [-10.0])
+    report = model.report()
+    mass, x = model.nodal("mass"), model.mesh.points
+    assert mass.sum() == pytest.approx(1000.0 * 0.5**dim) == model.particles.mass.sum()
+    soil = ((x >= low) & (x <= high)).all(axis=1)
+    np.testing.assert_array_equal(mass > 0, soil)
+    np.testing.assert_allclose(model.nodal("velocity"), soil[:, None] * velocity, rtol=1e-14)
+    np.testing.assert_array_equal(model.nodal("internal_force"), 0)
+    assert report.unbalanced_ratio == pytest.approx(1)

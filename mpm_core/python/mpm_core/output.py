@@ -240,8 +240,8 @@ class ModelOutput:
             more: further fields of the particles by name, a row for each.
 
         Raises:
-            InputError: a further field is of another length or not numeric; or no step was taken yet, without which nodes have
-                no values.
+            InputError: a further field is of another length or not numeric; or there was neither a step nor a ``Model.report``
+                since the particles were set, without which nodes have no values.
             RunError: the frame cannot be written.
         """
         (real, whole), failure = (NO_FIELDS, "") if more is None else _tried(partial(_split_fields, more), NO_FIELDS)
