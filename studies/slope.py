@@ -48,6 +48,8 @@ comm = MPI.COMM_WORLD
 COLUMNS = [
     "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unbalanced_ratio", "plastic_share", "dt_s"
 ]  # fmt: skip
+
+
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
