@@ -213,17 +213,17 @@ template <class T>
 void SeriesFile::copy_reals(const Dataset& dataset, const Source& source)
 {
   const std::span<T> rows = _files.next<T>(), all = _files.whole<T>();
-  const auto& [columns, carrier, whole] = source;
+  const std::span<const OutputColumn> columns = source.columns;
   const std::size_t n = columns.size();
-  if (!carrier)
+  if (!source.carrier)
     copy_columns(columns, dataset.width, rows);
   else if (!all.empty())
-    scatter_columns(columns, carrier->given(), dataset.width, all);
+    scatter_columns(columns, source.carrier->given(), dataset.width, all);
   else
   {
     const auto pack = [&](std::size_t row, double* to)
     { std::ranges::transform(columns, to, [&](const OutputColumn& column) { return column[row]; }); };
-    const OutputField carried = row_field({}, carrier->carry(n, pack), static_cast<int>(n));
+    const OutputField carried = row_field({}, source.carrier->carry(n, pack), static_cast<int>(n));
     copy_columns(std::span<const OutputColumn>(carried.columns), dataset.width, rows);
   }
 }
@@ -283,6 +283,7 @@ void SeriesFile::write(const std::vector<SeriesFile*>& series)
     throw;
   }
   std::vector<std::string> failures;
+  failures.reserve(series.size());
   for (SeriesFile* file : series)
     failures.push_back(file->finish());
   const auto first = std::ranges::find_if(failures, [](const std::string& failure) { return !failure.empty(); });

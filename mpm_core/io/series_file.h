@@ -65,9 +65,9 @@ struct Storage
 class SeriesFile
 {
 public:
-  /// @param comm  must outlive the object
-  /// @param path  without suffix, or with .h5 or .xdmf; the folder around it must exist. What an earlier series left
-  ///              under this name is removed.
+  /// @param comm    must outlive the object
+  /// @param path    without suffix, or with .h5 or .xdmf; the folder around it must exist. What an earlier series left
+  ///                under this name is removed.
   /// @param grid    name of the grid in the XDMF file
   /// @param writer  the rank that writes the XDMF file, and files that ranks put together
   /// @throws RunError if the files cannot be written, with path and reason

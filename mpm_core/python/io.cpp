@@ -95,9 +95,9 @@ ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector
 template <int D>
 void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& names, ParticleSeries* particles,
                  MeshSeries* mesh, RowCarrier* carrier, const RealFields& more, const IntegerFields& more_integers,
-                 std::string failure)
+                 const std::string& failure)
 {
-  Frame frame{.time = model.time, .particles = particles, .mesh = mesh, .failure = std::move(failure)};
+  Frame frame{.time = model.time, .particles = particles, .mesh = mesh, .failure = failure};
   if (mesh)
     frame.mesh_fields.nodes = nodal_fields(model, names.nodes, carrier); // raises errors on all ranks or on none
   if (particles && frame.failure.empty())
