@@ -6,8 +6,8 @@ its ranks a second after Ctrl-C.
 
 from __future__ import annotations
 
+import os
 import signal
-import sys
 from types import FrameType
 
 from mpi4py import MPI
@@ -28,16 +28,17 @@ class Interrupt:
 
     def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         self._comm = comm
-        self._signal = 0
+        # Set by the handler alone: were the exchange to set it too, a signal that comes in its middle would be lost.
+        self._caught = 0
+        self._agreed = 0  # what came on any rank, as far as all know of it
         self._before: dict[int, object] = {}
 
     def _catch(self, number: int, _: FrameType | None) -> None:
-        self._signal = number
+        self._caught = number
         self._restore()  # so that the next one has its usual effect
         if self._comm.rank == 0:
-            print(
-                "\ninterrupted: ending after this step and writing what there is; again to end at once", file=sys.stderr
-            )
+            # Past Python's buffer, which the signal may have found half-way through another line.
+            os.write(2, b"\ninterrupted: ending after this step and writing what there is; again to end at once\n")
 
     def requested(self) -> bool:
         """Whether the run should end; true on all ranks once a signal came on any.
@@ -45,13 +46,14 @@ class Interrupt:
         Note:
             Collective.
         """
-        self._signal = self._comm.allreduce(self._signal, op=MPI.MAX)
-        return self._signal != 0
+        self._agreed = self._comm.allreduce(self._caught, op=MPI.MAX)
+        return self._agreed != 0
 
     @property
     def exit_code(self) -> int:
         """0, or 128 plus the signal's number, as shells have it."""
-        return 128 + self._signal if self._signal else 0
+        number = max(self._caught, self._agreed)
+        return 128 + number if number else 0
 
     def _restore(self) -> None:
         for number, handler in self._before.items():

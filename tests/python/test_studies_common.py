@@ -111,7 +111,7 @@ def test_history_is_on_disk_after_each_row(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
-def test_the_first_signal_sets_a_flag(number, capsys):
+def test_the_first_signal_sets_a_flag(number, capfd):
     before = signal.getsignal(number)
     with Interrupt() as interrupt:
         assert not interrupt.requested() and interrupt.exit_code == 0
@@ -119,7 +119,31 @@ def test_the_first_signal_sets_a_flag(number, capsys):
         assert interrupt.requested()
         assert signal.getsignal(number) == before
     assert interrupt.exit_code == 128 + number
-    assert "ending after this step" in capsys.readouterr().err
+    assert "ending after this step" in capfd.readouterr().err
+
+
+class CommOfASignal:
+    """A communicator on which a signal comes in the middle of an exchange, when the flag has already been read."""
+
+    rank = 0
+
+    def __init__(self, number):
+        self.number = number
+
+    def allreduce(self, value, op):
+        if self.number:
+            number, self.number = self.number, 0
+            os.kill(os.getpid(), number)
+            time.sleep(0.01)  # the handler runs before this returns
+        return value
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+def test_a_signal_during_the_exchange_is_not_lost(number):
+    with Interrupt(CommOfASignal(number)) as interrupt:
+        assert interrupt.requested() or interrupt.requested()
+        assert interrupt.requested()
+    assert interrupt.exit_code == 128 + number
 
 
 def test_the_second_signal_ends_the_program():
