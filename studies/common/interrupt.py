@@ -1,22 +1,23 @@
 """Ctrl-C and SIGTERM end a run cleanly: the loop sees a flag, and the results so far are written.
 
-So does SIGUSR1, which mpirun hands on to its ranks; `studies/run --ranks` turns Ctrl-C into it, since mpirun itself kills
-its ranks a second after Ctrl-C.
+So does the end of the terminal (SIGHUP), unless nohup keeps it away, and SIGUSR1, which mpirun hands on to its ranks;
+`studies/run --ranks` turns the others into it, since mpirun itself kills its ranks a second after Ctrl-C.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 from types import FrameType
 
 from mpi4py import MPI
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP)
 
 
 class Interrupt:
-    """Catches the first of these signals while the context lasts; a second one ends the program at once.
+    """Catches the first of these signals while the context lasts; a second one, but SIGHUP, ends the program at once.
 
     Example:
         >>> with Interrupt() as interrupt:
@@ -35,10 +36,12 @@ class Interrupt:
 
     def _catch(self, number: int, _: FrameType | None) -> None:
         self._caught = number
-        self._restore()  # so that the next one has its usual effect
+        if number != signal.SIGHUP:  # which a shell repeats to its jobs
+            self._restore()  # so that the next one has its usual effect
         if self._comm.rank == 0:
             # Past Python's buffer, which the signal may have found half-way through another line.
-            os.write(2, b"\ninterrupted: ending after this step and writing what there is; again to end at once\n")
+            with contextlib.suppress(OSError):
+                os.write(2, b"\ninterrupted: ending after this step and writing what there is; again to end at once\n")
 
     def requested(self) -> bool:
         """Whether the run should end; true on all ranks once a signal came on any.
@@ -61,7 +64,9 @@ class Interrupt:
         self._before = {}
 
     def __enter__(self) -> Interrupt:
-        self._before = {number: signal.signal(number, self._catch) for number in SIGNALS}
+        nohup = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        caught = [number for number in SIGNALS if not (nohup and number == signal.SIGHUP)]
+        self._before = {number: signal.signal(number, self._catch) for number in caught}
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import io
+import signal
 import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
@@ -26,6 +29,32 @@ def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
     sys.excepthook = end
 
 
+class _Unheard(io.FileIO):
+    """A standard stream that stays one when its reader has ended: a closed pipe or terminal, to which text is lost."""
+
+    def write(self, text: Any) -> int:
+        try:
+            return super().write(text)
+        except OSError as error:
+            if error.errno not in (errno.EPIPE, errno.EIO):
+                raise
+            return len(text)
+
+
+def outlive_readers() -> None:
+    """From now on a run goes on when the reader of what it prints has ended.
+
+    In ``studies/run slope 2>&1 | tee log`` Ctrl-C ends tee, too, and what the study still prints must not keep it from
+    writing its results.
+    """
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # which Python does, but PETSc ends the program
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        stream = getattr(sys, name)
+        stream.flush()
+        raw = io.BufferedWriter(_Unheard(number, "w", closefd=False))
+        setattr(sys, name, io.TextIOWrapper(raw, stream.encoding, stream.errors, line_buffering=True))
+
+
 def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoReturn:
     """Run a study's script and exit with what ``main`` returns.
 
@@ -35,6 +64,7 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     """
     comm = MPI.COMM_WORLD
     end_all_on_error(comm)
+    outlive_readers()
     try:
         sys.exit(main())
     except expected as error:

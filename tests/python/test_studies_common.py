@@ -110,14 +110,18 @@ def test_history_is_on_disk_after_each_row(tmp_path):
             history.add(time_s=1.0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP])
 def test_the_first_signal_sets_a_flag(number, capfd):
     before = signal.getsignal(number)
     with Interrupt() as interrupt:
         assert not interrupt.requested() and interrupt.exit_code == 0
         os.kill(os.getpid(), number)
         assert interrupt.requested()
-        assert signal.getsignal(number) == before
+        if number == signal.SIGHUP:
+            os.kill(os.getpid(), number)
+        else:
+            assert signal.getsignal(number) == before
+    assert signal.getsignal(number) == before
     assert interrupt.exit_code == 128 + number
     assert "ending after this step" in capfd.readouterr().err
 
@@ -136,6 +140,16 @@ class CommOfASignal:
             os.kill(os.getpid(), number)
             time.sleep(0.01)  # the handler runs before this returns
         return value
+
+
+def test_a_run_under_nohup_does_not_see_the_end_of_the_terminal():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupt() as interrupt:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not interrupt.requested()
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])

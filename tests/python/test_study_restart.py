@@ -1,7 +1,11 @@
 """The slope stopped and started again: what was written stays, and the end is the same."""
 
 import csv
+import json
 import os
+import pty
+import select
+import shlex
 import signal
 import subprocess
 import sys
@@ -90,6 +94,46 @@ def test_an_interrupted_slope_leaves_a_checkpoint(tmp_path, number):
     assert "--restart" in err and (tmp_path / "checkpoint.h5").exists() and (tmp_path / "summary.json").exists()
     result = slope(tmp_path, "--restart", str(tmp_path / "checkpoint.h5"), "--time", "1e-3")
     assert result.returncode == 2 and "a time not before the present" in result.stderr
+
+
+def rows_are_there(folder):
+    path = folder / "history.csv"
+    return path.exists() and path.read_text().count("\n") > 2
+
+
+def stopped_with_a_checkpoint(folder):
+    stopped = json.loads((folder / "summary.json").read_text())["stopped_because"]
+    return "interrupted at" in stopped and (folder / "checkpoint.h5").exists()
+
+
+@pytest.mark.parametrize("ranks", [[], ["--ranks", "2"]], ids=["alone", "ranks"])
+def test_ctrl_c_that_ends_the_reader_too_leaves_a_checkpoint(tmp_path, ranks):
+    folder = tmp_path / "slope"
+    study = shlex.join([str(STUDIES / "run"), *ranks, "slope", "--output", str(folder), *SMALL, "--time", "1e4"])
+    shell = subprocess.Popen(["bash", "-o", "pipefail", "-c", f"{study} 2>&1 | tee '{tmp_path}/log'"],
+                             stdout=subprocess.PIPE, text=True, start_new_session=True)  # fmt: skip
+    while not rows_are_there(folder) and shell.poll() is None:
+        time.sleep(0.05)
+    os.killpg(shell.pid, signal.SIGINT)
+    shell.communicate(timeout=60)
+    assert "results in" not in (tmp_path / "log").read_text()
+    assert stopped_with_a_checkpoint(folder)
+
+
+@pytest.mark.parametrize("ranks", [[], ["--ranks", "2"]], ids=["alone", "ranks"])
+def test_the_end_of_the_terminal_leaves_a_checkpoint(tmp_path, ranks):
+    child, terminal = pty.fork()
+    if child == 0:
+        study = str(STUDIES / "run")
+        os.execv(study, [study, *ranks, "slope", "--output", str(tmp_path), *SMALL, "--time", "1e4"])
+    deadline = time.monotonic() + 60
+    while not rows_are_there(tmp_path) and time.monotonic() < deadline:
+        if select.select([terminal], [], [], 0.05)[0]:
+            os.read(terminal, 4096)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 128 + (signal.SIGUSR1 if ranks else signal.SIGHUP)
+    assert stopped_with_a_checkpoint(tmp_path)
 
 
 def test_a_restart_from_something_else_is_refused_on_all_ranks(tmp_path):
