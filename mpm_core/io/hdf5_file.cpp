@@ -54,17 +54,6 @@ hid_t space_of(const Dataset& dataset)
 }
 } // namespace
 
-RowSlice row_slice(MPI_Comm comm, std::size_t local)
-{
-  RowSlice rows;
-  rows.local = static_cast<GlobalIndex>(local);
-  GlobalIndex up_to_here = 0;
-  MPI_Scan(&rows.local, &up_to_here, 1, MPI_INT64_T, MPI_SUM, comm);
-  rows.before = up_to_here - rows.local;
-  MPI_Allreduce(&rows.local, &rows.total, 1, MPI_INT64_T, MPI_SUM, comm);
-  return rows;
-}
-
 Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, int compression)
     : _comm(comm), _path(std::move(path)), _compression(compression)
 {

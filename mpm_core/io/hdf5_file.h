@@ -4,6 +4,7 @@
 
 #include "io/descriptor.h"
 #include "parallel/agreement.h"
+#include "parallel/row_slice.h"
 
 #include <filesystem>
 #include <optional>
@@ -14,17 +15,6 @@
 
 namespace mpm
 {
-/// This rank's rows in an array that all ranks hold together, by rising rank.
-struct RowSlice
-{
-  GlobalIndex before = 0; ///< rows on lower ranks
-  GlobalIndex local = 0;
-  GlobalIndex total = 0;
-};
-
-/// @note Collective
-RowSlice row_slice(MPI_Comm comm, std::size_t local);
-
 /// How numbers are stored.
 enum class Number
 {

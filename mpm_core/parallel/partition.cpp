@@ -2,6 +2,7 @@
 
 #include "parallel/agreement.h"
 #include "parallel/halo.h"
+#include "parallel/row_slice.h"
 
 #ifdef TALUS_SCOTCH
 #include <cstdio> // which scotch.h needs before it
@@ -32,12 +33,11 @@ struct CellGraph
 template <int D>
 CellGraph cell_graph(const Mesh<D>& mesh, std::span<const GlobalIndex> weights, MPI_Comm comm)
 {
-  GlobalIndex count = mesh.owned_cells, first = 0;
-  MPI_Scan(&count, &first, 1, MPI_INT64_T, MPI_SUM, comm);
+  const GlobalIndex first = row_slice(comm, static_cast<std::size_t>(mesh.owned_cells)).before;
   std::vector<double> own;
   own.reserve(weights.size());
   for (Index c = 0; c < mesh.owned_cells; ++c)
-    own.push_back(static_cast<double>(first - count + c));
+    own.push_back(static_cast<double>(first + c));
   const std::vector<double> numbers = with_ghost_values(mesh, own, comm);
   CellGraph graph;
   // A rank without cells must give arrays too: PT-SCOTCH takes none on one rank for another kind of graph.

@@ -1,5 +1,7 @@
 #include "parallel/row_carrier.h"
 
+#include "parallel/row_slice.h"
+
 #include <algorithm>
 #include <numeric>
 
@@ -35,10 +37,7 @@ RowCarrier::RowCarrier(MPI_Comm comm, std::span<const std::int64_t> ranks, std::
   MPI_Alltoall(_n_taken.data(), 1, MPI_INT, _n_given.data(), 1, MPI_INT, comm);
   std::iota(_order.begin(), _order.end(), std::size_t{0});
   std::ranges::stable_sort(_order, {}, [&](std::size_t i) { return ranks[i]; });
-  const auto n_wanted = static_cast<std::int64_t>(_order.size());
-  std::int64_t up_to_here = 0;
-  MPI_Scan(&n_wanted, &up_to_here, 1, MPI_INT64_T, MPI_SUM, comm);
-  const std::int64_t before = up_to_here - n_wanted;
+  const GlobalIndex before = row_slice(comm, _order.size()).before;
   std::vector<Given> asked(rows.size());
   std::ranges::transform(_order, asked.begin(),
                          [&](std::size_t i) {

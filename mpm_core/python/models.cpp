@@ -73,7 +73,7 @@ py::array_t<double> nodal(const Model<D>& model, const std::string& name)
   py::array_t<double> array(shape);
   for (std::size_t k = 0; k < width; ++k)
     for (std::size_t i = 0; i < field.rows; ++i)
-      array.mutable_data()[i * width + k] = field.columns[k].first[i * field.columns[k].stride];
+      array.mutable_data()[i * width + k] = field.columns[k][i];
   return array;
 }
 

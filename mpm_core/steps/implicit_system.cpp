@@ -1,5 +1,7 @@
 #include "steps/implicit_system.h"
 
+#include "parallel/row_slice.h"
+
 #include <algorithm>
 
 namespace mpm
@@ -32,15 +34,11 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
   int changed = owned != system.owned || cells != system.cells || ghosts != system.ghosts;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
-  const auto count = static_cast<GlobalIndex>(owned.size());
-  GlobalIndex first = 0;
-  MPI_Exscan(&count, &first, 1, MPI_INT64_T, MPI_SUM, exchange.comm);
-  if (exchange.rank == 0)
-    first = 0;
-  MPI_Allreduce(&count, &system.total, 1, MPI_INT64_T, MPI_SUM, exchange.comm);
+  const RowSlice rows = row_slice(exchange.comm, owned.size());
+  system.total = rows.total;
   std::vector<std::array<double, 2>> sums(static_cast<std::size_t>(n)); // number, stiffness; whole numbers are exact
   for (std::size_t k = 0; k < owned.size(); ++k)
-    sums[owned[k]][0] = static_cast<double>(first + static_cast<GlobalIndex>(k));
+    sums[owned[k]][0] = static_cast<double>(rows.before + static_cast<GlobalIndex>(k));
   for (const Run& run : model.work.runs)
   {
     double volume = 0;

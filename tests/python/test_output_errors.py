@@ -128,13 +128,6 @@ def test_time_must_be_finite(tmp_path):
             output.write(float("nan"), GOOD)
 
 
-def test_nothing_is_written_after_closing(tmp_path):
-    output = ParticleOutput(tmp_path / "particles", COMM)
-    output.close()
-    with pytest.raises(RunError, match="it is closed"):
-        output.write(0.0, GOOD)
-
-
 BAD_MESHES = [
     (SQUARE, TRIANGLES + 2, "cells has node 5, expected numbers from 0 to 3"),
     (SQUARE, TRIANGLES[:, :2], r"cells has shape \(2, 2\)"),
