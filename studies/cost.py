@@ -132,7 +132,7 @@ def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> d
             seconds, reached = limited(work, a.limit)
     watched = case.crest_particle()
     particles = model.particles
-    crest = float(np.linalg.norm(particles.displacement[particles.id == watched], axis=1).max())
+    crest = float(np.linalg.norm(particles[particles.id == watched].displacement, axis=1).max())
     return {
         "soil": soil, "method": name, "cell_size_m": a.cell_size, "particles": len(particles),
         "cells": len(particles) // a.particles_per_cell, "reached": reached, "cpu_seconds": seconds,

@@ -78,8 +78,8 @@ def slide(case: SlopeCase, toe: float, crest_id: int) -> tuple[np.ndarray, list[
         return comm.allreduce(particles.position[:, 0].max(initial=-np.inf), MPI.MAX) - toe
 
     def crest() -> float:
-        mine = particles.displacement[particles.id == crest_id]
-        return comm.allreduce(float(np.linalg.norm(mine)))
+        mine = particles[particles.id == crest_id]
+        return comm.allreduce(float(np.linalg.norm(mine.displacement)))
 
     rows, frames = [(0.0, farthest(), crest())], [particle_frame(case.model, 0.0)]
     for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping):

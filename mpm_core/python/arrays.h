@@ -58,7 +58,7 @@ std::span<T> mutable_values(const char* name, py::array& array)
   return {static_cast<T*>(array.mutable_data()), static_cast<std::size_t>(array.size())};
 }
 
-/// A new array with a copy of the values; (n,) when width is 1 and flat, else (n, width).
+/// A new array with a copy of the values, shape (n,).
 template <class T, class Allocator>
 py::array_t<T> copied(const std::vector<T, Allocator>& values)
 {

@@ -5,6 +5,7 @@
 #include "particles/seed.h"
 #include "python/arrays.h"
 #include "python/nodal_field.h"
+#include "python/particle_columns.h"
 #include "steps/mapping.h"
 #include "steps/placement.h"
 #include "steps/rebalance.h"
@@ -35,32 +36,6 @@ std::shared_ptr<Mesh<D>> mesh_from_arrays(const py::array& points, const py::arr
                    rank));
 }
 
-/// Columns of a vector or tensor field as rows of a new array.
-template <class C>
-py::array_t<double> rows(const C& columns, std::size_t size)
-{
-  const std::size_t width = columns.size();
-  py::array_t<double> array({size, width});
-  double* out = array.mutable_data();
-  for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t p = 0; p < columns[k].size(); ++p)
-      out[p * width + k] = columns[k][p];
-  return array;
-}
-
-template <class C>
-void set_rows(const char* name, const py::array& array, C& columns, std::size_t size)
-{
-  check_array<double>(name, array, {static_cast<py::ssize_t>(size), static_cast<py::ssize_t>(columns.size())});
-  const double* in = values<double>(array).data();
-  for (std::size_t k = 0; k < columns.size(); ++k)
-  {
-    columns[k].resize(size);
-    for (std::size_t p = 0; p < size; ++p)
-      columns[k][p] = in[p * columns.size() + k];
-  }
-}
-
 /// A copy of a nodal field: (nodes,) for numbers, (nodes, D) for vectors.
 template <int D>
 py::array_t<double> nodal(const Model<D>& model, const std::string& name)
@@ -75,73 +50,6 @@ py::array_t<double> nodal(const Model<D>& model, const std::string& name)
     for (std::size_t i = 0; i < field.rows; ++i)
       array.mutable_data()[i * width + k] = field.columns[k][i];
   return array;
-}
-
-template <int D>
-py::object column(const Model<D>& model, const std::string& name)
-{
-  const Particles<D>& p = model.particles;
-  const std::size_t n = p.id.size();
-  if (name == "id")
-    return copied(p.id);
-  if (name == "material")
-    return copied(p.material);
-  if (name == "cell")
-    return copied(p.cell);
-  if (name == "volume")
-    return copied(p.volume);
-  if (name == "mass")
-    return copied(p.mass);
-  if (name == "deviatoric_strain")
-    return copied(p.deviatoric_strain);
-  if (name == "position")
-    return rows(p.position, n);
-  if (name == "velocity")
-    return rows(p.velocity, n);
-  if (name == "stress")
-    return rows(p.stress, n);
-  if (name == "initial_position")
-    return rows(p.initial_position, n);
-  if (name == "traction")
-    return rows(p.traction, p.loaded ? n : 0);
-  if (name == "state")
-    return rows(p.state, n);
-  throw InputError("particle field is '" + name + "', which does not exist");
-}
-
-template <int D>
-void set_column(Model<D>& model, const std::string& name, const py::array& array)
-{
-  Particles<D>& p = model.particles;
-  const std::size_t n = p.id.size();
-  auto scalar = [&](Column& column)
-  {
-    check_array<double>(name.c_str(), array, {static_cast<py::ssize_t>(n)});
-    const auto in = values<double>(array);
-    column.assign(in.begin(), in.end());
-  };
-  if (name == "volume")
-    scalar(p.volume);
-  else if (name == "mass")
-    scalar(p.mass);
-  else if (name == "deviatoric_strain")
-    scalar(p.deviatoric_strain);
-  else if (name == "velocity")
-    set_rows(name.c_str(), array, p.velocity, n);
-  else if (name == "stress")
-    set_rows(name.c_str(), array, p.stress, n);
-  else if (name == "initial_position")
-    set_rows(name.c_str(), array, p.initial_position, n);
-  else if (name == "traction")
-  {
-    set_rows(name.c_str(), array, p.traction, n);
-    p.loaded = true;
-  }
-  else if (name == "state")
-    set_rows(name.c_str(), array, p.state, n);
-  else
-    throw InputError("particle field is '" + name + "', which cannot be set");
-  model.work.ready = false;
 }
 
 py::dict as_dict(const Diagnostics& d)
@@ -294,6 +202,8 @@ void bind_model(py::module_& m, const std::string& suffix)
              return as_dict(diagnostics(model));
            })
       .def("column", &column<D>)
+      .def("row_numbers", &row_numbers<D>)
+      .def("find_rows", &find_rows<D>)
       .def("set_column", &set_column<D>)
       .def("place_particles",
            [](M& model, const py::array& positions)

@@ -22,8 +22,8 @@ class Watch:
     def crest_displacement(self) -> float:
         """Length of the displacement of the particle that started at the crest [m]. Collective."""
         p = self.model.particles
-        mine = np.flatnonzero(p.id == self.crest_id)
-        return self.model.comm.allreduce(float(np.linalg.norm(p.displacement[mine])))
+        found = p.find([self.crest_id])
+        return self.model.comm.allreduce(float(np.linalg.norm(p[found[found >= 0]].displacement)))
 
     def runout(self) -> float:
         """Advance of the farthest particle past where the farthest one started [m]. Collective."""

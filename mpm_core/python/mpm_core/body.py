@@ -40,7 +40,7 @@ class Body:
         """How often the mesh has been cut anew."""
         self._first_mesh = mesh  # kept, since it may own the communicator
         self._left_imbalance = 1.0  # by the last cut
-        self.particles = Particles(self._core, mesh.dim)
+        self.particles = Particles(self._core)
         """The particles on this rank."""
 
     # --- particles -----------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Any, Protocol
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
@@ -95,14 +96,17 @@ class ParticleProbe:
 
     def values(self) -> dict[str, float]:
         """Numbers by name; NaN for a particle that flowed out."""
-        p, comm = self.model.particles, self.model.comm
-        ids = p.id
-        here = np.flatnonzero(ids == self.ids[0] if len(self.ids) == 1 else np.isin(ids, self.ids))
-        fields = [p.position, p.displacement, p.velocity, p.stress]
-        mine = {int(ids[k]): np.concatenate([field[k] for field in fields]) for k in here}
-        found = {number: row for part in comm.allgather(mine) for number, row in part.items()}
-        absent = np.full(len(self._columns), np.nan)
-        rows = np.array([found.get(number, absent) for number in self.ids])
+        p = self.model.particles
+        found = p.find(self.ids)
+        here = np.flatnonzero(found >= 0)
+        few = p[found[here]]
+        # The first column counts the ranks that have the particle, which is one or none.
+        rows = np.zeros((len(self.ids), 1 + len(self._columns)))
+        rows[here, 0] = 1
+        rows[here, 1:] = np.hstack([few.position, few.displacement, few.velocity, few.stress])
+        self.model.comm.Allreduce(MPI.IN_PLACE, rows)
+        rows[rows[:, 0] == 0] = np.nan
+        rows = rows[:, 1:]
         return {"time_s": self.model.time, **_numbered(rows, self._columns)}
 
 
@@ -141,13 +145,13 @@ class PointProbe:
         sums = np.zeros(
             (len(self._points), 2 + len(self._columns))
         )  # ranks that have it, volumes of cell and soil, the rest
-        cell_of, volume = p.cell, p.volume
+        cell_of = p.cell
         for k, cell in enumerate(self._own_cells()):
             if cell < 0:
                 continue
-            inside = cell_of == cell
-            v = volume[inside, None]
-            moments = np.concatenate([(v * p.velocity[inside]).sum(axis=0), (v * p.stress[inside]).sum(axis=0)])
+            inside = p[cell_of == cell]
+            v = inside.volume[:, None]
+            moments = np.concatenate([(v * inside.velocity).sum(axis=0), (v * inside.stress).sum(axis=0)])
             sums[k] = [1.0, model.mesh.cell_volumes[cell], v.sum(), *moments]
         # A point on a side between the cells of two ranks is seen by both: the mean of the two.
         sums = model.comm.allreduce(sums)
@@ -201,10 +205,9 @@ class SectionProbe:
         model, dim = self.model, self.model.mesh.dim
         if self._mesh is not model.mesh:
             self._cut(model.mesh)
-        p, cell = model.particles, model.particles.cell
-        inside = np.flatnonzero(self._is_cut[cell])
-        stress = _matrices(p.stress[inside], dim) * p.volume[inside, None, None]
-        mine = np.einsum("pij,pj->i", stress, self._gradient[cell[inside]])
+        inside = model.particles[self._is_cut[model.particles.cell]]
+        stress = _matrices(inside.stress, dim) * inside.volume[:, None, None]
+        mine = np.einsum("pij,pj->i", stress, self._gradient[inside.cell])
         force = np.empty(dim)
         model.comm.Allreduce(mine, force)
         along = {"force_normal_N": float(force @ self._normal)}

@@ -1,0 +1,184 @@
+#pragma once
+/// @file
+/// Fields of particles by name, as NumPy arrays.
+
+#include "python/arrays.h"
+#include "steps/model.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+namespace mpm::python
+{
+using RowNumbers = py::array_t<std::int64_t, py::array::c_style>;
+/// Rows of particles, or none for all.
+using ChosenRows = std::optional<RowNumbers>;
+
+/// @throws InputError for a row that is not there
+inline void require_rows(const RowNumbers& rows, std::size_t size)
+{
+  for (const std::int64_t row : values<std::int64_t>(rows))
+    if (row < 0 || row >= static_cast<std::int64_t>(size))
+      throw InputError("rows has " + std::to_string(row) + ", expected 0 to " +
+                       std::to_string(static_cast<std::int64_t>(size) - 1) + ", as there are particles on this rank");
+}
+
+/// @param rows  numbers of rows, or whether each row is chosen
+/// @throws InputError for other arrays, or a row that is not there
+template <int D>
+RowNumbers row_numbers(const Model<D>& model, const py::array& rows)
+{
+  const std::size_t size = model.particles.id.size();
+  const char kind = rows.dtype().kind();
+  if (kind == 'b')
+  {
+    const py::array_t<bool, py::array::c_style> mask(rows);
+    check_array<bool>("rows", mask, {static_cast<py::ssize_t>(size)});
+    std::vector<std::int64_t> chosen;
+    for (std::size_t p = 0; const bool is_chosen : values<bool>(mask))
+    {
+      if (is_chosen)
+        chosen.push_back(static_cast<std::int64_t>(p));
+      ++p;
+    }
+    return copied(chosen);
+  }
+  if (rows.ndim() != 1 || (kind != 'i' && kind != 'u' && rows.size() > 0))
+    throw InputError("rows has shape " + shape_text(rows) + " and dtype " + py::str(rows.dtype()).cast<std::string>() +
+                     ", expected whole numbers in the shape (m,), or bool for each particle");
+  auto numbers = rows.cast<py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>>();
+  require_rows(numbers, size);
+  return numbers;
+}
+
+/// The row of each of some particles; -1 for those that are not on this rank.
+template <int D>
+py::array_t<std::int64_t> find_rows(const Model<D>& model, const std::vector<std::int64_t>& ids)
+{
+  std::vector<std::size_t> order(ids.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t k) { return ids[k]; });
+  std::vector<std::int64_t> rows(ids.size(), -1);
+  for (std::size_t p = 0; p < model.particles.id.size(); ++p)
+    for (const std::size_t k :
+         std::ranges::equal_range(order, model.particles.id[p], {}, [&](std::size_t i) { return ids[i]; }))
+      rows[k] = static_cast<std::int64_t>(p);
+  return copied(rows);
+}
+
+/// A copy of the chosen particles' values.
+template <class T, class Allocator>
+py::array_t<T> chosen_of(const std::vector<T, Allocator>& column, const ChosenRows& chosen)
+{
+  if (!chosen)
+    return copied(column);
+  py::array_t<T> array(chosen->size());
+  std::ranges::transform(values<std::int64_t>(*chosen), array.mutable_data(),
+                         [&](std::int64_t row) { return column[static_cast<std::size_t>(row)]; });
+  return array;
+}
+
+/// Columns of a vector or tensor field as rows of a new array, of the chosen particles.
+template <class C>
+py::array_t<double> rows(const C& columns, std::size_t size, const ChosenRows& chosen)
+{
+  const std::size_t width = columns.size();
+  const std::int64_t* const row = chosen ? chosen->data() : nullptr;
+  if (row)
+    size = static_cast<std::size_t>(chosen->size());
+  py::array_t<double> array({size, width});
+  double* out = array.mutable_data();
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t p = 0; p < size; ++p)
+      out[p * width + k] = columns[k][row ? static_cast<std::size_t>(row[p]) : p];
+  return array;
+}
+
+template <class C>
+void set_rows(const char* name, const py::array& array, C& columns, std::size_t size)
+{
+  check_array<double>(name, array, {static_cast<py::ssize_t>(size), static_cast<py::ssize_t>(columns.size())});
+  const double* in = values<double>(array).data();
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    columns[k].resize(size);
+    for (std::size_t p = 0; p < size; ++p)
+      columns[k][p] = in[p * columns.size() + k];
+  }
+}
+
+/// A copy of a field, of all particles or of the chosen ones.
+/// @throws InputError for a field that does not exist, or a row that is not there
+template <int D>
+py::object column(const Model<D>& model, const std::string& name, const ChosenRows& chosen)
+{
+  const Particles<D>& p = model.particles;
+  const std::size_t n = p.id.size();
+  if (chosen)
+    require_rows(*chosen, n);
+  if (name == "id")
+    return chosen_of(p.id, chosen);
+  if (name == "material")
+    return chosen_of(p.material, chosen);
+  if (name == "cell")
+    return chosen_of(p.cell, chosen);
+  if (name == "volume")
+    return chosen_of(p.volume, chosen);
+  if (name == "mass")
+    return chosen_of(p.mass, chosen);
+  if (name == "deviatoric_strain")
+    return chosen_of(p.deviatoric_strain, chosen);
+  if (name == "position")
+    return rows(p.position, n, chosen);
+  if (name == "velocity")
+    return rows(p.velocity, n, chosen);
+  if (name == "stress")
+    return rows(p.stress, n, chosen);
+  if (name == "initial_position")
+    return rows(p.initial_position, n, chosen);
+  if (name == "traction")
+    return p.loaded ? rows(p.traction, n, chosen) : rows(p.traction, 0, {});
+  if (name == "state")
+    return rows(p.state, n, chosen);
+  throw InputError("particle field is '" + name + "', which does not exist");
+}
+
+/// @throws InputError for a field that cannot be set, or another shape
+template <int D>
+void set_column(Model<D>& model, const std::string& name, const py::array& array)
+{
+  Particles<D>& p = model.particles;
+  const std::size_t n = p.id.size();
+  auto scalar = [&](Column& column)
+  {
+    check_array<double>(name.c_str(), array, {static_cast<py::ssize_t>(n)});
+    const auto in = values<double>(array);
+    column.assign(in.begin(), in.end());
+  };
+  if (name == "volume")
+    scalar(p.volume);
+  else if (name == "mass")
+    scalar(p.mass);
+  else if (name == "deviatoric_strain")
+    scalar(p.deviatoric_strain);
+  else if (name == "velocity")
+    set_rows(name.c_str(), array, p.velocity, n);
+  else if (name == "stress")
+    set_rows(name.c_str(), array, p.stress, n);
+  else if (name == "initial_position")
+    set_rows(name.c_str(), array, p.initial_position, n);
+  else if (name == "traction")
+  {
+    set_rows(name.c_str(), array, p.traction, n);
+    p.loaded = true;
+  }
+  else if (name == "state")
+    set_rows(name.c_str(), array, p.state, n);
+  else
+    throw InputError("particle field is '" + name + "', which cannot be set");
+  model.work.ready = false;
+}
+} // namespace mpm::python
