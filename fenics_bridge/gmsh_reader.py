@@ -10,8 +10,21 @@ import signal
 import sys
 from pathlib import Path
 
-import gmsh
 import numpy as np
+
+
+@contextlib.contextmanager
+def _own_ctrl_c():
+    """Ctrl-C stays what it is, a KeyboardInterrupt usually, while gmsh would have it end Python at once."""
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
+
+
+with _own_ctrl_c():
+    import gmsh
 
 _SIMPLEX = {2: "triangles", 3: "tetrahedra"}
 _GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh
@@ -25,15 +38,14 @@ class MeshError(Exception):
 
 @contextlib.contextmanager
 def gmsh_session():
-    """gmsh, silent; its handling of Ctrl-C is undone."""
-    handler = signal.getsignal(signal.SIGINT)
-    gmsh.initialize(["gmsh", "-v", "0"], False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        yield gmsh.model
-    finally:
-        gmsh.finalize()
-        signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
+    """gmsh, silent."""
+    with _own_ctrl_c():
+        gmsh.initialize(["gmsh", "-v", "0"], False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            yield gmsh.model
+        finally:
+            gmsh.finalize()
 
 
 def gmsh_message(error):

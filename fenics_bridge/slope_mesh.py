@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-import gmsh
 import numpy as np
 
 from fenics_bridge.errors import InputError, on_root
-from fenics_bridge.gmsh_reader import gmsh_message, gmsh_session
+from fenics_bridge.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.meshes import arrays_from_model
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 

@@ -60,14 +60,22 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
 
     Args:
         main: the study.
-        expected: errors whose message is all that the user needs; they end the script with code 2.
+        expected: errors whose message is all that the user needs; they end the script with code 2. Ctrl-C, where the
+            study does not catch it by `Interrupt`, ends it with code 130.
     """
-    comm = MPI.COMM_WORLD
+    comm, script = MPI.COMM_WORLD, Path(sys.argv[0])
+    name = script.parent.name if script.stem == "__main__" else script.stem
     end_all_on_error(comm)
     outlive_readers()
+    signal.signal(signal.SIGUSR1, signal.default_int_handler)  # by which `studies/run --ranks` hands Ctrl-C on
     try:
         sys.exit(main())
     except expected as error:
         if comm.rank == 0:
-            print(f"studies/run {Path(sys.argv[0]).stem}: {error}", file=sys.stderr)
+            print(f"studies/run {name}: {error}", file=sys.stderr)
         sys.exit(2)
+    except KeyboardInterrupt:
+        print(f"\nstudies/run {name}: interrupted", file=sys.stderr)
+        if comm.size > 1:
+            comm.Abort(128 + signal.SIGINT)
+        sys.exit(128 + signal.SIGINT)

@@ -172,6 +172,29 @@ def test_the_second_signal_ends_the_program():
     assert child.wait(timeout=10) == -signal.SIGTERM
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ctrl_c_that_nothing_catches_ends_all_ranks_without_a_traceback(ranks):
+    script = """
+import os, signal
+import fenics_bridge  # with it comes gmsh, which would have Ctrl-C end Python at once
+from mpi4py import MPI
+from studies.common.ranks import run_study
+def main():
+    if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
+        os.kill(os.getpid(), signal.SIGINT)
+    while True:
+        MPI.COMM_WORLD.barrier()
+run_study(main)
+"""
+    command = [sys.executable, "-c", script]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), "--oversubscribe", *command]
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    child = subprocess.run(command, capture_output=True, text=True, timeout=60, env={**os.environ, **root})
+    assert child.returncode == 130
+    assert ": interrupted" in child.stderr and "Traceback" not in child.stderr
+
+
 def test_progress_without_a_terminal_prints_lines(capsys):
     with Progress("sliding", until=2.0, pause=0.05) as progress:
         progress.show(0.5, 10, crest="0.10 m")

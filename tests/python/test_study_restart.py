@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[2] / "studies"
+# Python's own copy, without what MPI adds to it in this process.
+ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 SMALL = [
     "--initial",
     "zero",
@@ -37,8 +39,7 @@ def slope(folder, *options, ranks=1):
     command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(folder), *SMALL, *options]
     if ranks > 1:
         command = ["mpirun", "-n", str(ranks), "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", *command]
-    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, env={**os.environ, **root})
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=ENVIRONMENT)
 
 
 def history(folder):
@@ -102,6 +103,9 @@ def rows_are_there(folder):
 
 
 def stopped_with_a_checkpoint(folder):
+    deadline = time.monotonic() + 60
+    while not (folder / "summary.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.1)  # a shell may end before the study does
     stopped = json.loads((folder / "summary.json").read_text())["stopped_because"]
     return "interrupted at" in stopped and (folder / "checkpoint.h5").exists()
 
@@ -111,7 +115,7 @@ def test_ctrl_c_that_ends_the_reader_too_leaves_a_checkpoint(tmp_path, ranks):
     folder = tmp_path / "slope"
     study = shlex.join([str(STUDIES / "run"), *ranks, "slope", "--output", str(folder), *SMALL, "--time", "1e4"])
     shell = subprocess.Popen(["bash", "-o", "pipefail", "-c", f"{study} 2>&1 | tee '{tmp_path}/log'"],
-                             stdout=subprocess.PIPE, text=True, start_new_session=True)  # fmt: skip
+                             stdout=subprocess.PIPE, text=True, start_new_session=True, env=ENVIRONMENT)  # fmt: skip
     while not rows_are_there(folder) and shell.poll() is None:
         time.sleep(0.05)
     os.killpg(shell.pid, signal.SIGINT)
@@ -125,11 +129,11 @@ def test_the_end_of_the_terminal_leaves_a_checkpoint(tmp_path, ranks):
     child, terminal = pty.fork()
     if child == 0:
         study = str(STUDIES / "run")
-        os.execv(study, [study, *ranks, "slope", "--output", str(tmp_path), *SMALL, "--time", "1e4"])
+        os.execve(study, [study, *ranks, "slope", "--output", str(tmp_path), *SMALL, "--time", "1e4"], ENVIRONMENT)
     deadline = time.monotonic() + 60
     while not rows_are_there(tmp_path) and time.monotonic() < deadline:
         if select.select([terminal], [], [], 0.05)[0]:
-            os.read(terminal, 4096)
+            os.read(terminal, 4096)  # so that the study is not held up; fails if it has ended
     os.close(terminal)
     _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 128 + (signal.SIGUSR1 if ranks else signal.SIGHUP)
@@ -179,8 +183,7 @@ slope.run_study(lambda: slope.main({options!r}))
 @pytest.mark.parametrize("script", [BARE, SLIDING], ids=["bare", "sliding"])  # in the latter files are open
 def test_an_error_that_nothing_catches_ends_all_ranks(tmp_path, script):
     script = script.format(studies=str(STUDIES), options=[*SMALL, "--output", str(tmp_path / "slope")])
-    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     result = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", sys.executable, "-c", script],
-                            capture_output=True, text=True, timeout=60, env={**os.environ, **root})  # fmt: skip
+                            capture_output=True, text=True, timeout=60, env=ENVIRONMENT)  # fmt: skip
     assert result.returncode != 0
     assert "error on rank 1" in result.stderr and "this rank fails" in result.stderr
