@@ -184,12 +184,12 @@ def slide(
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
+def draw(case: SlopeCase, frames: list[dict], history: History, folder: Path) -> None:
     """Figures 2 to 6 of the paper and a film, from the stored frames; on the first rank."""
     scene = case.scene()
     if scene is None:
         return
-    first, last = watch.frames[0], watch.frames[-1]
+    first, last = frames[0], frames[-1]
     save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"])
     drawn = [
         ("figure_3_displacement", "displacement", DISPLACEMENT),
@@ -200,20 +200,20 @@ def draw(case: SlopeCase, watch: Watch, history: History, folder: Path) -> None:
         drawn.append(("figure_7_excess_pore_pressure", PORE, PORE_PRESSURE))
     title = f"$t$ = {last['time']:.1f} s"
     for name, key, quantity in drawn:
-        limits = colour_limits(quantity, [frame[key] for frame in watch.frames])
+        limits = colour_limits(quantity, [frame[key] for frame in frames])
         save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
                        limits=limits, title=title)  # fmt: skip
     save_history(folder / "figure_6_crest.png", history["time_s"], {"crest": history["crest_displacement_m"]},
                  "Displacement of the particle at the crest [m]",
                  limits=(0, max(0.5, 1.05 * history["crest_displacement_m"].max())))  # fmt: skip
-    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in watch.frames]
+    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
     save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
 
 
-def page(case: SlopeCase, watch: Watch, summary: dict) -> Page:
+def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
     """What the page ``report.html`` shows beside figures and tables. Collective."""
     a, scene = case.args, case.scene()
-    movies = [Movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, watch.frames)]
+    movies = [Movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, frames)]
     if case.fem is not None:
         before = fem_frame(case.model, case.fem, 0.0, case.model.particles.initial_position)
         title = f"FEM, equilibrium under {a.initial_unit_weight / 1e3:g} kN/m\u00b3 before the slide"
@@ -264,7 +264,8 @@ def main(arguments: list[str] | None = None) -> int:
         checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every)
         loop = slide(case, watch, history, files, interrupt, checkpoints)
         clock["slide"] = perf_counter()
-        draw(case, watch, history, folder)
+        frames = watch.frames()
+        draw(case, frames, history, folder)
         clock["pictures"] = perf_counter()
 
     names = list(clock)
@@ -286,7 +287,7 @@ def main(arguments: list[str] | None = None) -> int:
         "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }
-    write_summary(folder, a, summary, comm, page(case, watch, summary))
+    write_summary(folder, a, summary, comm, page(case, frames, summary))
     if comm.rank == 0:
         tell(summary, folder)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)

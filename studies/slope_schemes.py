@@ -144,7 +144,7 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
             run.stopped = str(error)
     run.cpu_seconds, run.steps = comm.allreduce(run.cpu_seconds), case.model.steps
     watch.keep(case.model.time)
-    run.frames = watch.frames
+    run.frames = watch.frames()
     return run, case.scene()
 
 

@@ -202,6 +202,7 @@ void bind_model(py::module_& m, const std::string& suffix)
              return as_dict(diagnostics(model));
            })
       .def("column", &column<D>)
+      .def("single_precision", &single_precision<D>)
       .def("row_numbers", &row_numbers<D>)
       .def("find_rows", &find_rows<D>)
       .def("set_column", &set_column<D>)

@@ -2,6 +2,7 @@
 /// @file
 /// Fields of particles by name, as NumPy arrays.
 
+#include "io/particle_fields.h"
 #include "python/arrays.h"
 #include "steps/model.h"
 
@@ -144,6 +145,42 @@ py::object column(const Model<D>& model, const std::string& name, const ChosenRo
   if (name == "state")
     return rows(p.state, n, chosen);
   throw InputError("particle field is '" + name + "', which does not exist");
+}
+
+/// A copy of a field in single precision, (n,) for numbers, (n, k) for vectors, tensors and states.
+inline py::array_t<float> single_of(const OutputField& field)
+{
+  const std::size_t width = field.columns.size();
+  std::vector<std::size_t> shape{field.rows};
+  if (width > 1 || field.name == "state")
+    shape.push_back(width);
+  py::array_t<float> array(shape);
+  float* out = array.mutable_data();
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t p = 0; p < field.rows; ++p)
+      out[p * width + k] = static_cast<float>(field.columns[k][p]);
+  return array;
+}
+
+/// Copies of fields by name, real ones in single precision; the position is always there.
+/// @throws InputError for a field that does not exist
+template <int D>
+py::dict single_precision(const Model<D>& model, const std::vector<std::string>& names)
+{
+  const ParticleFields fields = particle_fields<D>(model.particles, names);
+  py::dict copies;
+  copies["position"] = single_of(fields.position);
+  for (const OutputField& field : fields.fields)
+    copies[py::str(field.name)] = single_of(field);
+  for (const OutputIndexField& field : fields.index_fields)
+    copies[py::str(field.name)] = std::visit(
+        [](const auto& values) -> py::object
+        {
+          using T = typename std::remove_cvref_t<decltype(values)>::value_type;
+          return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
+        },
+        field.values);
+  return copies;
 }
 
 /// @throws InputError for a field that cannot be set, or another shape

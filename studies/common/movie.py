@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from mpi4py import MPI
 
 import mpm_core as mpm
 
@@ -52,16 +53,21 @@ class Movie:
 # --- frames ----------------------------------------------------------------------------------------------------------
 
 
+def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
+    """The particles of a plane model on this rank as they are."""
+    # Plastic strain, because elastic oscillations during a long creep add up in the total.
+    p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
+    pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
+    return {
+        "time": np.float64(time), "position": p["position"], "volume": p["volume"], "id": p["id"],
+        "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
+        "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore,
+    }  # fmt: skip
+
+
 def particle_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray] | None:
     """All particles of a plane model as they are, on the first rank; None on the others. Collective."""
-    p = model.particles
-    pore = {PORE: model.state(PORE)} if has_pore_pressure(model) else {}
-    return frame_of(model, time, {
-        "position": p.position, "volume": p.volume, "id": p.id, "displacement": np.linalg.norm(p.displacement, axis=1),
-        # Plastic, because elastic oscillations during a long creep add up in the total.
-        "shear_strain": p.plastic_strain, "vertical_stress": p.stress[:, 1], "speed": np.linalg.norm(p.velocity, axis=1),
-        **pore,
-    })  # fmt: skip
+    return gathered(model.comm, own_frame(model, time))
 
 
 def has_pore_pressure(model: mpm.Model) -> bool:
@@ -94,12 +100,17 @@ def fem_frame(model: mpm.Model, fem: object, time: float, places: np.ndarray | N
 def frame_of(model: mpm.Model, time: float, fields: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
     """Fields of all particles, on the first rank; None on the others. Collective."""
     single = {name: values if name == "id" else values.astype(np.float32) for name, values in fields.items()}
-    if model.comm.size == 1:
-        return {"time": np.float64(time), **single}
-    parts = model.comm.gather(single)
+    return gathered(model.comm, {"time": np.float64(time), **single})
+
+
+def gathered(comm: MPI.Comm, frame: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+    """Frames of all ranks as one, on the first rank; None on the others. Collective."""
+    if comm.size == 1:
+        return frame
+    parts = comm.gather(frame)
     if parts is None:
         return None
-    return {"time": np.float64(time), **{name: np.concatenate([part[name] for part in parts]) for name in fields}}
+    return {name: frame[name] if name == "time" else np.concatenate([part[name] for part in parts]) for name in frame}
 
 
 # --- packing ---------------------------------------------------------------------------------------------------------

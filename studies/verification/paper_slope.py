@@ -75,7 +75,8 @@ def slide(until, scheme="explicit", cell=0.1, per_cell=10, nmd=False, integratio
     for report in run:
         crest.append((report.time, watch.crest_displacement()))
     watch.keep(report.time)
-    return case.scene(), watch.frames[-1] if watch.frames else None, np.array(crest)
+    last = watch.frames()[-1:]
+    return case.scene(), last[0] if last else None, np.array(crest)
 
 
 def like_paper(time, name, found, limit=""):

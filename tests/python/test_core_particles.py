@@ -37,6 +37,19 @@ def test_some_particles_have_the_rows_of_all(dim, name):
     np.testing.assert_array_equal(getattr(particles[np.repeat(mask, 2)[::2]], name), every[mask])
 
 
+@pytest.mark.parametrize("dim", DIMS)
+def test_copies_in_single_precision_have_the_values_of_the_attributes(dim):
+    particles = seeded(dim).particles
+    copies = particles.single(*ATTRIBUTES)
+    assert set(copies) == set(ATTRIBUTES)
+    for name, copy in copies.items():
+        whole = getattr(particles, name)
+        np.testing.assert_array_equal(copy, whole if whole.dtype.kind == "i" else whole.astype(np.float32))
+    assert set(particles.single()) == {"position"}
+    with pytest.raises(mpm.InputError, match="particle field is 'height', which does not exist"):
+        particles.single("height")
+
+
 def test_some_particles_are_read_when_they_are_asked_for():
     model = seeded(2)
     some = model.particles[[3, 1]]

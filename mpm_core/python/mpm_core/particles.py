@@ -120,6 +120,17 @@ class Particles:
         """Number of the cell on this rank that holds each particle, shape (n,)."""
         return self._column("cell")
 
+    def single(self, *names: str) -> dict[str, NDArray[Any]]:
+        """Copies of fields of all particles in single precision, such as frames that are kept in memory; sooner than one by one.
+
+        Args:
+            names: as the attributes; `id`, `material` and `cell` stay whole numbers. The position is always there.
+
+        Raises:
+            InputError: a name that no field has.
+        """
+        return self._core.single_precision(names)
+
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field: velocity, stress, volume, mass, deviatoric_strain, state, initial_position or traction.
 
