@@ -36,22 +36,6 @@ std::shared_ptr<Mesh<D>> mesh_from_arrays(const py::array& points, const py::arr
                    rank));
 }
 
-/// A copy of a nodal field: (nodes,) for numbers, (nodes, D) for vectors.
-template <int D>
-py::array_t<double> nodal(const Model<D>& model, const std::string& name)
-{
-  const OutputField field = nodal_field(model, name);
-  const std::size_t width = field.columns.size();
-  std::vector<std::size_t> shape{field.rows};
-  if (width > 1)
-    shape.push_back(width);
-  py::array_t<double> array(shape);
-  for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t i = 0; i < field.rows; ++i)
-      array.mutable_data()[i * width + k] = field.columns[k][i];
-  return array;
-}
-
 py::dict as_dict(const Diagnostics& d)
 {
   using namespace py::literals;
@@ -220,7 +204,8 @@ void bind_model(py::module_& m, const std::string& suffix)
              model.particles.material.assign(in.begin(), in.end());
              model.work.ready = false;
            })
-      .def("nodal", &nodal<D>)
+      .def("nodal",
+           [](const M& model, const std::string& name) { return copied_field<double>(nodal_field(model, name)); })
       .def("phase_seconds",
            [](const M& model)
            {

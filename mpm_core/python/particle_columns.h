@@ -147,21 +147,6 @@ py::object column(const Model<D>& model, const std::string& name, const ChosenRo
   throw InputError("particle field is '" + name + "', which does not exist");
 }
 
-/// A copy of a field in single precision, (n,) for numbers, (n, k) for vectors, tensors and states.
-inline py::array_t<float> single_of(const OutputField& field)
-{
-  const std::size_t width = field.columns.size();
-  std::vector<std::size_t> shape{field.rows};
-  if (width > 1 || field.name == "state")
-    shape.push_back(width);
-  py::array_t<float> array(shape);
-  float* out = array.mutable_data();
-  for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t p = 0; p < field.rows; ++p)
-      out[p * width + k] = static_cast<float>(field.columns[k][p]);
-  return array;
-}
-
 /// Copies of fields by name, real ones in single precision; the position is always there.
 /// @throws InputError for a field that does not exist
 template <int D>
@@ -169,9 +154,9 @@ py::dict single_precision(const Model<D>& model, const std::vector<std::string>&
 {
   const ParticleFields fields = particle_fields<D>(model.particles, names);
   py::dict copies;
-  copies["position"] = single_of(fields.position);
+  copies["position"] = copied_field<float>(fields.position);
   for (const OutputField& field : fields.fields)
-    copies[py::str(field.name)] = single_of(field);
+    copies[py::str(field.name)] = copied_field<float>(field);
   for (const OutputIndexField& field : fields.index_fields)
     copies[py::str(field.name)] = std::visit(
         [](const auto& values) -> py::object

@@ -85,12 +85,18 @@ def test_rows_that_are_not_there_are_named(rows, words):
         particles[rows]
 
 
-def test_some_particles_cannot_be_set_nor_chosen_from():
-    some = seeded(2).particles[[0, 1]]
-    with pytest.raises(mpm.InputError, match="fields can only be set of all particles"):
-        some.set("velocity", np.zeros((2, 2)))
-    with pytest.raises(mpm.InputError, match="cannot be chosen among chosen ones"):
-        some[[0]]
+@pytest.mark.parametrize(
+    ("what", "use"),
+    [
+        ("set", lambda some: some.set("velocity", np.zeros((2, 2)))),
+        ("single", lambda some: some.single("stress")),
+        ("find", lambda some: some.find([0])),
+        ("choosing rows", lambda some: some[[0]]),
+    ],
+)
+def test_what_is_for_all_particles_says_so(what, use):
+    with pytest.raises(mpm.InputError, match=f"{what} is for all particles, not for those in some rows"):
+        use(seeded(2).particles[[0, 1]])
 
 
 def test_rows_of_particles_that_have_gone_are_named():

@@ -39,13 +39,17 @@ class Particles:
         Raises:
             InputError: rows of another shape or dtype, or a row that is not there, also when that is so only later.
         """
-        if self._rows is not None:
-            raise InputError("rows are those of all particles, and cannot be chosen among chosen ones")
+        self._require_all("choosing rows")
         return Particles(self._core, self._core.row_numbers(np.asarray(rows)))
 
     def find(self, ids: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int64]:
         """The row of each of some particles, by their numbers, shape (m,); -1 for those that are not on this rank."""
+        self._require_all("find")
         return self._core.find_rows(ids)
+
+    def _require_all(self, what: str) -> None:
+        if self._rows is not None:
+            raise InputError(f"{what} is for all particles, not for those in some rows")
 
     def _column(self, name: str) -> NDArray[Any]:
         return self._core.column(name, self._rows)
@@ -129,6 +133,7 @@ class Particles:
         Raises:
             InputError: a name that no field has.
         """
+        self._require_all("single")
         return self._core.single_precision(names)
 
     def set(self, name: str, values: ArrayLike) -> None:
@@ -141,7 +146,6 @@ class Particles:
         Raises:
             InputError: unknown field, wrong shape or dtype, a value that is not finite, or only some particles.
         """
-        if self._rows is not None:
-            raise InputError("fields can only be set of all particles, not of those in some rows")
+        self._require_all("set")
         shape: tuple[int | None, ...] = tuple(None for _ in np.shape(values))
         self._core.set_column(name, floats(name, values, shape))
