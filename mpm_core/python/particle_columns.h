@@ -9,8 +9,8 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
+#include <utility>
 
 namespace mpm::python
 {
@@ -59,14 +59,19 @@ RowNumbers row_numbers(const Model<D>& model, const py::array& rows)
 template <int D>
 py::array_t<std::int64_t> find_rows(const Model<D>& model, const std::vector<std::int64_t>& ids)
 {
-  std::vector<std::size_t> order(ids.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t k) { return ids[k]; });
+  std::vector<std::pair<std::int64_t, std::size_t>> wanted; // by rising number, and the place among `ids`
+  wanted.reserve(ids.size());
+  for (const std::int64_t id : ids)
+    wanted.emplace_back(id, wanted.size());
+  std::ranges::sort(wanted);
   std::vector<std::int64_t> rows(ids.size(), -1);
   for (std::size_t p = 0; p < model.particles.id.size(); ++p)
-    for (const std::size_t k :
-         std::ranges::equal_range(order, model.particles.id[p], {}, [&](std::size_t i) { return ids[i]; }))
-      rows[k] = static_cast<std::int64_t>(p);
+  {
+    const std::int64_t id = model.particles.id[p];
+    for (auto found = std::ranges::lower_bound(wanted, std::pair(id, std::size_t{0}));
+         found != wanted.end() && found->first == id; ++found)
+      rows[found->second] = static_cast<std::int64_t>(p);
+  }
   return copied(rows);
 }
 
