@@ -22,6 +22,7 @@ from common.ranks import run_study
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope_fem import step_line, weight
 from common.summary import OutputError, results_folder, write_summary
+from common.watch import Watch
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -70,20 +71,12 @@ def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
     return report
 
 
-def slide(case: SlopeCase, toe: float, crest_id: int) -> tuple[np.ndarray, list[dict]]:
+def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
     """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]; and frames."""
-    a, particles = case.args, case.model.particles
-
-    def farthest() -> float:
-        return comm.allreduce(particles.position[:, 0].max(initial=-np.inf), MPI.MAX) - toe
-
-    def crest() -> float:
-        mine = particles[particles.id == crest_id]
-        return comm.allreduce(float(np.linalg.norm(mine.displacement)))
-
-    rows, frames = [(0.0, farthest(), crest())], [particle_frame(case.model, 0.0)]
+    a = case.args
+    rows, frames = [(0.0, watch.runout(), watch.crest_displacement())], [particle_frame(case.model, 0.0)]
     for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping):
-        rows.append((report.time, farthest(), crest()))
+        rows.append((report.time, watch.runout(), watch.crest_displacement()))
         frames.append(particle_frame(case.model, report.time))
     return np.array(rows), frames
 
@@ -91,15 +84,14 @@ def slide(case: SlopeCase, toe: float, crest_id: int) -> tuple[np.ndarray, list[
 def run(a: Namespace, share: float, unit_weight: float) -> dict:
     """One hand-over and slide; what is to be told about it."""
     case = build_slope(a, comm)
-    toe = comm.allreduce(case.model.particles.position[:, 0].max(initial=-np.inf), MPI.MAX)
-    crest_id = case.crest_particle()
+    watch = Watch(case)  # of the particles as seeded, before the hand-over may move them
     report = hand_over(case, unit_weight)
     particles = case.model.particles
     undeformed = (
         particles.initial_position if a.move else particles.position
     )  # where the particles are in the FEM's body
     before = fem_frame(case.model, case.fem, 0.0, undeformed) if case.fem else None
-    history, frames = slide(case, toe, crest_id)
+    history, frames = slide(case, watch)
     if comm.rank == 0:
         print(f"handed over at {share:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
               file=sys.stderr, flush=True)  # fmt: skip
