@@ -13,6 +13,7 @@ from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_i
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fields import nodal_average
+from fenics_bridge.graded import graded_tags
 from fenics_bridge.handover import Handover, initialise
 from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
 from fenics_bridge.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
@@ -20,6 +21,7 @@ from fenics_bridge.load_steps import LoadStep, print_step
 from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
 from fenics_bridge.mixed import MixedQuasiStatic
+from fenics_bridge.names import name_tags, names_of
 from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh
@@ -30,8 +32,8 @@ __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
     "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "MixedQuasiStatic", "NewtonReport", "PointSearch",
     "QuasiStatic", "Support", "background_arrays", "background_mesh", "box_mesh", "collapse_load", "compare", "evaluate_at",
-    "factor_of_safety", "fixed", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
-    "log_spiral", "log_spiral_safety", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
+    "factor_of_safety", "fixed", "graded_tags", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
+    "log_spiral", "log_spiral_safety", "name_tags", "names_of", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]
 # fmt: on

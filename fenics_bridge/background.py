@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_bridge import compat
+from fenics_bridge.names import names_of
 from fenics_bridge.tagged import owned_cells, tag_values
 
 
@@ -38,10 +39,11 @@ def background_arrays(domain, cell_tags=None, facet_tags=None):
 
 
 def background_mesh(domain, cell_tags=None, facet_tags=None):
-    """`mpm_core.Mesh` of a DOLFINx mesh with its tags and partition. Collective."""
+    """`mpm_core.Mesh` of a DOLFINx mesh with its tags, their names, and its partition. Collective."""
     import mpm_core as mpm
 
-    mesh = mpm.Mesh(**background_arrays(domain, cell_tags, facet_tags), comm=domain.comm)
+    names = {"cell_names": names_of(cell_tags), "facet_names": names_of(facet_tags)}
+    mesh = mpm.Mesh(**background_arrays(domain, cell_tags, facet_tags), **names, comm=domain.comm)
     mesh.domain = domain  # type: ignore[attr-defined]  # it owns the communicator
     return mesh
 

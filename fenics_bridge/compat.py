@@ -68,7 +68,8 @@ def tags_from_nodes(domain, dim, entities, values):
         adjacency = graph.adjacencylist(local)
     else:
         adjacency = cpp.graph.AdjacencyList_int32(local)
-    return mesh.meshtags_from_entities(domain, dim, adjacency, np.asarray(local_values, dtype=np.int32))
+    tags = mesh.meshtags_from_entities(domain, dim, adjacency, np.asarray(local_values, dtype=np.int32))
+    return mesh.meshtags(domain, dim, tags.indices, tags.values)  # an object of Python, to which names can be given
 
 
 def cell_nodes(domain):

@@ -68,8 +68,10 @@ def read_file(path, dim):
 def model_arrays(dim):
     """gmsh's current model: points (n, dim), cells (m, dim + 1), cell_values (m,), facets (k, dim), facet_values (k,).
 
-    Cells and facets are rows of points. Raises MeshError.
+    Cells and facets are rows of points. cell_names, facet_names: names of physical groups, with their numbers in
+    cell_numbers, facet_numbers. Raises MeshError.
     """
+    gmsh.model.mesh.removeDuplicateNodes()  # soils whose common border was drawn twice would fall apart
     cells, cell_values = _entities(dim)
     facets, facet_values = _entities(dim - 1, only_groups=True)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -85,7 +87,18 @@ def model_arrays(dim):
     return {
         "points": points[rows, :dim], "cells": np.searchsorted(used, cells), "cell_values": cell_values,
         "facets": np.searchsorted(used, facets[inside]), "facet_values": facet_values[inside],
+        **_names("cell", dim), **_names("facet", dim - 1),
     }  # fmt: skip
+
+
+def _names(kind, dim):
+    """Names of the physical groups of one dimension and their numbers."""
+    named = [(gmsh.model.getPhysicalName(dim, tag), tag) for _, tag in gmsh.model.getPhysicalGroups(dim)]
+    named = [(name, tag) for name, tag in named if name]
+    return {
+        f"{kind}_names": np.array([name for name, _ in named], dtype=np.str_),
+        f"{kind}_numbers": np.array([tag for _, tag in named], dtype=np.int64),
+    }
 
 
 def _entities(dim, only_groups=False):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import ufl
@@ -11,7 +11,7 @@ from dolfinx import fem
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fields import assembled
-from fenics_bridge.supports import require_tag
+from fenics_bridge.names import by_number, tag_numbers
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Load:
     """What acts on the body at the end of a stage.
 
     unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
-    pressure: [Pa] by facet tag, compression positive, along the normal of the undeformed boundary
+    pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
     displacement: share of the displacements that the supports prescribe [-], for `prescribed` supports
     """
 
@@ -77,6 +77,7 @@ class LoadVectors:
         Collective; raises InputError, on all ranks, for a tag that does not exist or a value that is not finite.
         """
         require_finite(self._space.mesh.comm, load)
+        load = self.resolved(load)
         by_tag = _weight_by_tag(load.unit_weight)
         elsewhere = by_tag.get(None, 0.0)
         forces = elsewhere * self._weight[None]
@@ -86,6 +87,13 @@ class LoadVectors:
             forces = forces + pressure * self._unit_pressure(tag)
         return forces
 
+    def resolved(self, load):
+        """The load with numbers for the names of tags. Raises InputError, on all ranks, for unknown ones. Collective."""
+        comm, weight = self._space.mesh.comm, load.unit_weight
+        if isinstance(weight, dict):
+            weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
+        return replace(load, unit_weight=weight, pressure=by_number(comm, self._facet_tags, load.pressure, "pressure"))
+
     def _unit_weight(self, dx):
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
@@ -93,7 +101,6 @@ class LoadVectors:
 
     def _unit_weight_of(self, tag):
         if tag not in self._weight:
-            require_tag(self._space.mesh.comm, self._cell_tags, tag, "unit_weight", "cell")
             dx = ufl.Measure("dx", domain=self._space.mesh, subdomain_data=self._cell_tags)
             self._weight[tag] = self._unit_weight(dx(tag))
         return self._weight[tag]
@@ -101,7 +108,6 @@ class LoadVectors:
     def _unit_pressure(self, tag):
         if tag not in self._pressure:
             domain = self._space.mesh
-            require_tag(domain.comm, self._facet_tags, tag, "pressure")
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
             form = -ufl.inner(ufl.FacetNormal(domain), self._test) * ds(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
@@ -122,7 +128,7 @@ def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=Non
         force.interpolate(lambda x: body_force(x[: domain.geometry.dim]))
         work += ufl.inner(force, test) * ufl.dx
     for tag, value in traction.items():
-        require_tag(domain.comm, facet_tags, tag, "traction")
         ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
-        work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(tag)
+        numbers = tag_numbers(domain.comm, facet_tags, tag, "traction")
+        work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(numbers)
     return work

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_bridge.errors import agree
+from fenics_bridge.names import by_number, described, label
 from fenics_bridge.tagged import owned_cells, tag_values
 
 
@@ -16,9 +17,9 @@ class Materials:
     """
 
     def __init__(self, domain, law, cell_tags):
-        """law: of `mpm_core`, or {cell tag: law}. Raises InputError, on all ranks, for other tags. Collective."""
-        self._comm, n_cells = domain.comm, owned_cells(domain)
-        self.tags = tuple(law) if isinstance(law, dict) else (None,)
+        """law: of `mpm_core`, or {cell tag or name: law}. Raises InputError, on all ranks, for other tags. Collective."""
+        self._comm, self._cell_tags, n_cells = domain.comm, cell_tags, owned_cells(domain)
+        self.tags: tuple = (None,)
         if not isinstance(law, dict):
             self.number = np.zeros(n_cells, dtype=np.int32)
             return
@@ -27,18 +28,22 @@ class Materials:
             "cell_tags: got None, expected the tags that the laws are given for" if cell_tags is None else None,
         )
         values = tag_values(domain, cell_tags, domain.topology.dim)[:n_cells]
+        law = by_number(self._comm, cell_tags, law, "law", "cell")
         known = sorted(set().union(*self._comm.allgather(set(values.tolist()))))
         without = [tag for tag in known if tag not in law]
-        unknown = [tag for tag in law if tag not in known]
-        agree(self._comm, f"law: no law for cells with tag {without[0]} (0: untagged)" if without else None)
-        agree(self._comm, f"law: no cell has the tag {unknown[0]!r}; the mesh has {known}" if unknown else None)
+        problem = f"law: no law for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None
+        agree(self._comm, problem)
+        self.tags = tuple(law)
         self.number = np.zeros(n_cells, dtype=np.int32)
         for number, tag in enumerate(self.tags):
             self.number[values == tag] = number
 
     def laws(self, law):
         """The laws in their order; law: as above. Raises InputError, on all ranks, for other tags. Collective."""
-        given = law if isinstance(law, dict) else {None: law}
-        expected = f"laws for the cell tags {list(self.tags)}" if self.tags != (None,) else "one law"
-        agree(self._comm, None if set(given) == set(self.tags) else f"law: got {law!r}, expected {expected}")
+        named = isinstance(law, dict) and self.tags != (None,)
+        given = by_number(self._comm, self._cell_tags, law, "law", "cell") if named else {None: law}
+        tags = described(self._cell_tags, self.tags)
+        expected = f"laws for the cell tags {tags}" if self.tags != (None,) else "one law"
+        mistake = set(given) != set(self.tags) or isinstance(given.get(None), dict)
+        agree(self._comm, f"law: got {law!r}, expected {expected}" if mistake else None)
         return [given[tag] for tag in self.tags]

@@ -22,8 +22,9 @@ def read_mesh(path, comm, dim=2, parameters=None):
     path: .msh (any version that gmsh reads) or .geo (meshed here)
     comm: MPI communicator; dim: 2 for triangles in the plane z = 0, 3 for tetrahedra
     parameters: for .geo, values for its `DefineConstant` names, e.g. {"cell_size": 0.1}
-    Returns (domain, cell_tags, facet_tags). Tags are gmsh's physical groups. When the file has physical groups of
-    dimension `dim`, only their cells belong to the mesh, as when gmsh saves a mesh; otherwise all do, untagged.
+    Returns (domain, cell_tags, facet_tags). Tags are gmsh's physical groups, whose names stand for them wherever a tag
+    is asked for. When the file has physical groups of dimension `dim`, only their cells belong to the mesh, as when
+    gmsh saves a mesh; otherwise all do, untagged. Nodes at one place are merged, so that soils hold together.
     Raises InputError, on all ranks, for a file that is missing or cannot be read, another extension, a mesh without
     cells, of another dimension, with quadrilaterals or hexahedra, or with curved (second-order) elements.
     Collective.
@@ -87,7 +88,16 @@ def _read_apart(path, dim, result, name):
 
 def _mesh_arrays(arrays, name):
     check_cells_fit(arrays["cells"], name)
-    return MeshArrays(*(arrays[key] for key in ("points", "cells", "cell_values", "facets", "facet_values")))
+    keys = "points", "cells", "cell_values", "facets", "facet_values"
+    return MeshArrays(*(arrays[key] for key in keys), *(_names(arrays, kind) for kind in ("cell", "facet")))
+
+
+def _names(arrays, kind):
+    """{name: tags} of the physical groups of cells or facets."""
+    names: dict[str, tuple[int, ...]] = {}
+    for name, number in zip(arrays[f"{kind}_names"].tolist(), arrays[f"{kind}_numbers"].tolist()):
+        names[name] = (*names.get(name, ()), number)
+    return names
 
 
 def _constants(parameters, text, path):

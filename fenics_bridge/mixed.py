@@ -19,7 +19,7 @@ from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.stiffness import Stiffness
-from fenics_bridge.supports import Constraints
+from fenics_bridge.supports import Constraints, tagged_facets
 
 
 class MixedQuasiStatic:
@@ -83,7 +83,7 @@ class MixedQuasiStatic:
         space, dim = self._body.solution.function_space, self.domain.geometry.dim
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        facets = self._facet_tags.indices[self._facet_tags.values == facet_tag]
+        facets = tagged_facets(space.mesh.comm, self._facet_tags, facet_tag, "facet_tag")
         owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
         sums = []
         for component in range(dim):

@@ -20,7 +20,7 @@ from fenics_bridge.load_steps import raise_load
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
 from fenics_bridge.quadrature import QuadraturePoints
-from fenics_bridge.supports import Constraints
+from fenics_bridge.supports import Constraints, tagged_facets
 
 
 class QuasiStatic:
@@ -92,7 +92,7 @@ class QuasiStatic:
         self.converged = report.converged
         if report.converged:
             self._body.accept()
-            self.load, self.law = load, law
+            self.load, self.law = self._loads.resolved(load), law
         return report
 
     def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
@@ -101,7 +101,7 @@ class QuasiStatic:
         first_step: share of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
         `converged` tells whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
         """
-        return raise_load(self, load, first_step, tolerance, progress)
+        return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
 
     def reaction(self, facet_tag):
         """Force of the body on its support at the facets of a tag, summed over them: (D,) [N] ([N/m] in 2D).
@@ -110,7 +110,7 @@ class QuasiStatic:
         """
         space, dim = self.displacement.function_space, self.domain.geometry.dim
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        facets = self.facet_tags.indices[self.facet_tags.values == facet_tag]
+        facets = tagged_facets(self.domain.comm, self.facet_tags, facet_tag, "facet_tag")
         nodes = fem.locate_dofs_topological(space, dim - 1, facets)
         mine = nodes[nodes < space.dofmap.index_map.size_local]
         return self.domain.comm.allreduce(out_of_balance.reshape(-1, dim)[mine].sum(axis=0))

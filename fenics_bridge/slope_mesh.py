@@ -9,6 +9,7 @@ import numpy as np
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.meshes import arrays_from_model
+from fenics_bridge.names import name_tags
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 SOIL, EMPTY = 1, 2
@@ -16,6 +17,11 @@ SOIL, EMPTY = 1, 2
 
 LEFT, BASE, RIGHT, TOP, SLOPE, CREST = 1, 2, 3, 4, 5, 6
 """Facet tags of a slope mesh: the four sides of the background, and the free surface of the soil."""
+
+_NAMES = (
+    {"soil": SOIL, "empty": EMPTY},
+    {"left": LEFT, "base": BASE, "right": RIGHT, "top": TOP, "slope": SLOPE, "crest": CREST},
+)
 
 
 def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="crossed", runout=2.0, headroom=None):
@@ -44,7 +50,8 @@ def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="cro
         return makers[kind](*shape)
 
     result = on_root(comm, arrays)
-    return distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
+    domain, *tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
+    return (domain, *map(name_tags, tags, _NAMES))
 
 
 def _checked(height, angle, crest, cell_size, runout, headroom):

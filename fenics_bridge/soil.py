@@ -6,27 +6,31 @@ import numpy as np
 from dolfinx import la
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.names import name_tags, names_of, tag_numbers
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, owned_cells, tag_values
 
 
 def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
-    """Mesh of the cells of one tag, with a partition of its own, so that all ranks share the work.
+    """Mesh of the cells of one tag or several, with a partition of its own, so that all ranks share the work.
 
-    (DOLFINx's `create_submesh` keeps the partition and is not to be trusted on several ranks before 0.8.)
-    Returns (domain, cell_tags, facet_tags): the cells keep their tag, the facets of the body theirs.
-    Raises InputError, on all ranks, when no cell has the tag. Collective.
+    Soils of several tags are one body: they share the nodes of their borders. (DOLFINx's `create_submesh` keeps the
+    partition and is not to be trusted on several ranks before 0.8.)
+    tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"]
+    Returns (domain, cell_tags, facet_tags): the cells keep their tag, the facets of the body theirs, both their names.
+    Raises InputError, on all ranks, when no cell has a tag. Collective.
     """
     dim = domain.topology.dim
-    n_owned = owned_cells(domain)
-    cells = np.flatnonzero(tag_values(domain, cell_tags, dim)[:n_owned] == tag)
-    n_soil = domain.comm.allreduce(len(cells))
-    agree(domain.comm, None if n_soil else f"tag: no cell has the tag {tag!r}")
+    numbers = tag_numbers(domain.comm, cell_tags, tag, "tag", "cell")
+    values = tag_values(domain, cell_tags, dim)[: owned_cells(domain)]
+    cells = np.flatnonzero(np.isin(values, numbers))
     nodes = compat.cell_nodes(domain)[cells]
     number, points = _numbered_nodes(domain, nodes)
     facets, facet_values = _owned_facets_of(domain, cells, facet_tags)
-    arrays = MeshArrays(points, number[nodes], np.full(len(cells), tag, np.int32), number[facets], facet_values)
-    return distributed_mesh(domain.comm, arrays, dim)
+    arrays = MeshArrays(points, number[nodes], values[cells], number[facets], facet_values)
+    body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
+    for there, here in ((cell_tags, body_cells), (facet_tags, body_facets)):
+        name_tags(here, names_of(there))
+    return body, body_cells, body_facets
 
 
 def _numbered_nodes(domain, nodes):

@@ -8,16 +8,18 @@ import numpy as np
 from dolfinx import fem
 
 from fenics_bridge.errors import InputError, agree
+from fenics_bridge.names import tag_numbers
 
 
 @dataclass(frozen=True)
 class Support:
     """Displacement components prescribed on the facets of one tag; None leaves a component free.
 
+    facet_tag: number, or name, of the tag
     displacement: (D,) [m] or None for "all zero"
     """
 
-    facet_tag: int
+    facet_tag: int | str
     displacement: tuple | None = None
 
 
@@ -62,7 +64,7 @@ class Constraints:
         value_of, self.bcs = {}, []
         for support in supports:
             displacement = support.displacement or (0.0,) * dim
-            facets = facet_tags.indices[facet_tags.values == support.facet_tag]
+            facets = tagged_facets(domain.comm, facet_tags, support.facet_tag, "supports")
             for component, value in enumerate(displacement):
                 if value is None:
                     continue
@@ -74,17 +76,14 @@ class Constraints:
         self.values = np.fromiter(value_of.values(), float, len(value_of))
 
 
-def require_tag(comm, tags, tag, argument, entity="facet"):
-    """Raise InputError, on all ranks, when no facet (or cell) on any rank has the tag. Collective."""
-    known = comm.allgather(set(tags.values.tolist()) if tags is not None else set())
-    every = sorted(set().union(*known))
-    if tag not in every:
-        raise InputError(f"{argument}: no {entity} has the tag {tag!r}; the mesh has {every}")
+def tagged_facets(comm, facet_tags, tag, argument):
+    """Facets of this rank with a tag, given as a number or name. Raises InputError, on all ranks, for none. Collective."""
+    return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
 
 
 def _first_mistake(domain, facet_tags, supports, dim):
     for support in supports:
-        require_tag(domain.comm, facet_tags, support.facet_tag, "supports")
+        tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports")
         displacement = support.displacement
         if displacement is not None and len(displacement) != dim:
             return f"supports: {support} has {len(displacement)} components, expected {dim}"

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fenics_bridge import compat
+from fenics_bridge.names import name_tags
 
 
 class MeshArrays(NamedTuple):
@@ -16,6 +17,7 @@ class MeshArrays(NamedTuple):
     points: (n, D) float64 [m]; nodes are numbered through in order of rank
     cells: (m, D + 1) int64 by those numbers; cell_values: (m,) int32 tags, 0 for none
     facets: (k, D) int64 by those numbers; facet_values: (k,) int32 tags
+    cell_names, facet_names: {name: tags}, those of rank 0 hold
     """
 
     points: np.ndarray
@@ -23,6 +25,8 @@ class MeshArrays(NamedTuple):
     cell_values: np.ndarray
     facets: np.ndarray
     facet_values: np.ndarray
+    cell_names: dict | None = None
+    facet_names: dict | None = None
 
 
 def empty_arrays(dim):
@@ -39,14 +43,15 @@ def empty_arrays(dim):
 def distributed_mesh(comm, arrays, dim):
     """(domain, cell_tags, facet_tags) from the ranks' shares, partitioned by DOLFINx.
 
-    Cells of tag 0 and facets that are not listed stay untagged. Collective.
+    Cells of tag 0 and facets that are not listed stay untagged. Tags carry their names (see `name_tags`). Collective.
     """
     domain = compat.create_mesh(comm, arrays.points, arrays.cells, dim)
     tagged = arrays.cell_values != 0
     cell_tags = compat.tags_from_nodes(domain, dim, arrays.cells[tagged], arrays.cell_values[tagged])
     facet_tags = compat.tags_from_nodes(domain, dim - 1, arrays.facets, arrays.facet_values)
     cell_tags.name, facet_tags.name = "cell_tags", "facet_tags"
-    return domain, cell_tags, facet_tags
+    names = comm.bcast((arrays.cell_names or {}, arrays.facet_names or {}))
+    return domain, name_tags(cell_tags, names[0]), name_tags(facet_tags, names[1])
 
 
 def owned_cells(domain):

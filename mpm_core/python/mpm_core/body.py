@@ -13,7 +13,7 @@ from . import _core, partition
 from ._core import InputError
 from .checks import positive
 from .collective import collectively
-from .mesh import Mesh, cell_sizes, floats
+from .mesh import Mesh, Tag, cell_sizes, floats
 from .particles import Particles
 
 
@@ -57,13 +57,13 @@ class Body:
             raise InputError(f"material is {material}, expected 0 to {len(self.laws) - 1}, the number of a law")
         return material
 
-    def seed(self, *, density: float, per_cell: int = 10, cell_tag: int | None = None, material: int = 0) -> int:
+    def seed(self, *, density: float, per_cell: int = 10, cell_tag: Tag | None = None, material: int = 0) -> int:
         """Place particles evenly in cells, each with the same share of its cell's volume.
 
         Args:
             density: [kg/m3].
             per_cell: particles per cell: 1, 3, 4, 6, 10, 12, ... in a triangle; 1, 4, 8, 10, ... in a tetrahedron.
-            cell_tag: cells with this tag; all cells by default.
+            cell_tag: cells with this tag, or these tags, by number or name; all cells by default.
             material: number of their law.
 
         Returns:
@@ -74,12 +74,12 @@ class Body:
         """
 
         def place() -> int:
-            if cell_tag is not None:
-                self.mesh.require_tag("cell", cell_tag)
+            tags = [None] if cell_tag is None else self.mesh.tags_of("cell", cell_tag)
             rho = positive("density", density, "kg/m3")
             if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
                 raise InputError(f"per_cell is {per_cell}, expected a whole number")
-            return self._core.seed_cells(cell_tag, int(per_cell), self._material(material), rho, self._next_id)
+            number = self._material(material)
+            return sum(self._core.seed_cells(tag, int(per_cell), number, rho, self._next_id) for tag in tags)
 
         return self._seeded(collectively(self.comm, place), self.mesh.cell_numbers * int(per_cell))
 
@@ -118,11 +118,11 @@ class Body:
         cells = self.mesh.cells_of(points)
         return (cells >= 0) & (cells < self.mesh.owned_cells)
 
-    def traction(self, facet_tag: int, traction: ArrayLike) -> float:
+    def traction(self, facet_tag: Tag, traction: ArrayLike) -> float:
         """Load the particles next to the facets with a tag (15). The force moves with them and keeps its direction.
 
         Args:
-            facet_tag: tag of the loaded facets.
+            facet_tag: tag of the loaded facets, by number or name.
             traction: force per area [Pa], shape (D,).
 
         Returns:
@@ -130,12 +130,12 @@ class Body:
         """
 
         def load() -> float:
-            self.mesh.require_tag("facet", facet_tag)
-            return self._core.load_facets(facet_tag, floats("traction", traction, (self.mesh.dim,)).tolist())
+            tags, force = self.mesh.tags_of("facet", facet_tag), floats("traction", traction, (self.mesh.dim,)).tolist()
+            return sum(self._core.load_facets(tag, force) for tag in tags)
 
         area = self.comm.allreduce(collectively(self.comm, load))
         if area == 0:
-            raise InputError(f"facet_tag {facet_tag} has no filled cell behind it to carry the traction")
+            raise InputError(f"facet_tag {facet_tag!r} has no filled cell behind it to carry the traction")
         return area
 
     def state(self, name: str) -> NDArray[np.float64]:
@@ -224,35 +224,59 @@ class Body:
 
     # --- supports and loads --------------------------------------------------------------------------------------
 
-    def _support(
-        self, facet_tag: int, whole: bool, vector: ArrayLike, name: str, *, replaced: Any = None
-    ) -> tuple[int, bool, list[float]]:
-        def checked() -> tuple[int, bool, list[float]]:
-            self.mesh.require_tag("facet", facet_tag)
-            return facet_tag, whole, [float(x) for x in floats(name, vector, (self.mesh.dim,))]
-
-        wish = collectively(self.comm, checked)
-        wishes = [*(other for other in self._wishes if other is not replaced), wish]
+    def _set_supports(self, wishes: list[tuple[int, bool, list[float]]]) -> None:
         collectively(self.comm, lambda: self._core.set_supports(wishes))
         self._wishes = wishes
-        return wish
 
-    def fix(self, facet_tag: int) -> None:
-        """Hold the nodes on facets with this tag."""
+    def _support(
+        self, facet_tag: Tag, whole: bool, vector: ArrayLike, name: str, *, replaced: Sequence[Any] = ()
+    ) -> list[tuple[int, bool, list[float]]]:
+        def checked() -> list[tuple[int, bool, list[float]]]:
+            components = [float(x) for x in floats(name, vector, (self.mesh.dim,))]
+            return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
+
+        new = collectively(self.comm, checked)
+        kept = [wish for wish in self._wishes if not any(wish is old for old in replaced)]
+        self._set_supports([*kept, *new])
+        return new
+
+    def fix(self, facet_tag: Tag) -> None:
+        """Hold the nodes on facets with this tag, given by number or name as in all that follow."""
         self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
 
-    def roller(self, facet_tag: int, normal: ArrayLike) -> None:
+    def roller(self, facet_tag: Tag, normal: ArrayLike) -> None:
         """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
         self._support(facet_tag, False, normal, "normal")
 
-    def prescribe(self, facet_tag: int, velocity: ArrayLike) -> None:
+    def prescribe(self, facet_tag: Tag, velocity: ArrayLike) -> None:
         """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
-        before = self._prescribed.get(facet_tag)
-        self._prescribed[facet_tag] = self._support(facet_tag, True, velocity, "velocity", replaced=before)
+        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
+        before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
+        wishes = self._support(tags, True, velocity, "velocity", replaced=before)
+        self._prescribed.update({wish[0]: wish for wish in wishes})
 
-    def outflow(self, facet_tag: int) -> None:
+    def release(self, facet_tag: Tag) -> None:
+        """Take away whatever holds the nodes on facets with this tag.
+
+        Raises:
+            InputError: nothing holds them.
+        """
+
+        def remaining() -> list[tuple[int, bool, list[float]]]:
+            tags = self.mesh.tags_of("facet", facet_tag)
+            for tag in tags:
+                if tag not in {wish[0] for wish in self._wishes}:
+                    raise InputError(f"facet_tag {facet_tag!r} is not supported")
+            return [wish for wish in self._wishes if wish[0] not in tags]
+
+        self._set_supports(collectively(self.comm, remaining))
+        kept = {wish[0] for wish in self._wishes}
+        self._prescribed = {tag: wish for tag, wish in self._prescribed.items() if tag in kept}
+
+    def outflow(self, facet_tag: Tag) -> None:
         """Let particles leave the mesh through facets with this tag; they are counted in the report."""
-        self._core.outflow_tags = [*self._core.outflow_tags, self.mesh.require_tag("facet", facet_tag)]
+        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
+        self._core.outflow_tags = [*self._core.outflow_tags, *tags]
 
     @property
     def gravity(self) -> NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """The background mesh."""
 
+from collections.abc import Mapping, Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,6 +11,9 @@ from . import _core
 from ._core import InputError
 from .collective import collectively
 from .rows import found
+
+Tag = int | str | Sequence[int | str]
+"""A tag by its number or name, or several of them."""
 
 
 def _integers(name: str, values: ArrayLike, dtype: type, width: int | None) -> NDArray:
@@ -62,6 +66,7 @@ class Mesh:
         global_nodes: number of each node over all ranks, shape (nodes,).
         global_cells: number of each cell over all ranks, shape (cells,).
         cell_owners: rank that owns each cell, shape (cells,).
+        cell_names, facet_names: names that may stand for tags, {name: tag or tags}; the same on every rank.
         comm: the ranks that share the mesh.
 
     Raises:
@@ -83,6 +88,8 @@ class Mesh:
         global_nodes: ArrayLike = (),
         global_cells: ArrayLike = (),
         cell_owners: ArrayLike = (),
+        cell_names: Mapping[str, int | Sequence[int]] | None = None,
+        facet_names: Mapping[str, int | Sequence[int]] | None = None,
         comm: MPI.Comm = MPI.COMM_SELF,
     ) -> None:
         self.comm = comm
@@ -135,6 +142,12 @@ class Mesh:
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
         }
+        given = {"cell": cell_names or {}, "facet": facet_names or {}}
+        self.names: dict[str, dict[str, tuple[int, ...]]] = {
+            kind: {name: tuple(int(t) for t in np.atleast_1d(tags)) for name, tags in names.items()}
+            for kind, names in given.items()
+        }
+        """Tags by name, of cells ("cell") and of facets ("facet")."""
 
     @property
     def owned_cells(self) -> int:
@@ -180,15 +193,21 @@ class Mesh:
             self._carriers[other] = _core.RowCarrier(MPI._addressof(self.comm), ranks, rows)
         return self._carriers[other]
 
-    def require_tag(self, kind: str, tag: int) -> int:
-        """The tag, where cells or facets (``kind``) with it exist on any rank.
+    def tags_of(self, kind: str, given: Tag) -> tuple[int, ...]:
+        """The tags of cells or facets (``kind``) that a number, a name or a sequence of them stands for.
 
         Raises:
-            InputError: there are none; the message lists the tags that there are.
+            InputError: no cell or facet has one of them; the message lists names and tags that there are.
         """
-        if tag not in self._tags[kind]:
-            raise InputError(f"{kind}_tag is {tag}, which the mesh does not have; it has {sorted(self._tags[kind])}")
-        return int(tag)
+        names, known, tags = self.names[kind], self._tags[kind], []
+        for one in [given] if isinstance(given, (str, int, np.integer)) else given:
+            present = [tag for tag in (names.get(one, ()) if isinstance(one, str) else (int(one),)) if tag in known]
+            if not present:
+                there = [*(name for name, of_name in names.items() if known & {*of_name}), *sorted(known)]
+                what = f"'{one}'" if isinstance(one, str) else one
+                raise InputError(f"{kind}_tag is {what}, which the mesh does not have; it has {there}")
+            tags += present
+        return tuple(dict.fromkeys(tags))
 
 
 def cell_sizes(mesh: Mesh) -> NDArray[np.float64]:

@@ -108,5 +108,6 @@ def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
     facets = np.unique(facets[facets[:, -1] >= 0], axis=0)
     return Mesh(
         points[first[named]], cells, cell_tags=tags, facets=facets[:, :-1], facet_tags=facets[:, -1],
-        global_nodes=known[named], global_cells=numbers, cell_owners=owners, comm=comm,
+        global_nodes=known[named], global_cells=numbers, cell_owners=owners,
+        cell_names=mesh.names["cell"], facet_names=mesh.names["facet"], comm=comm,
     )  # fmt: skip
