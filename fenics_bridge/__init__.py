@@ -12,6 +12,7 @@ from fenics_bridge.comparison import Difference, compare
 from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
+from fenics_bridge.fem_site import FemSite
 from fenics_bridge.fields import nodal_average
 from fenics_bridge.graded import graded_tags
 from fenics_bridge.handover import Handover, initialise
@@ -25,14 +26,15 @@ from fenics_bridge.names import name_tags, names_of
 from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh
+from fenics_bridge.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 # fmt: off
 __all__ = [
-    "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution",
+    "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution", "FemSite",
     "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "MixedQuasiStatic", "NewtonReport", "PointSearch",
-    "QuasiStatic", "Support", "background_arrays", "background_mesh", "box_mesh", "collapse_load", "compare", "evaluate_at",
-    "factor_of_safety", "fixed", "graded_tags", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
+    "QuasiStatic", "Stage", "StageError", "StageReport", "Support", "background_arrays", "background_mesh", "box_mesh", "carry_out", "collapse_load", "compare", "evaluate_at",
+    "factor_of_safety", "fixed", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
     "log_spiral", "log_spiral_safety", "name_tags", "names_of", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
     "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]

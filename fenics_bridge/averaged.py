@@ -92,7 +92,8 @@ class AveragedKinematics:
     def _mean_over_nodes(self, comm, nodes):
         """Matrix from cells to cells: to the nodes by volume, and back as the mean over a cell's nodes."""
         size = len(nodes), self._space.dofmap.index_map.size_local
-        to_nodes = _matrix(comm, size, nodes, self._volumes[:, None]).transpose()
+        there = self._points.material >= 0  # cells that are switched off take no part
+        to_nodes = _matrix(comm, size, nodes, (self._volumes * there)[:, None]).transpose()
         around = to_nodes.getRowSum()
         around.reciprocal()
         to_nodes.diagonalScale(L=around)

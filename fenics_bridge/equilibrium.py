@@ -48,7 +48,7 @@ class EquilibriumStep:
         self._scale = None
         self.reason = ""
         """Why the last move could not be made"""
-        self._moved = displacement * body.constraints.values - body.solution.x.array[self._fixed]
+        self._moved = body.constraints.at(displacement) - body.solution.x.array[self._fixed]
         self._base = np.zeros_like(body.increment.x.array)
         self._correction = fem.Function(self._space)
 

@@ -57,7 +57,13 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
     if isinstance(fem, QuasiStatic):
-        _require_same_laws(model, fem, search.values(fem.material_function())[:, 0].astype(int))
+        number = search.values(fem.material_function())[:, 0].astype(int)
+        outside = int(np.sum(number < 0))
+        agree(
+            model.comm,
+            f"particles: {outside} of them lie where the soil of the finite elements is not there" if outside else None,
+        )
+        _require_same_laws(model, fem, number)
     returned = _take_stress_and_state(model, fem, search, smooth)
     _displace(model, fem.displacement, search, move, count_displacement)
     before = model.out_of_balance()

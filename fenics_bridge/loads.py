@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import ufl
@@ -21,11 +22,13 @@ class Load:
     unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
     pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
     displacement: share of the displacements that the supports prescribe [-], for `prescribed` supports
+    held: share of the forces that were out of balance when the present stage began and are still held [-], see `Stage`
     """
 
     unit_weight: float | dict = 0.0
     pressure: dict = field(default_factory=dict)
     displacement: float = 0.0
+    held: float = 0.0
 
     def towards(self, other, share):
         """The load a share of the way (0 to 1) from this one to another."""
@@ -42,13 +45,14 @@ class Load:
             between_tags(*map(_weight_by_tag, weights)) if by_tag else between(*weights),
             between_tags(self.pressure, other.pressure),
             between(self.displacement, other.displacement),
+            between(self.held, other.held),
         )
 
 
 def require_finite(comm, load):
     """Raises InputError on all ranks where a load has a value that is not finite on any. Collective."""
     problem = None
-    for name in ("unit_weight", "pressure", "displacement"):
+    for name in ("unit_weight", "pressure", "displacement", "held"):
         value = getattr(load, name)
         wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v)]
         if wrong:
@@ -62,10 +66,19 @@ def _weight_by_tag(unit_weight):
 
 
 class LoadVectors:
-    """Nodal forces of loads on a displacement space; each kind of load is assembled once."""
+    """Nodal forces of loads on a displacement space; each kind of load is assembled once.
 
-    def __init__(self, space, facet_tags, cell_tags=None, test=None):
-        """test: test function of the displacement, where it is only a part of the space."""
+    constant, held: forces that always act, and those of which the load's share `held` acts; arrays like `forces`, or 0
+    """
+
+    def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None):
+        """test: test function of the displacement, where it is only a part of the space.
+
+        active: function, 1 in cells that are there and 0 in those that are not; the others neither weigh nor are pressed
+        """
+        self._active: Any = active
+        self.constant: Any = 0.0
+        self.held: Any = 0.0
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
         self._weight = {None: self._unit_weight(ufl.dx)}
@@ -85,7 +98,7 @@ class LoadVectors:
             forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
-        return forces
+        return forces + self.constant + load.held * self.held
 
     def resolved(self, load):
         """The load with numbers for the names of tags. Raises InputError, on all ranks, for unknown ones. Collective."""
@@ -97,7 +110,8 @@ class LoadVectors:
     def _unit_weight(self, dx):
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
-        return assembled(fem.form(ufl.inner(down, self._test) * dx), self._space).array.copy()
+        there = 1.0 if self._active is None else self._active
+        return assembled(fem.form(there * ufl.inner(down, self._test) * dx), self._space).array.copy()
 
     def _unit_weight_of(self, tag):
         if tag not in self._weight:
@@ -109,7 +123,13 @@ class LoadVectors:
         if tag not in self._pressure:
             domain = self._space.mesh
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
-            form = -ufl.inner(ufl.FacetNormal(domain), self._test) * ds(tag)
+            normal, test, active = ufl.FacetNormal(domain), self._test, self._active
+            if active is None:
+                form = -ufl.inner(normal, test) * ds(tag)
+            else:  # also where what is there ends inside of the mesh; between two cells that are there it cancels
+                dS = ufl.Measure("dS", domain=domain, subdomain_data=self._facet_tags)
+                form = -active * ufl.inner(normal, test) * ds(tag)
+                form -= ufl.inner(active("+") * normal("+") + active("-") * normal("-"), test("+")) * dS(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
 

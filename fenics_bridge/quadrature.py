@@ -14,6 +14,7 @@ class QuadraturePoints:
     """The quadrature points of the cells that this rank owns, cell after cell, the cells of each material together.
 
     n: their number; per_cell: number in a cell; cells: (m,) int32, the cells; material: (m,) int32, of each of them
+    off: rows of the points in cells that are switched off, whose stress is zero
     stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium; n_state: that of the law with most variables
     deviatoric_strain: (n,) accumulated up to there, the sum of sqrt(2/3 de : de) as the particles have it [-]
     trial_stress, trial_state, tangent: (n, S), (n, n_state), (n, S, S) at the displacement under trial
@@ -27,10 +28,8 @@ class QuadraturePoints:
         self.per_cell = len(self.reference)
         # With the points of a law in one piece it works on them in place.
         self.cells = np.argsort(material, kind="stable").astype(np.int32)
-        self.material = material[self.cells]
-        ends = self.per_cell * np.searchsorted(self.material, np.arange(len(laws) + 1))
-        self._pieces = [slice(*ends[number : number + 2]) for number in range(len(laws))]
         self.n = len(self.cells) * self.per_cell
+        self.assign(material, len(laws))
         self.stress = np.zeros((self.n, self.size))
         self.state = np.zeros((self.n, max(law.n_state for law in laws)))
         self.deviatoric_strain = np.zeros(self.n)
@@ -39,25 +38,50 @@ class QuadraturePoints:
         self.tangent = np.zeros((self.n, self.size, self.size))
         self.reset_state(laws)
 
-    def reset_state(self, laws):
-        """State variables as the laws want them at the start: zero, but for the size of cells [m] where asked for."""
-        self.state[:], self.deviatoric_strain[:] = 0.0, 0.0
+    def assign(self, material, n_laws):
+        """Give each cell the number of its law; -1 for a cell that is switched off, whose points no law updates.
+
+        material: (owned cells,) int32, in the order of the mesh
+        """
+        self.material = material[self.cells]
+        of_point = np.repeat(self.material, self.per_cell)
+        self._pieces = [_piece(np.flatnonzero(of_point == number)) for number in range(n_laws)]
+        self.off = np.flatnonzero(of_point < 0)
+
+    def reset_state(self, laws, points=slice(None)):
+        """State variables as the laws want them at the start: zero, but for the size of cells [m] where asked for.
+
+        points: rows of the points that are reset; all by default
+        """
+        missing = max(law.n_state for law in laws) - self.state.shape[1]
+        if missing > 0:  # a law with more variables has come in
+            self.state = np.pad(self.state, ((0, 0), (0, missing)))
+            self.trial_state = self.state.copy()
+        self.state[points], self.deviatoric_strain[points] = 0.0, 0.0
         size = np.repeat(cell_volumes(self._domain)[self.cells] ** (1 / self._domain.geometry.dim), self.per_cell)
+        chosen = np.zeros(self.n, dtype=bool)
+        chosen[points] = True
         for law, piece in zip(laws, self._pieces):
             if "cell_size" in law.state_names:
-                self.state[piece, law.state_names.index("cell_size")] = size[piece]
+                rows = np.arange(self.n)[piece][chosen[piece]]
+                self.state[rows, law.state_names.index("cell_size")] = size[rows]
 
     def update(self, laws, strain_increment):
         """Trial stress, state and tangent by one call of each law; returns where and why one failed, empty if none did."""
         np.copyto(self.trial_stress, self.stress)
         np.copyto(self.trial_state, self.state)
         self._trial_strain, failure = strain_increment, ""
+        self._trial_strain[self.off] = 0.0
+        self.tangent[self.off] = 0.0
         for law, piece in zip(laws, self._pieces):
             state = np.ascontiguousarray(self.trial_state[piece, : law.n_state])  # the columns themselves if it has all
-            report = law.update(strain_increment[piece], self.trial_stress[piece], state, self.tangent[piece])
+            stress, tangent = self.trial_stress[piece], self.tangent[piece]  # views, unless the piece is scattered
+            report = law.update(strain_increment[piece], stress, state, tangent)
             self.trial_state[piece, : law.n_state] = state
+            if not isinstance(piece, slice):
+                self.trial_stress[piece], self.tangent[piece] = stress, tangent
             if report.failed and not failure:
-                failure = self._failure(law, piece.start + report.first_failed)
+                failure = self._failure(law, np.arange(self.n)[piece][report.first_failed])
         return failure
 
     def _failure(self, law, point):
@@ -95,6 +119,13 @@ class QuadraturePoints:
 
     def _linear_shapes(self):
         return np.column_stack([1 - self.reference.sum(axis=1), self.reference])
+
+
+def _piece(rows):
+    """Rows in order as a slice where they are in one piece."""
+    if len(rows) == 0:
+        return slice(0, 0)
+    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] + 1 == len(rows) else rows
 
 
 def deviatoric_size(strain):

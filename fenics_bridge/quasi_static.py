@@ -9,6 +9,7 @@ from dolfinx import fem
 from mpm_core.newton import newton
 
 from fenics_bridge import compat
+from fenics_bridge.active_cells import reconfigure
 from fenics_bridge.averaged import AveragedKinematics
 from fenics_bridge.equilibrium import Body, EquilibriumStep
 from fenics_bridge.errors import agree
@@ -19,6 +20,7 @@ from fenics_bridge.linear_solver import LinearSolver
 from fenics_bridge.load_steps import raise_load
 from fenics_bridge.loads import Load, LoadVectors
 from fenics_bridge.materials import Materials
+from fenics_bridge.names import known_tags
 from fenics_bridge.quadrature import QuadraturePoints
 from fenics_bridge.supports import Constraints, tagged_facets
 
@@ -46,20 +48,54 @@ class QuasiStatic:
         self.domain, self.law, self.facet_tags, self.degree = domain, law, facet_tags, degree
         self.displacement = fem.Function(space, name="displacement")
         self.increment = fem.Function(space, name="increment")
+        self.cell_tags, self.supports, self.off = cell_tags, tuple(supports), ()
+        self._nmd, self._options_prefix = nmd, options_prefix
         constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags, cell_tags)
         self._materials = Materials(domain, law, cell_tags)
         self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
         self.load, self.converged = Load(), False
-        kinematics: type = AveragedKinematics if nmd else Kinematics
+        self._assemble(constraints)
+
+    def _assemble(self, constraints):
+        """Put together what a step works on, with the present points and the given constraints. Collective."""
+        kinematics: type = AveragedKinematics if self._nmd else Kinematics
         self._kinematics = kinematics(self.increment, self.points, constraints)
-        solver = LinearSolver(space, options_prefix)
+        solver = LinearSolver(self.displacement.function_space, self._options_prefix)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, solver)
+
+    def reconfigure(self, off=(), supports=None, pore_pressure=None, stress=None, law=None):
+        """Change what is there; the forces that this brings out of balance are held until `solve` releases them.
+
+        For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; those that were off and
+        no longer are begin without stress and state, or with the given one. Afterwards `load.held` is 1, and the body is
+        in equilibrium; `solve` to a load with `held` 0, as every new Load has, lets the forces go in steps.
+
+        off: cell tags or names; supports: as for the constructor, None for the present ones, where they are now
+        pore_pressure: function of positions (n, D) that returns pore pressures (n,) [Pa], or None for none
+        stress: function of positions that returns stresses (n, S) [Pa] of the cells that come in
+        law: law, or laws by cell tag, in force from now on; where one is another than before its state is reset
+        Collective.
+        """
+        reconfigure(self, off, supports, pore_pressure, stress, law)
 
     @property
     def laws(self):
         """The laws in force as a list, in the order in which they were given. Collective."""
         return self._materials.laws(self.law)
+
+    @property
+    def soils(self):
+        """The cell tags that the laws are given for, in the order of `laws`; (None,) for one law of the whole body."""
+        return self._materials.tags
+
+    def law_by_tag(self):
+        """The laws in force as {cell tag: law}; where one law holds for the whole body, for each tag of its cells. Collective."""
+        laws, tags = self.laws, self.soils
+        if tags == (None,):
+            tags = tuple(known_tags(self.domain.comm, self.cell_tags))
+            laws = laws * len(tags)
+        return dict(zip(tags, laws))
 
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
@@ -77,6 +113,7 @@ class QuasiStatic:
     def reset_displacement(self):
         """Count displacements from here on (the stress stays)."""
         self.displacement.x.array[:] = 0.0
+        self._body.constraints.origin[:] = 0.0
         self.load = replace(self.load, displacement=0.0)
 
     def equilibrate(self, load, law=None, **newton_options):

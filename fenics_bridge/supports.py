@@ -53,11 +53,11 @@ class Constraints:
     """The supports of a body on the degrees of freedom of a displacement space.
 
     `dofs` (k,) int32 local, `values` (k,) [m], both unrolled over components and with ghosts; `bcs` for assembling
-    matrices. Where supports meet, the later one holds.
+    matrices. Where supports meet, the later one holds. `origin` (k,) [m]: displacement from which the values count.
     """
 
-    def __init__(self, space, facet_tags, supports):
-        """space: of the displacement, or that part of a mixed space."""
+    def __init__(self, space, facet_tags, supports, held=()):
+        """space: of the displacement, or that part of a mixed space; held: further dofs (local, blocked) that stay."""
         domain, dim = space.mesh, space.mesh.geometry.dim
         agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
         domain.topology.create_connectivity(dim - 1, dim)
@@ -72,8 +72,16 @@ class Constraints:
                 dofs = fem.locate_dofs_topological(part, dim - 1, facets)
                 self.bcs.append(fem.dirichletbc(np.float64(0.0), dofs, part))
                 value_of.update(dict.fromkeys(dofs.tolist(), float(value)))
+        if len(held):
+            self.bcs.append(fem.dirichletbc(np.zeros(dim), np.asarray(held, dtype=np.int32), space))
+            value_of.update(dict.fromkeys((dim * np.asarray(held)[:, None] + np.arange(dim)).ravel().tolist(), 0.0))
         self.dofs = np.fromiter(value_of.keys(), np.int32, len(value_of))
         self.values = np.fromiter(value_of.values(), float, len(value_of))
+        self.origin = np.zeros(len(value_of))
+
+    def at(self, share):
+        """Displacements (k,) [m] of the dofs at a share of the values."""
+        return self.origin + share * self.values
 
 
 def tagged_facets(comm, facet_tags, tag, argument):

@@ -1,0 +1,64 @@
+"""Stages of construction give the same on 1, 2 and 3 ranks: against sums by hand and a site on one rank."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+from stage_cases import ROLLERS, SOILS, mesh_of, site_of, weights  # noqa: E402
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+COMM = MPI.COMM_WORLD
+POINTS = np.array([(x, y) for x in (0.5, 2.9, 3.2, 6.0) for y in (0.4, 1.7, 2.8)])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return Path(COMM.bcast(str(tmp_path)))
+
+
+def plastic(soils):
+    return {
+        s: mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=12e3, friction_angle=25.0, dilation_angle=25.0)
+        for s in soils
+    }
+
+
+def dug(folder, comm, **options):
+    """Stresses and displacements after an excavation with water, load and a support that goes."""
+    site = site_of(mesh_of("pit", folder, comm), plastic(SOILS["pit"]), **options)
+    stages = [
+        bridge.Stage(
+            "in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), pore_pressure=bridge.hydrostatic(2.0)
+        ),
+        bridge.Stage("dig 1", excavate="pit 1", reset_displacement=True),
+        bridge.Stage("dig 2", excavate="pit 2", pressure={"floor": 5e3}, pore_pressure=bridge.hydrostatic(1.0)),
+    ]
+    reports = list(bridge.carry_out(site, stages))
+    return site.fem.evaluate_at(POINTS), reports
+
+
+@pytest.mark.parametrize("options", [{"degree": 1}, {"degree": 2}, {"degree": 1, "nmd": True}])
+def test_an_excavation_is_the_same_on_all_numbers_of_ranks(folder, options):
+    together, reports = dug(folder, COMM, **options)
+    apart = folder / f"rank {COMM.rank}"
+    apart.mkdir()
+    alone, expected = dug(apart, MPI.COMM_SELF, **options)
+    for name, values in together.items():
+        assert np.allclose(values, alone[name], rtol=0, atol=1e-8 * max(np.abs(alone[name]).max(), 1e-12))
+    assert [r.steps for r in reports] == [r.steps for r in expected]
+
+
+def test_a_stage_that_fails_says_the_same_on_all_ranks(folder):
+    laws = {soil: mpm.tresca(young=20e6, poisson=0.4, shear_strength=2e3) for soil in SOILS["pit"]}
+    site = site_of(mesh_of("pit", folder), laws, ROLLERS, degree=1)
+    with pytest.raises(bridge.StageError) as error:
+        list(bridge.carry_out(site, [bridge.Stage("in situ", fill="ground", unit_weight={"ground": 20e3})]))
+    assert len(set(COMM.allgather(str(error.value)))) == 1
+    with pytest.raises(bridge.InputError, match="stage 'a': fill: no cell has the name 'sand'"):
+        site.carry_out(bridge.Stage("a", fill="sand"))
