@@ -96,6 +96,14 @@ UmatFunction load_umat(const std::string& library, const std::string& symbol)
   return reinterpret_cast<UmatFunction>(address);
 }
 
+std::string library_file(UmatFunction function)
+{
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(function), &info) == 0 || !info.dli_fname)
+    return {};
+  return info.dli_fname;
+}
+
 std::vector<std::string> state_names(const Umat& law)
 {
   std::vector<std::string> names{"plastic_strain", "strain_xx", "strain_yy", "strain_zz",

@@ -34,6 +34,8 @@ struct Umat
   int plastic_strain_variable;
   /// Modulus of the compression wave [Pa], for the critical time step
   double wave_modulus;
+  /// Symbol, and a hash of the library's file as it was loaded: another one under the same name is another law
+  std::string code = {};
 
   static constexpr std::string_view name = "Umat";
 
@@ -44,6 +46,9 @@ struct Umat
 /// @param symbol  of the subroutine; `umat_` is what Fortran compilers make of UMAT
 /// @throws InputError the library or the symbol is not there; with the loader's message
 UmatFunction load_umat(const std::string& library, const std::string& symbol);
+
+/// The file that a function of a shared library was loaded from.
+std::string library_file(UmatFunction function);
 
 /// plastic_strain, six components of STRAN (of which plane strain uses four), then STATEV
 inline int n_state(const Umat& law) { return 7 + law.n_variables; }

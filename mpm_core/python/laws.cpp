@@ -194,6 +194,15 @@ exceeds it by (tension positive). Where there is a steady pore pressure, stresse
       .def_readonly("porosity", &Undrained::porosity);
 }
 
+/// SHA-256 of a file, in hexadecimal digits.
+std::string file_hash(const std::string& path)
+{
+  const py::object hash = py::module_::import("hashlib").attr("sha256");
+  return hash(py::module_::import("pathlib").attr("Path")(path).attr("read_bytes")())
+      .attr("hexdigest")()
+      .cast<std::string>();
+}
+
 void bind_umat(py::module_& m)
 {
   bind_law<Umat>(m, "Umat", R"(A law given as an Abaqus UMAT in a shared library.
@@ -213,13 +222,16 @@ one counts as a failure.)")
                [](const std::string& library, std::vector<double> properties, int n_variables, double p_wave_modulus,
                   int plastic_strain_variable, const std::string& symbol)
                {
-                 return checked(Umat{load_umat(library, symbol), std::move(properties), n_variables,
-                                     plastic_strain_variable, p_wave_modulus});
+                 const UmatFunction function = load_umat(library, symbol);
+                 return checked(Umat{function, std::move(properties), n_variables, plastic_strain_variable,
+                                     p_wave_modulus, symbol + " of " + file_hash(library_file(function))});
                }),
            py::arg("library"), py::kw_only(), py::arg("properties"), py::arg("n_variables"), py::arg("p_wave_modulus"),
            py::arg("plastic_strain_variable") = 0, py::arg("symbol") = "umat_")
       .def_readonly("properties", &Umat::properties)
-      .def_readonly("n_variables", &Umat::n_variables);
+      .def_readonly("n_variables", &Umat::n_variables)
+      .def_readonly("plastic_strain_variable", &Umat::plastic_strain_variable)
+      .def_readonly("code", &Umat::code, "Symbol and SHA-256 of the library's file");
 }
 } // namespace
 

@@ -152,6 +152,14 @@ Args:
 A point fails where its stress or a state of it is not finite afterwards: so a law tells that it found no solution there.
 An exception in update is a failure of all its points; they are then tried one by one, and the first exception of a law
 is printed.)")
-      .def(py::init(&python_law), py::arg("law"));
+      .def(py::init(&python_law), py::arg("law"))
+      .def_property_readonly(
+          "law",
+          [](const ExternalLaw& law)
+          {
+            auto* const object = static_cast<PyObject*>(const_cast<void*>(law.identity));
+            return py::reinterpret_borrow<py::object>(object);
+          },
+          "The object that was given");
 }
 } // namespace mpm::python

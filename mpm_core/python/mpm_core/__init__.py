@@ -24,6 +24,7 @@ from ._core import (
 )
 from ._core import compiler as compiler
 from ._core import version as __version__
+from .checkpoint import checkpoint_description
 from .element import ElementTest
 from .ghost import GhostPenalty
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
@@ -61,6 +62,7 @@ __all__ = [
     "Umat",
     "Undrained",
     "__version__",
+    "checkpoint_description",
     "log_preconsolidation",
     "matched_drucker_prager",
     "tresca",

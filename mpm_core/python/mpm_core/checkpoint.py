@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
@@ -11,23 +12,53 @@ from mpi4py import MPI
 from . import _core, partition
 from ._core import InputError, RunError
 from .collective import collectively
+from .fingerprint import fingerprint
 from .implicit import StepControl
 
 if TYPE_CHECKING:
     from .model import Model
 
 
-def save(model: Model, path: str | os.PathLike[str]) -> None:
+def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
-    _core.save(model._core, os.fspath(path), json.dumps(_description(model), indent=1), model.cuts > 0)
+    text = collectively(model.comm, lambda: _text(_description(model), notes))
+    _core.save(model._core, os.fspath(path), text, model.cuts > 0)
+
+
+def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
+    try:
+        return json.dumps({**description, "notes": dict(notes or {})}, indent=1)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"notes hold what JSON has no form for: {error}") from None
+
+
+def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
+    """What a checkpoint says of itself, without a model: ``time`` [s], ``steps``, ``ranks``, ``materials``, ``notes`` and the
+    other entries that docs/checkpoints.md lists.
+
+    Raises:
+        RunError: on all ranks, with path and reason, as `Model.restore`.
+
+    Note:
+        Collective.
+    """
+    name = os.fspath(path)
+    return _parsed(name, _core.checkpoint_description(MPI._addressof(comm), name))
+
+
+def _parsed(path: str, text: str) -> dict[str, Any]:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
 
 
 def restore(model: Model, path: str | os.PathLike[str]) -> None:
     """See `Model.restore`."""
     name = os.fspath(path)
-    text = _core.checkpoint_description(MPI._addressof(model.comm), name)
+    there = checkpoint_description(name, model.comm)
     here = _description(model)
-    there = collectively(model.comm, lambda: _matching(name, text, here))
+    collectively(model.comm, lambda: _compare(name, there, here))
     if there.get("cuts") and there["ranks"] == model.comm.size:
         cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
         partition.take_partition(model, cells)
@@ -36,18 +67,13 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     _take(model, there)
 
 
-def _matching(path: str, text: str, here: dict[str, Any]) -> dict[str, Any]:
-    """The description in a checkpoint, where it is of the same dimension, mesh and materials."""
-    try:
-        there = json.loads(text)
-    except ValueError as error:
-        raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
+def _compare(path: str, there: dict[str, Any], here: dict[str, Any]) -> None:
+    """Refuse a checkpoint of another dimension, mesh or materials."""
     for key, what in (("dimension", "dimension"), ("materials", "materials"), ("mesh", "background mesh")):
         if there.get(key) != here[key]:
             raise InputError(
                 f"checkpoint {path} is of another {what}: it has {_shown(there.get(key))}, the model has {_shown(here[key])}"
             )
-    return there
 
 
 def _shown(value: Any) -> str:
@@ -83,8 +109,16 @@ def _material(law: Any) -> str:
     """A law with all its parameters as text that tells any two apart; laws within laws too."""
     names = sorted(name for name, value in vars(type(law)).items() if isinstance(value, property))
     values = [getattr(law, name) for name in names]
-    texts = [_material(value) if isinstance(value, tuple(_core.law_types)) else repr(value) for value in values]
+    texts = [_value(law, value) for value in values]
     return f"{type(law).__name__}({', '.join(f'{name}={text}' for name, text in zip(names, texts, strict=True))})"
+
+
+def _value(law: Any, value: Any) -> str:
+    """A parameter of a law as text."""
+    if isinstance(value, tuple(_core.law_types)):
+        return _material(value)
+    is_python = isinstance(law, _core.PythonLaw) and value is law.law
+    return fingerprint(value) if is_python else repr(value)
 
 
 def _take(model: Model, there: dict[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """A model: background mesh, particles, laws, loads and supports; and the schemes that move it."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -37,7 +37,7 @@ class Model(Body):
 
     # --- checkpoints ---------------------------------------------------------------------------------------------
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
         """Save the complete state: particles, loads, supports, time and totals.
 
         The file is written aside as ``path.part``, flushed to the disk and renamed, so that a file of that name is whole at
@@ -45,11 +45,13 @@ class Model(Body):
 
         Args:
             path: of the file, commonly ``NAME.h5``; the folder must exist.
+            notes: what JSON can hold, to be read again by `checkpoint_description`, for instance how the run was made.
 
         Raises:
+            InputError: notes that JSON cannot hold.
             RunError: on all ranks, with path and reason, when it cannot be written; an older file stays as it is.
         """
-        checkpoint.save(self, path)
+        checkpoint.save(self, path, notes)
 
     def restore(self, path: str | os.PathLike[str]) -> None:
         """Take the state that ``save`` wrote; particles, loads and supports that the model has are replaced.
