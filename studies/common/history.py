@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.row_file import RowFile
 
 
 class History:
@@ -20,31 +20,34 @@ class History:
         array([0.])
 
     Args:
-        path: of the file; an older one is replaced. The first rank writes, every rank keeps the rows.
+        path: of the file. The first rank writes, every rank keeps the rows.
         columns: names, which end in their unit.
+        keep_before: keep the rows before this time [s] of a file that is there, as after a restart; otherwise it is replaced.
+
+    Raises:
+        InputError: on all ranks, with path and reason: the file cannot be written, or has other columns to keep.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    def __init__(
+        self, path: Path, columns: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD, *, keep_before: float | None = None
+    ) -> None:
         self.columns = list(columns)
-        self._rows: list[list[float]] = []
-        self._file = open(path, "w", newline="", encoding="utf-8") if comm.rank == 0 else None
-        if self._file is not None:
-            self._writer = csv.writer(self._file)
-            self._writer.writerow(self.columns)
-            self._file.flush()
+        self._file = RowFile(path, self.columns, comm, keep_before=keep_before)
+        self._rows: list[list[float]] = [[float(value) for value in row] for row in comm.bcast(self._file.kept)]
 
     def add(self, **values: float) -> None:
-        """Add a row.
+        """Add a row. Collective.
 
         Args:
             values: one number for each column, by name.
+
+        Raises:
+            RunError: on all ranks, with path and reason, when the file cannot be written.
         """
         if set(values) != set(self.columns):
             raise ValueError(f"columns are {', '.join(values)}, expected {', '.join(self.columns)}")
         self._rows.append([float(values[name]) for name in self.columns])
-        if self._file is not None:
-            self._writer.writerow([f"{value:.9g}" for value in self._rows[-1]])
-            self._file.flush()
+        self._file.add(self._rows[-1])
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -58,5 +61,4 @@ class History:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._file is not None:
-            self._file.close()
+        self._file.close()

@@ -14,7 +14,6 @@ Example:
 
 from __future__ import annotations
 
-import csv
 import os
 from types import TracebackType
 from typing import Any, Protocol
@@ -27,6 +26,7 @@ from ._core import InputError
 from .collective import collectively
 from .mesh import Mesh, floats
 from .model import Model
+from .row_file import RowFile
 
 AXES = ("x", "y", "z")
 STRESSES = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "yz", "xz")}
@@ -253,34 +253,21 @@ class ProbeFile:
     """
 
     def __init__(self, path: str | os.PathLike[str], probe: Probe, *, keep: bool = False) -> None:
-        self._probe, self._comm = probe, probe.model.comm
-        self._file: Any = None
-        columns = list(probe.values())
-        collectively(self._comm, lambda: self._open(os.fspath(path), columns, keep))
-
-    def _open(self, path: str, columns: list[str], keep: bool) -> None:
-        if self._comm.rank != 0:
-            return
-        try:
-            rows = _rows_before(path, columns, self._probe.model.time) if keep and os.path.exists(path) else []
-            self._file = open(path, "w", newline="", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"path: cannot write {path}: {error.strerror}") from None
-        self._writer = csv.writer(self._file)
-        self._writer.writerows([columns, *rows])
-        self._file.flush()
+        self._probe = probe
+        before = probe.model.time if keep else None
+        self._file = RowFile(path, list(probe.values()), probe.model.comm, keep_before=before)
 
     def record(self) -> None:
-        """Look, and add a row. Collective."""
-        values = self._probe.values()
-        if self._file is not None:
-            self._writer.writerow([f"{value:.9g}" for value in values.values()])
-            self._file.flush()
+        """Look, and add a row. Collective.
+
+        Raises:
+            RunError: on all ranks, with path and reason, when the file cannot be written.
+        """
+        self._file.add(list(self._probe.values().values()))
 
     def close(self) -> None:
         """Close the file; nothing can be recorded after that."""
-        if self._file is not None:
-            self._file.close()
+        self._file.close()
 
     def __enter__(self) -> ProbeFile:
         return self
@@ -289,11 +276,3 @@ class ProbeFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _rows_before(path: str, columns: list[str], time: float) -> list[list[str]]:
-    with open(path, newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    if rows and rows[0] != columns:
-        raise InputError(f"path: {path} has the columns {', '.join(rows[0])}; expected {', '.join(columns)}")
-    return [row for row in rows[1:] if len(row) == len(columns) and float(row[0]) < time * (1 - 1e-9)]

@@ -1,0 +1,122 @@
+"""A CSV file of numbers that grows while a run goes on, and that the same run goes on with after a restart."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mpi4py import MPI
+
+from ._core import InputError, RunError
+from .collective import collectively
+
+ROUNDING = 1e-8
+"""Relative; times in the file have nine digits."""
+
+
+class RowFile:
+    """Rows under one heading, each on disk as soon as it was added; the first rank writes.
+
+    The file begins aside, as ``path.part``, and gets its name when what it begins with is on the disk: a run that is killed
+    meanwhile leaves the file as it was.
+
+    Args:
+        path: of the file.
+        columns: names; the first is the time [s].
+        keep_before: keep the rows before this time [s] of a file that is there, as after a restart; None begins anew. Rows
+            that are not whole, or not later than the one before, are left out, with a note on standard error.
+
+    Raises:
+        InputError: on all ranks, with path and reason: the file cannot be written, or has other columns to keep.
+
+    Note:
+        Collective, as `add` is.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], columns: Sequence[str], comm: MPI.Comm, *, keep_before: float | None = None
+    ) -> None:
+        self.path, self._comm, self._file = os.fspath(path), comm, None  # type: str, MPI.Comm, Any
+        self.kept: list[list[str]] = []
+        """Rows that were kept, as texts; on the first rank"""
+        collectively(comm, self._on_first(lambda: self._begin(list(columns), keep_before)))
+
+    def _on_first(self, work: Callable[[], None]) -> Callable[[], None]:
+        return work if self._comm.rank == 0 else lambda: None
+
+    def _begin(self, columns: list[str], keep_before: float | None) -> None:
+        aside = f"{self.path}.part"
+        try:
+            if keep_before is not None and os.path.exists(self.path):
+                self.kept = _rows_before(self.path, columns, keep_before)
+            file = open(aside, "w", newline="", encoding="utf-8")
+            self._file, self._writer = file, csv.writer(file)
+            self._writer.writerows([columns, *self.kept])
+            file.flush()
+            os.fsync(file.fileno())
+            os.replace(aside, self.path)
+        except OSError as error:
+            raise InputError(f"path: cannot write {self.path}: {error.strerror}") from None
+
+    def add(self, values: Sequence[float]) -> None:
+        """Add a row.
+
+        Raises:
+            RunError: on all ranks, with path and reason, when it cannot be written.
+        """
+        problem = None
+        if self._file is not None:
+            try:
+                self._writer.writerow([f"{value:.9g}" for value in values])
+                self._file.flush()
+            except OSError as error:
+                problem = f"cannot write {self.path}: {error.strerror}"
+        problem = self._comm.bcast(problem)
+        if problem is not None:
+            raise RunError(problem)
+
+    def close(self) -> None:
+        """Close the file; nothing can be added after that. A row that there was no room for stays out."""
+        if self._file is not None:
+            try:
+                self._file.close()
+            except OSError:  # what could not be written was an error when it was added
+                pass
+
+
+def _rows_before(path: str, columns: list[str], time: float) -> list[list[str]]:
+    """Rows of a file before a time, without those that a killed run left half-written."""
+    with open(path, newline="", encoding="utf-8", errors="replace") as file:
+        text = file.read()
+    rows = list(csv.reader(text.splitlines()))
+    if not rows:
+        return []
+    if rows[0] != columns:
+        raise InputError(f"path: {path} has the columns {', '.join(rows[0])}; expected {', '.join(columns)}")
+    if not text.endswith("\n"):
+        rows[-1] = []
+    kept: list[list[str]] = []
+    last, dropped = -math.inf, 0
+    for row in rows[1:]:
+        at = _time_of(row, len(columns))
+        if at is None or at <= last:
+            dropped += 1
+        elif at < time - ROUNDING * abs(time):
+            kept.append(row)
+            last = at
+    if dropped:
+        print(f"note: {path}: {dropped} incomplete or repeated row(s) left out", file=sys.stderr)
+    return kept
+
+
+def _time_of(row: list[str], width: int) -> float | None:
+    """The first number of a row of numbers; None where it is no such row."""
+    try:
+        numbers = [float(value) for value in row]
+    except ValueError:
+        return None
+    return numbers[0] if len(numbers) == width else None
