@@ -12,14 +12,16 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
+from common.files import OutputError
 from common.movie import Movie, frame_of
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.plots import Quantity, save_history
 from common.progress import Progress
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -89,7 +91,7 @@ def main(arguments: list[str] | None = None) -> int:
     check_slope_options(p, a)
     if comm.size == 1:
         raise mpm.InputError("one rank is always balanced; run the study on several, by --ranks 4")
-    folder = results_folder("balance", a.output, comm)
+    folder = open_results(a, comm)
     cases = [build_slope(a, comm) for _ in range(2)]
     runs = {"as cut at first": slide(cases[0], a.time, a.frames, None),
             "cut anew": slide(cases[1], a.time, a.frames, a.threshold)}  # fmt: skip

@@ -12,8 +12,10 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.files import OutputError
 from common.options import check, study_parser
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -22,7 +24,7 @@ from common.slope_fem import (
     step_line,
     weight,
 )
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -93,7 +95,7 @@ def draw(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("collapse", a.output, comm)
+    folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest)
     sizes = mesh_sizes(a)
     runs = {

@@ -12,12 +12,14 @@ from time import process_time
 
 import numpy as np
 from common.field_plots import bend, save_curves
+from common.files import OutputError
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import GRAVITY, soil_of
 from common.slope_fem import add_fem_slope_options, check_fem_slope_options, mesh_sizes, slope_fem, step_line, weight
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -108,7 +110,7 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if comm.size > 1:
         raise mpm.InputError(f"the study collapse_schemes runs on one rank, but was started on {comm.size}")
-    folder = results_folder("collapse_schemes", a.output, comm)
+    folder = open_results(a, comm)
     expected = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest).unit_weight
     by_size = {size: runs(a, size, FIRST_STEP * expected, BEYOND * expected) for size in mesh_sizes(a)}
     rows = [

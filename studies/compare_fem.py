@@ -15,11 +15,13 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
+from common.files import OutputError
 from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
 from common.page import Page
 from common.plots import Quantity
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import (
     GRAVITY,
     SUPPORTS,
@@ -32,7 +34,7 @@ from common.slope_case import (
     soil_of,
 )
 from common.slope_fem import mesh_sizes, step_line, weight
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -196,7 +198,7 @@ def draw_convergence(rows: list[dict], sizes: list[float], folder: Path) -> None
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("compare_fem", a.output, comm)
+    folder = open_results(a, comm)
     sizes = mesh_sizes(a)
     fems = finite_elements(a)
     rows, frames = [], []

@@ -20,12 +20,15 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from common.figures import save_figure
+from common.files import OutputError
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.plots import CURVES, WIDTH, paper_style
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, solved_fem
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -215,8 +218,7 @@ def save_costs(path: Path, rows: list[dict]) -> None:
             axes.set_xlabel("Cells of soil")
         handles, names = panels[0][0].get_legend_handles_labels()
         figure.legend(handles, names, loc="lower center", ncols=3)
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 def speed_up(rows: list[dict]) -> dict[str, float]:
@@ -242,7 +244,7 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if comm.size > 1:
         raise mpm.InputError(f"the study cost measures one processor, but runs on {comm.size} ranks")
-    folder = results_folder("cost", a.output, comm)
+    folder = open_results(a, comm)
     rows, steps = [], []
     for level in range(a.meshes):
         mesh = Namespace(**{**vars(a), "cell_size": a.cell_size / 2**level})

@@ -12,12 +12,16 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from common.figures import save_figure
+from common.files import OutputError
 from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
 from common.plots import paper_style
+from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import add_soil_options
 from common.soils import add_law_options, law_of
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 
 import mpm_core as mpm
 
@@ -117,15 +121,14 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         axes[0].set_xlim(
             min(0.0, 1.05 * axes[0].dataLim.x0), 1.05 * axes[0].dataLim.x1
         )  # nothing looks larger than it is
-        figure.savefig(path, dpi=200)
-        plt.close(figure)
+        save_figure(figure, path, dpi=200)
 
 
 def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
     law = law_of(a)
-    folder = results_folder("element_test", a.output)
+    folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
     with History(folder / "history.csv", COLUMNS) as history:
         stopped = run(test, a, history)
@@ -143,8 +146,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (mpm.InputError, OutputError) as error:
-        print(f"studies/run element_test: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_study(main, mpm.InputError, OutputError)

@@ -12,11 +12,13 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.files import OutputError
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.ranks import run_study
+from common.results import ROOT, open_results
 from common.slope_case import soil_of
 from common.slope_fem import step_line
-from common.summary import ROOT, OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -140,7 +142,7 @@ def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("footing", a.output, comm)
+    folder = open_results(a, comm)
     sizes = [
         a.cell_size * 2**k for k in reversed(range(a.meshes)) if a.cell_size * 2**k <= a.half_width * (1 + 1e-9)
     ]

@@ -14,14 +14,16 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_curves
+from common.files import OutputError
 from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
 from common.plots import save_history
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope_fem import step_line, weight
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI
 
@@ -132,7 +134,7 @@ def movies(runs: list[dict]) -> list[Movie]:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("handover", a.output, comm)
+    folder = open_results(a, comm)
     fem = soil_fem(build_slope(a, comm))
     collapse = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse")).value
     runs = [run(a, share, share * collapse) for share in SHARES]

@@ -13,10 +13,12 @@ from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 
+from common.files import OutputError
 from common.options import add_count, check, study_parser
 from common.page import Page
 from common.ranks import run_study
-from common.summary import OutputError, results_folder, write_summary
+from common.results import open_results
+from common.summary import write_summary
 from locking_cases import CASES
 from locking_cases.pictures import save_errors, save_pressures
 from locking_cases.runs import Found
@@ -109,7 +111,7 @@ def draw(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]], 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("locking", a.output, comm)
+    folder = open_results(a, comm)
     results, captions = {}, {}
     for name in a.cases.split(","):
         case, last = CASES[name], {}

@@ -17,6 +17,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from common.animation import Frame, save_animation
+from common.figures import save_figure
+from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import Movie, particle_frame
@@ -25,8 +27,9 @@ from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, paper_style, save_particles
 from common.progress import Progress
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -199,8 +202,7 @@ def compare(results: list[Slide], folder: Path) -> None:
             ax.set(xlabel="Time [s]", ylabel=label, xlim=(0, None), ylim=(0, None))
             ax.grid(linewidth=0.3, color="#d0d0d0")
         axes[0].legend(frameon=False)
-        figure.savefig(folder / "meshes.png", dpi=200)
-        plt.close(figure)
+        save_figure(figure, folder / "meshes.png", dpi=200)
 
 
 def differences(results: list[Slide]) -> dict[str, float]:
@@ -218,7 +220,7 @@ def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
     check_slope_options(p, a)
-    folder = results_folder("retrogression", a.output, comm)
+    folder = open_results(a, comm)
     results, movies = [], []
     with Interrupt(comm) as interrupt:
         for size in [a.cell_size, a.cell_size / 2][: 1 if a.meshes == "one" else 2]:

@@ -13,8 +13,10 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.files import OutputError
 from common.options import add_number, study_parser
 from common.ranks import run_study
+from common.results import open_results
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -23,7 +25,7 @@ from common.slope_fem import (
     step_line,
     weight,
 )
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -95,7 +97,7 @@ def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
-    folder = results_folder("safety", a.output, comm)
+    folder = open_results(a, comm)
     limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight)
     sizes = mesh_sizes(a)
     runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}

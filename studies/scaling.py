@@ -2,8 +2,8 @@
 
 Counted: a square (cube) full of particles is cut by DOLFINx's partitioner into any number of parts, and what each part
 exchanges in a step follows from the nodes that it shares. Timed: explicit steps of a full box on the ranks that the study
-runs on, with the same size on any number of ranks (strong) and with that size for each rank (weak); rows are added to
-timed.csv, so that runs with --ranks 1 and --ranks 2 make one table.
+runs on, with the same size on any number of ranks (strong) and with that size for each rank (weak). Rows are added to the
+timed.csv that is there, so that runs with --ranks 1 and --ranks 2 make one table; --overwrite begins a new one.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ from time import perf_counter
 
 import dolfinx
 import numpy as np
+from common.files import OutputError
 from common.options import add_count, study_parser
 from common.ranks import run_study
-from common.summary import OutputError, results_folder, write_summary
+from common.results import open_results
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -142,7 +144,7 @@ def main(arguments: list[str] | None = None) -> int:
     add_count(parser, "--side-3d", 20, "cubes along an edge of the three-dimensional box")
     add_count(parser, "--steps", 100, "steps that are timed")
     options = parser.parse_args(arguments)
-    folder = results_folder("scaling", options.output, comm)
+    folder = open_results(options, comm, adds=True)
     rows = timed(options)
     if comm.rank == 0:
         boxes = [(dim, *box_cells(dim, side)) for dim, side in ((2, options.side_2d), (3, options.side_3d))]
@@ -150,7 +152,7 @@ def main(arguments: list[str] | None = None) -> int:
         show(counts)
         show(rows)
         add_rows(folder / "counted.csv", counts, replace=True)
-        add_rows(folder / "timed.csv", rows, replace=comm.size == 1)
+        add_rows(folder / "timed.csv", rows, replace=False)
     write_summary(folder, options, {"timed": rows}, comm)
     return 0
 

@@ -15,11 +15,13 @@ from time import perf_counter
 from typing import Any
 
 from common.animation import Frame, save_animation
-from common.checkpoint import Checkpoints, add_checkpoint_options, continued_history, numbered
+from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
+from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import PORE, Movie, fem_frame, has_pore_pressure
-from common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
+from common.notes import notes_of
+from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.output_options import add_output_options
 from common.page import Page
 from common.plots import (
@@ -27,6 +29,7 @@ from common.plots import (
     PORE_PRESSURE,
     SHEAR_STRAIN,
     VERTICAL_STRESS,
+    Scene,
     colour_limits,
     save_history,
     save_mesh,
@@ -34,9 +37,10 @@ from common.plots import (
 )
 from common.progress import Progress
 from common.ranks import run_study
+from common.results import open_results
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI
 from mpm_core.output import PARTICLE_FIELDS, ModelOutput
@@ -48,6 +52,11 @@ comm = MPI.COMM_WORLD
 COLUMNS = [
     "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unbalanced_ratio", "plastic_share", "dt_s"
 ]  # fmt: skip
+MAY_CHANGE = {
+    "time", "dt", "damping", "pic", "nmd", "solver", "frames", "frame-steps", "rebalance", "checkpoint-every", "fields", "float64",
+    "compression",
+}  # fmt: skip
+"""Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -84,8 +93,13 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     options = p.parse_args(arguments)
     check_slope_options(p, options)
     if options.paper:
+        check(
+            p, options.initial in (None, "zero"), lambda: f"--initial is {options.initial}, expected zero with --paper"
+        )
+        check(p, options.dt in (None, 1e-4), lambda: f"--dt is {options.dt:g}, expected 1e-4 s with --paper")
         options.initial, options.dt = "zero", 1e-4
     check_scheme_options(p, options)
+    check_restart(p, options, MAY_CHANGE)
     return options
 
 
@@ -132,6 +146,8 @@ def slide(
     a, model = case.args, case.model
     loop = {"seconds": 0.0, "stopped": None}
     energy_scale = 0.0
+    report = model.report()
+    done_before = report.particle_steps
     drawn = -1  # of the times of --frames, the last one so far; those of --frame-steps are for the files alone
 
     def look(report: mpm.Report) -> None:
@@ -154,14 +170,12 @@ def slide(
         return interrupt.requested()
 
     with Progress("slide", a.time, comm) as progress:
-        report = model.report()
-        done_before = report.particle_steps
-        look(report)
         if a.scheme == "quasi-static":
             model.set_gravity((0.0, -GRAVITY), ramp=a.time)
         run = run_scheme(a, model, a.time / a.frames, between_steps, rebalance=a.rebalance, every_steps=a.frame_steps)
-        started = perf_counter()
         try:
+            look(report)
+            started = perf_counter()
             for report in run:
                 loop["seconds"] += perf_counter() - started
                 energy_scale = max(energy_scale, abs(report.external_work), report.kinetic_energy)
@@ -184,11 +198,8 @@ def slide(
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(case: SlopeCase, frames: list[dict], history: History, folder: Path) -> None:
+def draw(scene: Scene, frames: list[dict], history: History, folder: Path) -> None:
     """Figures 2 to 6 of the paper and a film, from the stored frames; on the first rank."""
-    scene = case.scene()
-    if scene is None:
-        return
     first, last = frames[0], frames[-1]
     save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"])
     drawn = [
@@ -227,7 +238,6 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
     facts = {
         "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",
         "simulated": f"{summary['time_s']:.4g} s", "particles": f"{summary['particles']:,}",
-        "computing time": f"{summary['wall_seconds']['slide']:.3g} s",
     }  # fmt: skip
     subtitle = (f"{a.height:g} m high, inclined by {a.angle:g} degrees, unit weight {a.unit_weight / 1e3:g} kN/m\u00b3. Initial "
                 f"stresses: {a.initial}; slide by the {a.scheme} material point method.")  # fmt: skip
@@ -240,44 +250,55 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     clock = {"start": perf_counter()}
-    folder = results_folder("slope", a.output, comm)
+    folder = open_results(a, comm)
     case = build_slope(a, comm)
     clock["mesh_and_particles"] = perf_counter()
-    start = {"initial_out_of_balance_ratio": None}
     if a.restart is not None:
         case.model.restore(a.restart)
+        start = a.notes["start"]
     else:
         start = initialise(case, a.initial, a.initial_unit_weight)
     clock["initial_stress"] = perf_counter()
     if comm.rank == 0 and a.restart is not None:
-        print(f"going on from {a.restart} at {case.model.time:g} s")
+        changed = a.restarts[-1]["changed"]
+        print(f"going on from {a.restart} at {case.model.time:g} s" + (f", changed: {changed}" if changed else ""))
     elif comm.rank == 0:
         facts = ", ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in start.items())
         print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): {facts}")
 
     watch = Watch(case)
-    with (
-        Interrupt(comm) as interrupt,
-        continued_history(folder / "history.csv", COLUMNS, case.model.time, comm) as history,
-        Files(case, folder) as files,
-    ):
-        checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every)
-        loop = slide(case, watch, history, files, interrupt, checkpoints)
+    keep_before = case.model.time if a.restart is not None else None
+    with Interrupt(comm) as interrupt:
+        with (
+            History(folder / "history.csv", COLUMNS, comm, keep_before=keep_before) as history,
+            Files(case, folder) as files,
+        ):
+            notes = notes_of(a.study, a.parameters(), a.restarts, start)
+            checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every, notes)
+            loop = slide(case, watch, history, files, interrupt, checkpoints)
         clock["slide"] = perf_counter()
-        frames = watch.frames()
-        draw(case, frames, history, folder)
-        clock["pictures"] = perf_counter()
+        summary = summarised(case, start, loop, history, clock)
+        frames, scene = watch.frames(), case.scene()
+        write_summary(
+            folder, a, summary, comm, page(case, frames, summary), lambda: draw(scene, frames, history, folder)
+        )
+    if comm.rank == 0:
+        tell(summary, folder)
+    return interrupt.exit_code or (1 if loop["stopped"] else 0)
 
+
+def summarised(case: SlopeCase, start: dict, loop: dict, history: History, clock: dict[str, float]) -> dict:
+    """The results of a run by name. Collective."""
+    a, mesh, report = case.args, case.model.mesh, loop["report"]
     names = list(clock)
-    report = loop["report"]
-    summary = {
+    return {
         "scheme": a.scheme,
         "finished_run": loop["stopped"] is None,
         "stopped_because": loop["stopped"],
         "time_s": report.time,
         "steps": report.steps,
-        "cells": comm.allreduce(case.model.mesh.owned_cells),
-        "soil_cells": comm.allreduce(int((case.model.mesh.cell_tags[: case.model.mesh.owned_cells] == 1).sum())),
+        "cells": comm.allreduce(mesh.owned_cells),
+        "soil_cells": comm.allreduce(int((mesh.cell_tags[: mesh.owned_cells] == 1).sum())),
         "particles": report.particles,
         **start,
         "crest_displacement_m": history["crest_displacement_m"][-1],
@@ -287,10 +308,6 @@ def main(arguments: list[str] | None = None) -> int:
         "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }
-    write_summary(folder, a, summary, comm, page(case, frames, summary))
-    if comm.rank == 0:
-        tell(summary, folder)
-    return interrupt.exit_code or (1 if loop["stopped"] else 0)
 
 
 def tell(summary: dict, folder: Path) -> None:
@@ -298,9 +315,9 @@ def tell(summary: dict, folder: Path) -> None:
         f"crest displacement {summary['crest_displacement_m']:.4f} m, run-out {summary['runout_m']:.3f} m at "
         f"{summary['time_s']:g} s; {summary['particle_steps_per_second'] / 1e6:.1f} million particle-steps per second"
     )
+    print(f"results in {folder}", flush=True)
     if summary["stopped_because"]:
         print(f"the run ended early: {summary['stopped_because']}; what there is has been written", file=sys.stderr)
-    print(f"results in {folder}")
 
 
 if __name__ == "__main__":

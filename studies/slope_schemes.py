@@ -15,6 +15,8 @@ from time import process_time
 
 import matplotlib.pyplot as plt
 import numpy as np
+from common.figures import save_figure
+from common.files import OutputError
 from common.movie import Movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -34,9 +36,10 @@ from common.plots import (
 )
 from common.progress import Progress
 from common.ranks import run_study
+from common.results import open_results
 from common.schemes import run_scheme
 from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
-from common.summary import OutputError, results_folder, write_summary
+from common.summary import write_summary
 from common.watch import Watch
 from matplotlib.colors import Normalize
 from mpi4py import MPI
@@ -168,8 +171,7 @@ def save_pair(path: Path, scene: Scene, runs: list[Run], key: str, quantity: Qua
             axes.set_title(f"{name}, $t$ = {frame['time']:.1f} s", loc="left")
         panels[0].set_ylabel("$y$ [m]")
         draw_bar(figure, figure.add_axes((0.3, 0.12, 0.4, 0.03)), quantity, limits, has_less=limits[0] != 0.0)
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 def save_crests(path: Path, runs: list[Run]) -> None:
@@ -188,8 +190,7 @@ def save_crests(path: Path, runs: list[Run]) -> None:
         axes.set(xlabel="Time [s]", ylabel="Displacement of the particle at the crest [m]", ylim=(0, None))
         axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower right")
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 def draw(runs: list[Run], scene: Scene | None, folder: Path) -> None:
@@ -211,7 +212,7 @@ def draw(runs: list[Run], scene: Scene | None, folder: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
-    folder = results_folder("slope_schemes", a.output, comm)
+    folder = open_results(a, comm)
     wanted = [("explicit", "explicit", "", None)]
     for factor in (1.0, 2.5, 5.0)[: 1 + a.longer_steps]:
         multiple = factor * a.step

@@ -1,17 +1,19 @@
-"""Checkpoints of a study now and then, and going on from one."""
+"""Checkpoints of a study now and then, and the options of a run that goes on from one."""
 
 from __future__ import annotations
 
 import argparse
-import csv
 import time
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
 import mpm_core as mpm
 
-from .history import History
+from .notes import changes, restart_row
+from .options import Options, check
 
 
 def add_checkpoint_options(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +24,27 @@ def add_checkpoint_options(parser: argparse.ArgumentParser) -> None:
         "(default: only when the run is interrupted)",
     )  # fmt: skip
     parser.add_argument(
-        "--restart", type=Path, default=None, metavar="FILE", help="go on from a checkpoint of the same mesh and soil"
-    )
+        "--restart", type=Path, default=None, metavar="FILE",
+        help="go on from a checkpoint, with the options that its run had, in the folder where it lies unless --output names "
+        "another",
+    )  # fmt: skip
+
+
+def check_restart(parser: argparse.ArgumentParser, options: Options, may_change: Collection[str]) -> None:
+    """Compare the options with those that the checkpoint's run had: end with an error, or take note of what changed.
+
+    Args:
+        may_change: names, without dashes in front, of the options that may change from there on; with another value of any
+            other the run would not be the one that it says it is.
+    """
+    if not options.notes:
+        return
+    changed = changes(options.notes, options.parameters())
+    for name, (before, now) in changed.items():
+        check(parser, name in may_change,
+              lambda name=name, before=before, now=now: f"--{name} is {now}, but the run of checkpoint {options.restart} has {before}; "
+              f"leave it out to go on with that, or begin anew. From a checkpoint on may change: {', '.join(sorted(may_change))}")  # fmt: skip
+    options.restarts = [*options.notes["restarts"], restart_row(options.notes, changed, MPI.COMM_WORLD.size)]
 
 
 def _interval(text: str) -> str:
@@ -57,10 +78,12 @@ class Checkpoints:
         model: what is saved.
         path: of the file.
         every: such as "500" (steps) or "5min", as the option gives it; None to save only by ``save``.
+        notes: kept in the file, see ``notes.py``.
     """
 
-    def __init__(self, model: mpm.Model, path: Path, every: str | None) -> None:
+    def __init__(self, model: mpm.Model, path: Path, every: str | None, notes: Mapping[str, Any]) -> None:
         self.path = path
+        self._notes = notes
         self._model = model
         self._every = None if every is None else _read(every)
         self._last = self._now()
@@ -78,7 +101,7 @@ class Checkpoints:
 
     def save(self) -> None:
         """Save. Collective."""
-        self._model.save(self.path)
+        self._model.save(self.path, self._notes)
         self._last = self._now()
 
 
@@ -88,16 +111,3 @@ def numbered(folder: Path, name: str, restarted: bool) -> Path:
     while restarted and (folder / f"{name}{'' if number == 1 else f'-{number}'}.xdmf").exists():
         number += 1
     return folder / (name if number == 1 else f"{name}-{number}")
-
-
-def continued_history(path: Path, columns: list[str], until: float, comm: MPI.Comm) -> History:
-    """A history file that keeps the rows of an earlier run before a time [s]; the first column must be the time."""
-    rows: list[dict[str, str]] = []
-    if comm.rank == 0 and path.exists():
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.DictReader(file) if set(row) == set(columns) and float(row[columns[0]]) < until]
-    rows = comm.bcast(rows)
-    history = History(path, columns, comm)
-    for row in rows:
-        history.add(**{name: float(value) for name, value in row.items()})
-    return history

@@ -17,6 +17,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator
 
 import fenics_bridge as bridge
 
+from .figures import save_figure
 from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, boundary_edges, colour_limits, discs, paper_style
 
 INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
@@ -294,5 +295,4 @@ def _bar(figure: Figure, axes: Axes, quantity: Quantity, limits: tuple[float, fl
 
 
 def _save(figure: Figure, path: Path) -> None:
-    figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
-    plt.close(figure)
+    save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

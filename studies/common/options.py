@@ -16,23 +16,31 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from .parameters import Parameter, ParameterError, described, read_parameters
+from .notes import checkpoint_notes
+from .parameters import Parameter, ParameterError, checked_values, described, read_parameters
 
 
 class Options(argparse.Namespace):
-    """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings."""
+    """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings.
 
-    __slots__ = ("actions", "description", "study")
+    ``notes`` are those of the checkpoint of ``--restart``, and ``restarts`` has a row for each time that the run went on from
+    one; see ``checkpoint.py``.
+    """
+
+    __slots__ = ("actions", "description", "study", "notes", "restarts")
     actions: list[argparse.Action]
     description: str
     study: str
+    notes: Mapping[str, Any]
+    restarts: list[dict[str, Any]]
 
     def parameters(self) -> list[Parameter]:
         """All options that say what is computed, with the values that are in force."""
@@ -43,18 +51,43 @@ class _Parser(argparse.ArgumentParser):
     """A parser that reads a file of parameters too and, on several ranks, speaks on the first one only."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: None = None) -> Options:  # type: ignore[override]
-        first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-        first.add_argument("--parameters", nargs="?")
-        path = first.parse_known_args(args)[0].parameters
-        if path is not None:
-            try:
-                self.set_defaults(**read_parameters(Path(path), self._actions))
-            except ParameterError as error:
-                self.error(str(error))
         options = Options()
         options.actions, options.study = self._actions, self.prog.split()[-1]
         options.description = self.description or options.study
+        options.notes, options.restarts = {}, []
+        try:
+            self._take_defaults_from_files(args, options)
+        except ParameterError as error:
+            self.error(str(error))
         return super().parse_args(args, options)
+
+    def _take_defaults_from_files(self, args: Sequence[str] | None, options: Options) -> None:
+        """Values of a checkpoint, and over them those of a file of parameters, stand for what the command line does not name."""
+        first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+        names = ["parameters", *(["restart"] if any(action.dest == "restart" for action in self._actions) else [])]
+        for name in names:
+            first.add_argument(f"--{name}", nargs="?")
+        given = first.parse_known_args(args)[0]
+        values: dict[str, object] = {}
+        if getattr(given, "restart", None) is not None:
+            options.notes = checkpoint_notes(Path(given.restart), options.study)
+            values |= checked_values(f"checkpoint {given.restart}", options.notes["options"], self._actions)
+        if given.parameters is not None:
+            values |= read_parameters(Path(given.parameters), self._actions)
+        self._refuse_code(args, values)
+        self.set_defaults(**values)
+
+    def _refuse_code(self, args: Sequence[str] | None, values: Mapping[str, object]) -> None:
+        """Code that a file names is run only when the command line says so too."""
+        words = {word.split("=")[0] for word in (sys.argv[1:] if args is None else args)}
+        for action in self._actions:
+            if not getattr(action, "runs_code", False) or values.get(action.dest) is None:
+                continue
+            if not words & {"--allow-code", *action.option_strings}:
+                raise ParameterError(
+                    f"{action.option_strings[0]} is {values[action.dest]}, code that a file names and the command line does "
+                    "not; repeat the option, or say --allow-code, if you trust it"
+                )
 
     def _print_message(self, message: str, file=None) -> None:
         if MPI.COMM_WORLD.rank == 0:
@@ -76,8 +109,11 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
     parser = _Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
     parser.prog = f"studies/run {Path(parser.prog).stem}"
     parser.add_argument(
-        "--output", type=Path, default=None, metavar="DIR", help="folder for the results (default: results/NAME)"
-    )
+        "--output", type=Path, default=None, metavar="DIR",
+        help="folder for the results; one that holds results is refused (default: results/NAME, or where that holds a run "
+        "results/NAME-2 and so on)",
+    )  # fmt: skip
+    add_flag(parser, "--overwrite", "remove the results of the earlier run in the folder")
     parser.add_argument(
         "--parameters", type=Path, default=None, metavar="FILE", dest="parameters_file",
         help="TOML file with options, such as parameters.toml of an earlier run; the command line wins over it",
@@ -172,6 +208,23 @@ def add_switch(parser: argparse.ArgumentParser, name: str, default: bool, text: 
 def add_flag(parser: argparse.ArgumentParser, name: str, text: str) -> None:
     """Add an option that is off unless it is named."""
     parser.add_argument(name, action="store_true", help=text)
+
+
+def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str) -> None:
+    """Add an option that names a file with code to run, and ``--allow-code``, without which only the command line may name it."""
+
+    def existing(value: str) -> str:
+        file, colon, rest = value.rpartition(":") if ":" in metavar else (value, "", "")
+        return (
+            f"{Path(file).resolve()}{colon}{rest}" if Path(file).is_file() else value
+        )  # so that a restart elsewhere finds it
+
+    action = parser.add_argument(name, type=existing, metavar=metavar, help=text)
+    action.runs_code = True  # type: ignore[attr-defined]
+    if "--allow-code" not in parser._option_string_actions:
+        add_flag(
+            parser, "--allow-code", "run the code that a file of parameters or a checkpoint names; see docs/safety.md"
+        )
 
 
 def change_defaults(parser: argparse.ArgumentParser, **defaults: object) -> None:

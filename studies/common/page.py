@@ -29,7 +29,8 @@ class Page:
     Args:
         movies: particles over time, panels side by side; None entries (of ranks that hold none) are left out.
         slider: what the movies' slider shows, and its unit.
-        facts: the few results that count, name to text with unit; the first numbers of the results if not given.
+        facts: the few results that count, name to text with unit; the first numbers of the results if not given. The computing
+            time of the run is added.
         subtitle: one sentence; the study's first sentence if not given.
         captions: of figures, by the names of their files without the ending; made from these names if not given.
     """
@@ -54,7 +55,7 @@ def write_page(
     save_report(folder / "report.html", Report(
         title=title,
         subtitle=page.subtitle or subtitle,
-        facts=page.facts or _facts(numbers),
+        facts={**(page.facts or _facts(numbers)), "computing time": f"{seconds_since_start():.3g} s"},
         movies=[movie for movie in page.movies if movie is not None and movie.frames],
         slider=page.slider,
         curves={**dict(_histories(folder)), **curves},
@@ -64,6 +65,11 @@ def write_page(
         sections=sections,
         footer=footer,
     ))  # fmt: skip
+
+
+def seconds_since_start() -> float:
+    """Of this program, s."""
+    return time.time() - STARTED
 
 
 def _heading(description: str) -> tuple[str, str]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomllib
 
-NOT_PARAMETERS = ("help", "output", "parameters_file", "restart")
-"""Options that say where things are, not what is computed; they do not belong into a file of parameters."""
+from .files import write_text
+
+NOT_PARAMETERS = ("help", "output", "overwrite", "parameters_file", "restart", "allow_code")
+"""Options that say where things are, or what a run may do, not what is computed; they do not belong into a file of parameters."""
 
 
 class ParameterError(ValueError):
@@ -48,29 +50,59 @@ def read_parameters(path: Path, actions: Sequence[argparse.Action]) -> dict[str,
         raise ParameterError(f"cannot read --parameters {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ParameterError(f"--parameters {path} is not TOML: {error}") from None
+    return checked_values(str(path), table, actions)
+
+
+def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argparse.Action]) -> dict[str, object]:
+    """Values of a table, by the options' names, by their names in Python, checked as the command line checks them.
+
+    Args:
+        source: of the table, for messages.
+        table: None stands for an option that was not named.
+
+    Raises:
+        ParameterError: an unknown key; a value of another type or out of bounds.
+    """
     known = _named(actions)
-    values = {}
+    values: dict[str, object] = {}
     for key, value in table.items():
         if key not in known:
-            raise ParameterError(f"{path}: unknown key '{key}', expected some of {', '.join(known)}")
+            raise ParameterError(f"{source}: unknown key '{key}', expected some of {', '.join(known)}")
         try:
-            values[known[key].dest] = _from_toml(known[key], value)
+            values[known[key].dest] = None if value is None else _from_toml(known[key], value)
         except (argparse.ArgumentTypeError, ValueError) as error:
-            raise ParameterError(f"{path}: {key} {error}") from None
+            raise ParameterError(f"{source}: {key} {error}") from None
     return values
 
 
-def write_parameters(path: Path, parameters: Sequence[Parameter], study: str) -> None:
+def plain_values(parameters: Sequence[Parameter]) -> dict[str, Any]:
+    """Values by the options' names, as JSON has them and `checked_values` takes them."""
+    return {p.name: str(p.value.resolve()) if isinstance(p.value, Path) else p.value for p in parameters}
+
+
+def write_parameters(
+    path: Path, parameters: Sequence[Parameter], study: str, restarts: Sequence[Mapping[str, Any]] = ()
+) -> None:
     """Write a file that `read_parameters` reads, with units and meanings as comments. Call it on one rank.
 
     What is None is left out: TOML has no form for it, and it is what an option is when it is not named.
+
+    Args:
+        restarts: rows of ``Options.restarts``; what they changed stands in comments.
+
+    Raises:
+        OutputError: with path and reason.
     """
-    lines = [f"# To repeat this run: studies/run {study} --parameters {path.name}", ""]
+    lines = [f"# To repeat this run: studies/run {study} --parameters {path.name}"]
+    for restart in restarts:
+        changed = f"; changed then: {restart['changed']}" if restart["changed"] else ""
+        lines.append(f"# Restarted from a checkpoint at {restart['time_s']:.9g} s{changed}")
+    lines.append("")
     for parameter in parameters:
         if parameter.value is not None:
             unit = "" if parameter.unit == "-" else f" [{parameter.unit}]"
             lines.append(f"{parameter.name} = {_to_toml(parameter.value)}  # {parameter.meaning}{unit}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:

@@ -24,6 +24,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from .figures import save_figure
+
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
@@ -280,5 +282,4 @@ def save_history(
 
 
 def _save(figure: Figure, path: Path) -> None:
-    figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
-    plt.close(figure)
+    save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

@@ -14,6 +14,8 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
+from .files import NOT_WRITTEN
+
 
 def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
     """From now on an error that nothing catches ends all ranks, with its message; otherwise they would wait for ever."""
@@ -59,7 +61,8 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     """Run a study's script and exit with what ``main`` returns.
 
     Args:
-        main: the study.
+        main: the study. When it returns 0 but a picture or film could not be written, the code is 1, and the last lines say
+            why.
         expected: errors whose message is all that the user needs; they end the script with code 2. Ctrl-C, where the
             study does not catch it by `Interrupt`, ends it with code 130.
     """
@@ -69,7 +72,10 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     outlive_readers()
     signal.signal(signal.SIGUSR1, signal.default_int_handler)  # by which `studies/run --ranks` hands Ctrl-C on
     try:
-        sys.exit(main())
+        code = main()
+        for reason in NOT_WRITTEN:
+            print(f"studies/run {name}: {reason}", file=sys.stderr)
+        sys.exit(code or (1 if NOT_WRITTEN else 0))
     except expected as error:
         if comm.rank == 0:
             print(f"studies/run {name}: {error}", file=sys.stderr)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import html
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from .files import expendable
 from .movie import Movie, packed
 from .parameters import Parameter
 from .plots import colour_limits
@@ -65,7 +65,7 @@ class Report:
 
 
 def save_report(path: Path, report: Report) -> None:
-    """Write the page; the file appears as a whole or not at all. Call it on one rank.
+    """Write the page; the file appears as a whole or not at all, see `expendable`. Call it on one rank.
 
     Raises:
         ValueError: a movie without frames.
@@ -89,9 +89,8 @@ def save_report(path: Path, report: Report) -> None:
     page = _part("page.html")
     pieces = page.split("{{")
     text = pieces[0] + "".join(filled[name] + rest for name, rest in (piece.split("}}", 1) for piece in pieces[1:]))
-    aside = path.with_name(path.name + ".part")
-    aside.write_text(text, encoding="utf-8")
-    os.replace(aside, path)
+    with expendable(path) as aside:
+        aside.write_text(text, encoding="utf-8")
 
 
 def name_and_unit(column: str) -> tuple[str, str]:

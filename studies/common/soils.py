@@ -10,7 +10,7 @@ from typing import Any
 
 import mpm_core as mpm
 
-from .options import add_choice, add_number, add_switch
+from .options import add_choice, add_code, add_number, add_switch
 
 MATERIALS = ("mohr-coulomb", "softening", "tresca", "von-mises", "drucker-prager", "cam-clay", "elastic")
 
@@ -39,9 +39,8 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     add_switch(p, "--undrained", False, "effective stresses, with pore water that does not drain")
     add_number(p, "--water-modulus", 2e7, "Pa", "undrained: bulk modulus of the pore water", above=0)
     add_number(p, "--porosity", 0.4, "-", "undrained: porosity", above=0, below=1)
-    p.add_argument("--python-law", metavar="FILE:CLASS", help="a law written in Python, made without arguments, instead of "
-                   "--material")  # fmt: skip
-    p.add_argument("--umat", metavar="LIBRARY", help="shared library with an Abaqus UMAT, instead of --material")
+    add_code(p, "--python-law", "FILE:CLASS", "a law written in Python, made without arguments, instead of --material")
+    add_code(p, "--umat", "LIBRARY", "shared library with an Abaqus UMAT, instead of --material")
     p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
     p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")

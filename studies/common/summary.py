@@ -1,57 +1,22 @@
-"""The results folder and the files ``summary.json`` and ``parameters.toml`` in it."""
+"""The file ``summary.json`` of a run, and its page."""
 
 from __future__ import annotations
 
 import json
-import os
 import platform
 import subprocess
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
+from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
-from .page import Page, write_page
-from .parameters import write_parameters
-
-ROOT = Path(__file__).parents[2]
-
-
-class OutputError(RuntimeError):
-    """The results cannot be written; the message names the path and the reason."""
-
-
-def results_folder(name: str, chosen: Path | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
-    """Create the folder for the results of a study, and see to it that files can be written there.
-
-    Args:
-        name: of the study; its folder is ``results/NAME`` of the repository unless ``chosen`` is given.
-        chosen: another folder.
-
-    Raises:
-        OutputError: on all ranks, with path and reason.
-
-    Note:
-        Collective.
-    """
-    folder = Path(chosen) if chosen is not None else ROOT / "results" / name
-    problem = None
-    if comm.rank == 0:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            trial = folder / ".writable"
-            trial.touch()
-            trial.unlink()
-        except OSError as error:
-            problem = f"cannot write results to {folder}: {error.strerror}"
-    problem = comm.bcast(problem, root=0)
-    if problem is not None:
-        raise OutputError(problem)
-    return folder.resolve()
+from .page import Page, seconds_since_start, write_page
+from .results import ROOT, note_what_was_written
 
 
 def versions() -> dict[str, str]:
@@ -96,21 +61,40 @@ def write_summary(
     results: Mapping[str, object],
     comm: MPI.Comm = MPI.COMM_WORLD,
     page: Page | None = None,
+    draw: Callable[[], None] | None = None,
 ) -> None:
-    """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names.
+    """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names; then pictures and page.
 
-    The options also go to ``parameters.toml``, by which the run can be repeated, and everything to the page ``report.html``.
-    ``summary.json`` and the page appear as a whole or not at all. Call it on every rank, when all figures and tables are
-    written; the first rank writes.
+    The pictures come second, so that a full disk costs them and not the results. Everything goes to the page ``report.html``
+    as well. Each file appears as a whole or not at all. Call it on every rank, when all tables are written; the first rank
+    writes.
 
     Args:
-        folder: as ``results_folder`` gave it.
+        folder: as ``open_results`` gave it.
         options: of the study, as parsed.
         results: numbers, texts, lists or mappings of these, NumPy's too, by name (names end in their unit: ``_m``).
         page: what the study adds to its page, such as moving particles.
+        draw: makes the figures; called on the first rank.
+
+    Raises:
+        OutputError: on all ranks, with path and reason, when ``summary.json`` cannot be written. A picture, a film or the page
+            that cannot be written costs only itself.
     """
-    if comm.rank != 0:
-        return
+    problem = None
+    if comm.rank == 0:
+        try:
+            _write(folder, options, results, comm, page, draw)
+        except OutputError as error:
+            problem = str(error)
+    problem = comm.bcast(problem)
+    if problem is not None:
+        raise OutputError(problem)
+
+
+def _write(
+    folder: Path, options: Namespace, results: Mapping[str, object], comm: MPI.Comm, page: Page | None,
+    draw: Callable[[], None] | None,
+) -> None:  # fmt: skip
     summary = {
         "parameters": vars(options),
         "versions": versions(),
@@ -119,13 +103,19 @@ def write_summary(
         "finished": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **results,
     }
-    aside = folder / "summary.json.part"
-    aside.write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
-    os.replace(aside, folder / "summary.json")
+    if isinstance(options, Options) and options.restarts:
+        summary["restarts"] = options.restarts
+    write_text(folder / "summary.json", json.dumps(summary, indent=2, default=_plain) + "\n")
+    if draw is not None:
+        draw()
     if isinstance(options, Options):
-        write_parameters(folder / "parameters.toml", options.parameters(), options.study)
         told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in summary["versions"].items())
-        write_page(folder, options, results, page, f"{told}; {comm.size} rank(s); {summary['finished']}")
+        more = {"restarts": options.restarts} if options.restarts else {}
+        write_page(folder, options, {**results, **more}, page, f"{told}; {comm.size} rank(s); {summary['finished']}")
+    summary["run_seconds"], summary["not_written"] = seconds_since_start(), list(NOT_WRITTEN)
+    with expendable(folder / "summary.json") as aside:
+        aside.write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
+    note_what_was_written(folder)
 
 
 def _plain(value: object) -> object:

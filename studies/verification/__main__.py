@@ -13,10 +13,10 @@ from time import process_time
 
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
+from common.files import OutputError
 from common.options import add_flag, check, study_parser
-from common.parameters import write_parameters
 from common.ranks import run_study
-from common.summary import ROOT, OutputError, results_folder
+from common.results import ROOT, note_what_was_written, open_results, subfolder
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -56,7 +56,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 def run_case(name: str, group: str, quick: bool, folder: Path) -> CaseRow:
     """Run one case; an error in it becomes part of its result."""
     module = importlib.import_module(name)
-    folder = results_folder(name, folder / name, comm)
+    folder = subfolder(folder, name, comm)
     start, result, error = process_time(), Result([]), ""
     # On several ranks only errors that all of them raise: with another one, the others would wait for this rank.
     expected = Exception if comm.size == 1 else (mpm.InputError, mpm.RunError)
@@ -75,9 +75,7 @@ def run_case(name: str, group: str, quick: bool, folder: Path) -> CaseRow:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
-    folder = results_folder("verification", a.output, comm)
-    if comm.rank == 0:
-        write_parameters(folder / "parameters.toml", a.parameters(), a.study)
+    folder = open_results(a, comm)
     table, names = Table.begun(a.quick, comm.size), a.cases.split(",")
     for k, name in enumerate(names, 1):
         if comm.rank == 0:
@@ -88,6 +86,7 @@ def main(arguments: list[str] | None = None) -> int:
             save_table(folder / "verification.json", table)
             save_page(folder, table, a.parameters())
     if comm.rank == 0:
+        note_what_was_written(folder)
         if a.docs:
             save_docs(ROOT / "docs", folder, table)
         print(f"{table.summary()}; report in {folder / 'report.html'}")

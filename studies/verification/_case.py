@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
@@ -13,8 +12,10 @@ STUDIES = Path(__file__).parents[1]
 if str(STUDIES) not in sys.path:
     sys.path.insert(0, str(STUDIES))  # a case imports what studies share, and other studies
 
+from common.files import OutputError  # noqa: E402
+from common.options import add_flag, study_parser  # noqa: E402
 from common.ranks import run_study  # noqa: E402
-from common.summary import OutputError, results_folder  # noqa: E402
+from common.results import note_what_was_written, open_results  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import mpm_core as mpm  # noqa: E402
@@ -91,12 +92,15 @@ def run_alone(case: Callable[[bool, Path], Result]) -> None:
 
     def main() -> int:
         name = Path(sys.argv[0]).stem
-        parser = ArgumentParser(description=sys.modules["__main__"].__doc__)
-        parser.add_argument("--quick", action="store_true", help="a small size, as the tests run it")
-        quick = parser.parse_args().quick
-        result = case(quick, results_folder(f"verification/{name}"))
+        parser = study_parser(sys.modules["__main__"].__doc__)
+        parser.prog = f"studies/run verification_{name}"
+        add_flag(parser, "--quick", "a small size, as the tests run it")
+        options = parser.parse_args()
+        folder = open_results(options)
+        result = case(options.quick, folder)
         if MPI.COMM_WORLD.rank == 0:
-            print(*map(line, result.checks), sep="\n")
+            print(*map(line, result.checks), f"pictures in {folder}", sep="\n")
+            note_what_was_written(folder)
         return 0 if all(check.passed or check.limit for check in result.checks) else 1
 
     run_study(main, mpm.InputError, mpm.RunError, OutputError)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from common.figures import save_figure
 from common.plots import CURVES, WIDTH, paper_style
 from matplotlib.ticker import FuncFormatter, LogLocator
 
@@ -60,8 +61,7 @@ def save_comparison(
         axes.tick_params(top=True, right=True)
         axes.grid(linewidth=0.3, color="#d0d0d0")
         _legend(axes)
-        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
-        plt.close(figure)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
 def save_refinement(
@@ -90,5 +90,4 @@ def save_refinement(
             axes.tick_params(top=True, right=True, which="both")
             axes.grid(linewidth=0.3, color="#d0d0d0")
         _legend(row[0][0])
-        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
-        plt.close(figure)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

@@ -15,6 +15,7 @@ import numpy as np
 from _case import Check, Result, run_alone
 from _moving_mesh import in_order, on_moved_mesh, set_in_order
 from _plots import save_refinement
+from common.figures import save_figure
 from common.plots import WIDTH, Quantity, colour_limits, discs, draw_bar, paper_style
 from matplotlib import pyplot as plt
 from matplotlib.colors import Normalize
@@ -195,8 +196,7 @@ def draw_stress(path, beams) -> None:
             axes.set_title(name, loc="left", pad=4)
         panels[0].set_ylabel("$y$ [m]")
         draw_bar(figure, figure.add_axes((0.2, 0.15, 0.6, 0.03)), STRESS, limits)
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 if __name__ == "__main__":

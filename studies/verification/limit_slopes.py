@@ -11,6 +11,7 @@ A slope of 30° with a friction angle of 30° carries any weight.
 
 import matplotlib.pyplot as plt
 from _case import Check, Result, run_alone
+from common.figures import save_figure
 from common.plots import CURVES, paper_style
 from common.summary import ROOT
 from mpi4py import MPI
@@ -88,8 +89,7 @@ def save_factors(path, found):
         axes.minorticks_off()
         axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend()
-        figure.savefig(path, bbox_inches="tight", pad_inches=0.06)
-        plt.close(figure)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ noise away, and the displacement in the end hardly depends on the mesh.
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
+from common.figures import save_figure
 from common.options import study_parser
 from common.plots import (
     DISPLACEMENT,
@@ -157,8 +158,7 @@ def draw_variants(path, slides):
             bar = figure.add_axes((box.x0, 0.045, box.width, 0.008))
             draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
             bar.set_xticks(np.linspace(*limits, 3))
-        figure.savefig(path, dpi=200)
-        plt.close(figure)
+        save_figure(figure, path, dpi=200)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from common.field_plots import save_log_log
+from common.figures import save_figure
 from common.plots import VERTICAL_STRESS, WIDTH, Scene, colour_limits, discs, draw_bar, draw_scene, paper_style
 from matplotlib.colors import Normalize
 from mpi4py import MPI
@@ -127,8 +128,7 @@ def save_stresses(path, models, rough):
             axes.set_title(f"{name}, $t$ = {model.time:g} s, roughness {rough[name]:.1%}", loc="left")
         panels[-1].set_xlabel("$x$ [m]")
         draw_bar(figure, figure.add_axes((0.25, 0.06, 0.5, 0.015)), VERTICAL_STRESS, limits)
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 if __name__ == "__main__":

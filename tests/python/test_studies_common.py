@@ -19,7 +19,7 @@ from studies.common.history import History
 from studies.common.interrupt import Interrupt
 from studies.common.options import add_choice, add_count, add_number, add_switch, check, study_parser
 from studies.common.progress import Progress
-from studies.common.summary import OutputError, results_folder, versions, write_summary
+from studies.common.summary import versions, write_summary
 
 
 def example_parser():
@@ -74,18 +74,6 @@ def test_options_that_do_not_fit_together(capsys):
     with pytest.raises(SystemExit):
         check(example_parser(), False, "--dilation-angle is 30, expected at most --friction-angle")
     assert "--dilation-angle is 30" in capsys.readouterr().err
-
-
-def test_results_folder_is_made_and_can_be_written(tmp_path):
-    folder = results_folder("slope", tmp_path / "a" / "b")
-    assert folder == tmp_path / "a" / "b"
-    assert list(folder.iterdir()) == []
-
-
-def test_results_folder_that_cannot_be_made_is_named(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(OutputError, match=f"cannot write results to {tmp_path}/file/results: Not a directory"):
-        results_folder("slope", tmp_path / "file" / "results")
 
 
 def test_summary_holds_parameters_versions_and_results(tmp_path):

@@ -6,6 +6,7 @@ import os
 import pty
 import select
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
+from studies.common.history import History
 
 STUDIES = Path(__file__).parents[2] / "studies"
 # Python's own copy, without what MPI adds to it in this process.
@@ -144,8 +147,8 @@ def test_a_restart_from_something_else_is_refused_on_all_ranks(tmp_path):
     assert slope(tmp_path / "a", "--checkpoint-every", "40").returncode == 0
     checkpoint = str(tmp_path / "a" / "checkpoint.h5")
     for options, message in [
-        (["--restart", checkpoint, "--cohesion", "2e3"], "is of another materials"),
-        (["--restart", checkpoint, "--crest", "1.4"], "is of another background mesh"),
+        (["--restart", checkpoint, "--cohesion", "2e3"], "--cohesion is 2000.0, but the run of checkpoint"),
+        (["--restart", checkpoint, "--crest", "1.4"], "--crest is 1.4, but the run of checkpoint"),
         (["--restart", str(tmp_path / "none.h5")], "No such file or directory"),
     ]:
         result = slope(tmp_path / "b", *options, ranks=2)
@@ -187,3 +190,124 @@ def test_an_error_that_nothing_catches_ends_all_ranks(tmp_path, script):
                             capture_output=True, text=True, timeout=60, env=ENVIRONMENT)  # fmt: skip
     assert result.returncode != 0
     assert "error on rank 1" in result.stderr and "this rank fails" in result.stderr
+
+
+# --- options of a restart --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def checkpointed(tmp_path_factory):
+    """A run with a checkpoint in its middle."""
+    folder = tmp_path_factory.mktemp("checkpointed") / "run"
+    assert slope(folder, "--unit-weight", "60e3", "--checkpoint-every", "50").returncode == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    "option", [("--unit-weight", "70e3"), ("--particles-per-cell", "6"), ("--initial", "k0"), ("--paper",)]
+)
+def test_an_option_that_the_particles_would_not_follow_is_refused(tmp_path, checkpointed, option):
+    # Without SMALL: what is not named is that of the checkpoint.
+    command = [
+        sys.executable,
+        STUDIES / "slope.py",
+        "--restart",
+        checkpointed / "checkpoint.h5",
+        *option,
+        "--output",
+        tmp_path,
+    ]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (
+        result.returncode == 2 and f"{option[0]} is " in result.stderr and "but the run of checkpoint" in result.stderr
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
+    folder = tmp_path / "run"
+    shutil.copytree(checkpointed, folder)
+    command = [
+        sys.executable,
+        STUDIES / "slope.py",
+        "--restart",
+        folder / "checkpoint.h5",
+        "--damping",
+        "0.5",
+        "--checkpoint-every",
+        "20",
+    ]
+    assert subprocess.run(command, capture_output=True, timeout=60).returncode == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["parameters"]["unit_weight"] == 60e3 and summary["parameters"]["damping"] == 0.5
+    (row,) = summary["restarts"]
+    assert row["changed"] == "damping 0.75 to 0.5, checkpoint-every 50 to 20" and 0 < row["time_s"] < 0.6
+    assert "damping 0.75 to 0.5" in (folder / "report.html").read_text()
+    assert "changed then: damping 0.75 to 0.5" in (folder / "parameters.toml").read_text()
+    # The run that it went on from is still told of, and so is the change in the next checkpoint.
+    assert json.loads((folder / "summary-1.json").read_text())["parameters"]["damping"] == 0.75
+    assert subprocess.run(command[:4], capture_output=True, timeout=60).returncode == 0
+    again = json.loads((folder / "summary.json").read_text())
+    assert again["parameters"]["damping"] == 0.5 and [r["changed"] for r in again["restarts"]] == [row["changed"], ""]
+
+
+def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
+    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not rows_are_there(tmp_path) and child.poll() is None:
+        time.sleep(0.05)
+    child.kill()
+    child.wait()
+    assert "time = 10000.0" in (tmp_path / "parameters.toml").read_text()
+    result = slope(tmp_path)
+    assert result.returncode == 2 and "holds the results of an earlier run" in result.stderr
+    assert slope(tmp_path, "--overwrite").returncode == 0
+    assert float(history(tmp_path)[-1]["time_s"]) == 0.6
+
+
+def test_a_second_run_in_the_folder_is_refused_while_the_first_goes_on(tmp_path):
+    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not rows_are_there(tmp_path) and first.poll() is None:
+        time.sleep(0.05)
+    second = slope(tmp_path, "--overwrite", ranks=2)
+    assert second.returncode == 2 and f"another run writes to {tmp_path}: process {first.pid}" in second.stderr
+    assert first.poll() is None
+    first.kill()
+    first.wait()
+
+
+# --- history ---------------------------------------------------------------------------------------------------------
+
+KILLED_WHILE_IT_REWRITES = """
+import os, sys
+from mpi4py import MPI
+from studies.common.history import History
+replace = os.replace
+os.replace = lambda *paths: os._exit(9)
+History(sys.argv[1], ["time_s", "a"], keep_before=2.0)
+"""
+
+
+def test_rows_survive_a_kill_while_a_restart_rewrites_them(tmp_path):
+    path = tmp_path / "history.csv"
+    path.write_text("time_s,a\n0,1\n1,2\n")
+    killed = subprocess.run([sys.executable, "-c", KILLED_WHILE_IT_REWRITES, path], timeout=60, env=ENVIRONMENT)
+    assert killed.returncode == 9 and path.read_text() == "time_s,a\n0,1\n1,2\n"
+
+
+@pytest.mark.parametrize(
+    "end",
+    ["2,", "2,3.", "2", "2,x\n", "1,2\n", "1.00000000049,2\n", '2,"'],
+    ids=["comma", "digits", "short", "text", "twice", "rounded", "quote"],
+)
+def test_rows_that_a_kill_left_half_written_or_twice_are_dropped(tmp_path, capsys, end):
+    path = tmp_path / "history.csv"
+    path.write_text("time_s,a\n0,1\n1,2\n" + end)
+    until = 1.0000000005 if end.startswith("1.") else 3.0
+    with History(path, ["time_s", "a"], keep_before=until) as rows:
+        rows.add(time_s=until, a=4.0)
+    kept = [0.0, until] if end.startswith("1.") else [0.0, 1.0, until]
+    assert rows["time_s"].tolist() == kept
+    assert [float(row["time_s"]) for row in history(tmp_path)] == pytest.approx(kept, rel=1e-8)
+    assert end.startswith("1.") or "1 incomplete or repeated row(s) left out" in capsys.readouterr().err
