@@ -3,13 +3,12 @@
 What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 """
 
-from mpm_core.newton import NewtonReport
-
 from fenics_bridge.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.box_mesh import BODY, box_mesh
-from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety, reduced_strength
+from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety
 from fenics_bridge.comparison import Difference, compare
 from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
+from fenics_bridge.equilibration import PRACTICE, EquilibriumReport, Solver
 from fenics_bridge.errors import InputError
 from fenics_bridge.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fem_site import FemSite
@@ -27,15 +26,19 @@ from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh
 from fenics_bridge.stages import Stage, StageError, StageReport, carry_out, hydrostatic
+from fenics_bridge.strength import davis_reduced_strength, davis_strength, reduced_strength
 from fenics_bridge.supports import Support, fixed, prescribed, roller
 
 # fmt: off
 __all__ = [
-    "BASE", "BODY", "CREST", "EMPTY", "LEFT", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference", "ElasticSolution", "FemSite",
-    "Handover", "InputError", "Load", "LoadStep", "LogSpiral", "MixedQuasiStatic", "NewtonReport", "PointSearch",
-    "QuasiStatic", "Stage", "StageError", "StageReport", "Support", "background_arrays", "background_mesh", "box_mesh", "carry_out", "collapse_load", "compare", "evaluate_at",
-    "factor_of_safety", "fixed", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress",
-    "log_spiral", "log_spiral_safety", "name_tags", "names_of", "nodal_average", "original_cells", "prescribed", "print_step", "read_mesh",
-    "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
+    "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
+    "ElasticSolution", "EquilibriumReport", "FemSite", "Handover", "InputError", "Load", "LoadStep", "LogSpiral",
+    "MixedQuasiStatic", "PointSearch", "QuasiStatic", "Solver", "Stage", "StageError", "StageReport", "Support",
+    "background_arrays", "background_mesh", "box_mesh", "carry_out", "collapse_load", "compare",
+    "davis_reduced_strength", "davis_strength", "evaluate_at", "factor_of_safety", "fixed", "graded_tags",
+    "hydrostatic", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress", "log_spiral",
+    "log_spiral_safety", "name_tags", "names_of", "nodal_average", "original_cells", "prescribed", "print_step",
+    "read_mesh", "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic",
+    "solve_nearly_incompressible",
 ]
 # fmt: on

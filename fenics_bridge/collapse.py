@@ -8,81 +8,84 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-import mpm_core as mpm
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import agree
 from fenics_bridge.load_steps import advance
+from fenics_bridge.strength import reduced_strength
 
 
 @dataclass(frozen=True)
 class Collapse:
-    """The last equilibrium that was found on the way to collapse.
+    """The last equilibrium that was found on the way to collapse, and what is above it.
 
     value: of the load or of the factor of safety there; failed_at: smallest value above it that was tried
+    failed: whether the body was shown to fail at `failed_at`: it flows in a mechanism under a load that its stresses do not
+        carry. If not, the solver gave up there, and `value` is a lower bound only; reason: in words
+    carried: fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if not shown
+    residual: largest out-of-balance force that was accepted on the way, over the forces at work [-]
     curve: (k, 2), value and largest displacement of a node [m] at every equilibrium on the way
-    mechanism: function, displacement increment of the last step, scaled to a largest displacement of 1
+    mechanism: function, displacement of the mechanism where failure was shown, otherwise increment of the last step with
+        equilibrium; scaled to a largest displacement of 1
     steps: every LoadStep that was tried
     """
 
     value: float
     failed_at: float
+    failed: bool
+    reason: str
+    carried: float
+    residual: float
     curve: np.ndarray
     mechanism: fem.Function
     steps: list
 
 
 def collapse_load(model, load_of, first_step, start=0.0, tolerance=2e-3, progress=None):
-    """Raise a load to the last equilibrium: steps double while they are easy, and are bisected once one has failed.
+    """Raise a load to the last equilibrium: steps double while they are easy; below a value that fails they bisect.
 
     model: QuasiStatic, in equilibrium under `load_of(start)`, e.g. fresh and unloaded
     load_of: function of a number, the load's value, that returns the Load
-    first_step: of the value; tolerance: width of the last step as a share of the value [-]
-    Returns a Collapse. Raises InputError when not even the first steps find equilibrium. Collective.
+    first_step: of the value; tolerance: width of the last step as a fraction of the value [-]
+    Returns a Collapse, whose `failed` tells whether failure was shown. Raises InputError when not even the first steps
+    find equilibrium. Collective.
     """
     return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
 
 
-def factor_of_safety(model, load, start=0.5, first_step=0.1, tolerance=2e-3, progress=None):
-    """Factor by which cohesion and tan(friction angle) can be divided before equilibrium under a load is lost.
+def factor_of_safety(
+    model, load, start=0.5, first_step=0.1, tolerance=2e-3, progress=None, unreduced=(), reduce=reduced_strength
+):
+    """Factor by which the strength can be divided before equilibrium under a load is lost.
 
-    model: QuasiStatic with a Mohr-Coulomb law, unloaded or in equilibrium under a load on the way to `load`
+    model: QuasiStatic, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows
     start: factor to begin with; the body must carry the load with its strength divided by it (below 1: raised)
-    first_step: of the factor; tolerance: width of the last step as a share of the factor [-]
-    Returns a Collapse whose value is the factor. Raises InputError when the load is not carried at the start.
-    Collective.
+    first_step: of the factor; tolerance: width of the last step as a fraction of the factor [-]
+    unreduced: cell tags whose laws keep their strength
+    reduce: function (law, factor, unreduced) that returns the law, or laws by cell tag, with less strength
+    Returns a Collapse whose value is the factor, and whose `failed` tells whether failure was shown above it. Raises
+    InputError when the load is not carried at the start. The model keeps the weakened law. Collective.
     """
     law = model.law
-    model.law = reduced_strength(law, start)
-    model.solve(load, progress=progress)
-    message = f"start: the load is not carried with the strength divided by {start!r}; take a smaller start"
-    agree(model.domain.comm, None if model.converged else message)
+    model.law = reduce(law, start, unreduced)
+    steps = model.solve(load, progress=progress)
+    agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
 
     def weaken(factor):
-        return model.equilibrate(load, law=reduced_strength(law, factor))
+        return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
     return _follow(model, weaken, start, first_step, tolerance, progress)
 
 
-def reduced_strength(law, factor):
-    """Mohr-Coulomb law with cohesion and tan(phi) divided by a factor.
-
-    The dilation angle stays where it can, and is limited to the new friction angle: associated flow stays associated.
-    law: one, or {cell tag: law}
-    """
-    if isinstance(law, dict):
-        return {tag: reduced_strength(one, factor) for tag, one in law.items()}
-    if not isinstance(law, mpm.MohrCoulomb):
-        raise InputError(f"law: got {type(law).__name__}, expected MohrCoulomb")
-    if not (np.isfinite(factor) and factor > 0):
-        raise InputError(f"factor: got {factor!r}, expected a positive number")
-    friction = math.degrees(math.atan(math.tan(math.radians(law.friction_angle)) / factor))
-    associated = law.dilation_angle == law.friction_angle
-    return mpm.MohrCoulomb(
-        young=law.young,
-        poisson=law.poisson,
-        cohesion=law.cohesion / factor,
-        friction_angle=friction,
-        dilation_angle=friction if associated else min(law.dilation_angle, friction),
-        tension_cutoff=law.tension_cutoff,
+def _not_carried(start, steps):
+    """Why the load is not carried at the start, and what to try."""
+    last = next((step for step in reversed(steps) if not step.converged), steps[-1])
+    carried = max((step.value for step in steps if step.converged), default=0.0)
+    advice = {
+        "failure": "take a smaller start, or look at supports and strengths",
+        "undecided": "look at supports and strengths, or allow more steps of relaxation (max_steps)",
+    }[last.report.outcome]
+    return (
+        f"start: with the strength divided by {start!r} only {carried:.1%} of the load is carried; at {last.value:.1%}: "
+        f"{last.report.reason}; {advice}"
     )
 
 
@@ -96,16 +99,31 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
         report = equilibrate(value)
         if report.converged:
             curve.append((value, _largest(model.displacement, comm, dim)))
+        if report.converged or report.outcome == "failure":
             mechanism.x.array[:] = model.increment.x.array
         return report
 
     steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
-    agree(comm, None if len(curve) > 1 else f"first_step: no equilibrium was found above {start!r}; take a smaller one")
+    last = min((step for step in steps if step.value > curve[-1][0]), key=lambda step: step.value)
+    agree(
+        comm,
+        None
+        if len(curve) > 1
+        else f"first_step: no equilibrium was found above {start!r}, {last.report.reason}; take a smaller one",
+    )
     largest = _largest(mechanism, comm, dim)
     mechanism.x.array[:] /= largest if largest > 0 else 1.0
-    value = curve[-1][0]
-    failed_at = min((step.value for step in steps if step.value > value), default=math.inf)
-    return Collapse(value, failed_at, np.array(curve), mechanism, steps)
+    return Collapse(
+        value=curve[-1][0],
+        failed_at=last.value,
+        failed=last.report.outcome == "failure",
+        reason=last.report.reason,
+        carried=last.report.carried,
+        residual=max(step.report.residuals[-1] for step in steps if step.converged),
+        curve=np.array(curve),
+        mechanism=mechanism,
+        steps=steps,
+    )
 
 
 def _largest(function, comm, dim):

@@ -26,26 +26,37 @@ class Body:
     solver: Any
 
     def accept(self):
-        """The step becomes the last equilibrium."""
+        """Makes the step's end the state that the next step starts from."""
         self.points.accept()
         self.solution.x.array[:] += self.increment.x.array
+
+    def snapshot(self):
+        """Copies of the state that the next step starts from, for `restore`."""
+        return self.solution.x.array.copy(), self.points.snapshot()
+
+    def restore(self, snapshot):
+        """Goes back to a state copied before."""
+        self.solution.x.array[:] = snapshot[0]
+        self.points.restore(snapshot[1])
 
 
 class EquilibriumStep:
     """One step of a Body to equilibrium, as `newton` wants it."""
 
-    def __init__(self, body, laws, external, before, displacement):
+    def __init__(self, body, laws, external, before, displacement, viscosity=0.0, scale=None):
         """
         laws: in the order of the points; external, before: nodal forces of the loads at the step's end and at its start
-        displacement: share of the displacements that the supports prescribe, at the step's end
+        displacement: fraction of the displacements that the supports prescribe, at the step's end
+        viscosity: factor of the elastic stiffness, times the strain increment a stress added to that of the laws [-]
+        scale: norm of forces that residuals are divided by; by default it is found at the start
         """
-        self._body, self._laws = body, laws
+        self._body, self._laws, self._viscosity = body, laws, viscosity
         self._space = body.solution.function_space
         self._comm = self._space.mesh.comm
         self._n_owned = self._space.dofmap.index_map.size_local * self._space.dofmap.index_map_bs
         self._fixed = body.constraints.dofs
         self._external, self._before = external, before
-        self._scale = None
+        self.scale = scale
         self.reason = ""
         """Why the last move could not be made"""
         self._moved = body.constraints.at(displacement) - body.solution.x.array[self._fixed]
@@ -60,6 +71,7 @@ class EquilibriumStep:
         self._base[:] = increment.x.array
         spread = self._body.kinematics.strain_increment()
         points.update(self._laws, np.zeros_like(spread))
+        points.add_viscosity(self._laws, self._viscosity, np.zeros_like(spread))
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def correction(self):
@@ -71,11 +83,27 @@ class EquilibriumStep:
         """Add a share of the correction to the last point of the iteration; returns the residual there."""
         body, points = self._body, self._body.points
         body.increment.x.array[:] = self._base + step * self._correction.x.array
-        failure = points.update(self._laws, body.kinematics.strain_increment())
+        strain = body.kinematics.strain_increment()
+        failure = points.update(self._laws, strain)
         self.reason = next(filter(None, self._comm.allgather(failure)), "")
         if self.reason:
             return np.inf
-        return self._residual(points.trial_stress)
+        return self._residual(points.trial_stress + points.add_viscosity(self._laws, self._viscosity, strain))
+
+    def out_of_balance(self):
+        """The residual of the laws' stresses alone, without the viscous ones, at the last point that was moved to."""
+        return self._residual(self._body.points.trial_stress)
+
+    def carried_fraction(self):
+        """Power of the laws' stresses over that of the external forces, both on the increment; NaN where these do none.
+
+        In a mechanism it is the factor by which the load would have to be multiplied to be carried.
+        """
+        body, n = self._body, self._n_owned
+        increment = body.increment.x.array[:n]
+        internal = body.kinematics.internal_forces(body.points.trial_stress).array[:n]
+        works = self._comm.allreduce(np.array([internal @ increment, self._external[:n] @ increment]))
+        return works[0] / works[1] if works[1] > 0 else np.nan
 
     def work(self):
         """The residual times the correction."""
@@ -90,11 +118,11 @@ class EquilibriumStep:
         """Norm of the out-of-balance forces over that of the forces at work."""
         forces = self._body.kinematics.internal_forces(stress)
         forces.array[:] = self._external - forces.array
-        if self._scale is None:
-            self._scale = self._forces_at_work(forces.array)
+        if self.scale is None:
+            self.scale = self._forces_at_work(forces.array)
         forces.array[self._fixed] = 0.0
         self._residual_vector = forces
-        return self._norm(forces.array) / self._scale if self._scale > 0 else 0.0
+        return self._norm(forces.array) / self.scale if self.scale > 0 else 0.0
 
     def _forces_at_work(self, out_of_balance):
         """Largest norm of the loads before and after the step and of the reactions at its start.

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import ufl
 from dolfinx import fem, la
-from mpm_core.newton import newton
 
 import mpm_core as mpm
 from fenics_bridge import compat
-from fenics_bridge.equilibrium import Body, EquilibriumStep
+from fenics_bridge.equilibration import Solver, find_equilibrium
+from fenics_bridge.equilibrium import Body
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import assembled, strain
@@ -32,10 +34,11 @@ class MixedQuasiStatic:
     Has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_"):
+    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_", solver=None):
         """
         law: of `mpm_core`, LinearElastic, or MohrCoulomb with a friction angle of 0 and no tension cut-off
         facet_tags, supports: as for `solve_elastic`; options_prefix: of the PETSc options of the linear solver
+        solver: as for `QuasiStatic`
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
         agree(domain.comm, _first_mistake(law))
@@ -47,8 +50,9 @@ class MixedQuasiStatic:
         self.load, self.converged = Load(), False
         unknowns = fem.Function(space), fem.Function(space)
         self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law)
-        solver = LinearSolver(space, options_prefix, "mumps")
-        self._body = Body(*unknowns, self.points, self._kinematics, constraints, solver)
+        linear = LinearSolver(space, options_prefix, "mumps")
+        self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
+        self.solver = solver or Solver()
         self._facet_tags = facet_tags
         self._displacements, self._parts = space.sub(0).collapse()
 
@@ -62,15 +66,14 @@ class MixedQuasiStatic:
         """Displacement of the last step [m]."""
         return self._displacement(self._body.increment, "increment")
 
-    def equilibrate(self, load, law=None, **newton_options):
+    def equilibrate(self, load, law=None, **options):
         """Go to the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
         forces = self._loads.forces(load), self._loads.forces(self.load)
-        report = newton(EquilibriumStep(self._body, [law], *forces, load.displacement), **newton_options)
+        report = find_equilibrium(self._body, [law], *forces, load.displacement, replace(self.solver, **options))
         self.converged = report.converged
         if report.converged:
-            self._body.accept()
             self.load, self.law = load, law
         return report
 

@@ -90,6 +90,29 @@ class QuadraturePoints:
         strain = ", ".join(f"{e:.6g}" for e in self._trial_strain[point])
         return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
 
+    def add_viscosity(self, laws, factor, strain_increment):
+        """Adds a factor times the elastic stiffness to the tangent; returns that times the strain increment: (n, S) [Pa].
+
+        The stiffness is the isotropic one of each law's wave moduli, an estimate for laws whose stiffness changes.
+        """
+        if factor == 0:
+            return 0.0
+        stress = np.zeros((self.n, self.size))
+        for law, piece in zip(laws, self._pieces):
+            stiffness = factor * isotropic_stiffness(law, self.size)
+            self.tangent[piece] += stiffness
+            stress[piece] = strain_increment[piece] @ stiffness
+        return stress
+
+    def snapshot(self):
+        """Copies of stress, state and accumulated strain, for `restore`."""
+        return self.stress.copy(), self.state.copy(), self.deviatoric_strain.copy()
+
+    def restore(self, snapshot):
+        """Goes back to values copied before."""
+        for values, copied in zip((self.stress, self.state, self.deviatoric_strain), snapshot):
+            values[:] = copied
+
     def accept(self):
         """The trial becomes the last equilibrium."""
         np.copyto(self.stress, self.trial_stress)
@@ -132,3 +155,11 @@ def deviatoric_size(strain):
     """sqrt(2/3 e : e) of the deviators e of strains (n, S) with engineering shear: (n,)."""
     deviator = strain[:, :3] - strain[:, :3].mean(axis=1, keepdims=True)
     return np.sqrt(2 / 3 * (np.sum(deviator**2, axis=1) + 0.5 * np.sum(strain[:, 3:] ** 2, axis=1)))
+
+
+def isotropic_stiffness(law, size):
+    """Elastic stiffness (S, S) [Pa] with the wave moduli of a law; S = 4 in plane strain, 6 in three dimensions."""
+    shear = law.shear_modulus
+    stiffness = np.diag([2 * shear] * 3 + [shear] * (size - 3))
+    stiffness[:3, :3] += law.p_wave_modulus - 2 * shear
+    return stiffness

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
-from mpm_core.newton import newton
 
 from fenics_bridge import compat
 from fenics_bridge.active_cells import reconfigure
 from fenics_bridge.averaged import AveragedKinematics
-from fenics_bridge.equilibrium import Body, EquilibriumStep
+from fenics_bridge.equilibration import Solver, find_equilibrium
+from fenics_bridge.equilibrium import Body
 from fenics_bridge.errors import agree
 from fenics_bridge.evaluate import evaluate_at
 from fenics_bridge.fields import nodal_average
@@ -33,13 +33,16 @@ class QuasiStatic:
     Every stage starts from the equilibrium before it; a step that fails leaves that equilibrium untouched.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_", cell_tags=None):
+    def __init__(
+        self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_", cell_tags=None, solver=None
+    ):
         """
         law: of `mpm_core`, or {cell tag: law}; facet_tags, supports: as for `solve_elastic`
         degree: 1 or 2 of the displacement
         nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1
         options_prefix: of the PETSc options of the linear solver
         cell_tags: of the domain; needed where laws or unit weights are given by cell tag
+        solver: the Solver, with tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
         agree(domain.comm, None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2")
@@ -54,15 +57,15 @@ class QuasiStatic:
         self._loads = LoadVectors(space, facet_tags, cell_tags)
         self._materials = Materials(domain, law, cell_tags)
         self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
-        self.load, self.converged = Load(), False
+        self.load, self.converged, self.solver = Load(), False, solver or Solver()
         self._assemble(constraints)
 
     def _assemble(self, constraints):
         """Put together what a step works on, with the present points and the given constraints. Collective."""
         kinematics: type = AveragedKinematics if self._nmd else Kinematics
         self._kinematics = kinematics(self.increment, self.points, constraints)
-        solver = LinearSolver(self.displacement.function_space, self._options_prefix)
-        self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, solver)
+        linear = LinearSolver(self.displacement.function_space, self._options_prefix)
+        self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
     def reconfigure(self, off=(), supports=None, pore_pressure=None, stress=None, law=None):
         """Change what is there; the forces that this brings out of balance are held until `solve` releases them.
@@ -116,19 +119,18 @@ class QuasiStatic:
         self._body.constraints.origin[:] = 0.0
         self.load = replace(self.load, displacement=0.0)
 
-    def equilibrate(self, load, law=None, **newton_options):
-        """Go to the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns the NewtonReport.
+    def equilibrate(self, load, law=None, **options):
+        """Go to the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns EquilibriumReport.
 
-        When it does not converge everything is left as it was. newton_options: as for `newton`. Collective.
+        Newton's method first; where it gives up, the body relaxes with a viscosity until it rests or flows (`relaxation`).
+        Without equilibrium everything is left as it was. options: of `Solver`, in place of those of `solver`. Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)
-        report = newton(
-            EquilibriumStep(self._body, self._materials.laws(law), *forces, load.displacement), **newton_options
-        )
+        solver = replace(self.solver, **options)
+        report = find_equilibrium(self._body, self._materials.laws(law), *forces, load.displacement, solver)
         self.converged = report.converged
         if report.converged:
-            self._body.accept()
             self.load, self.law = self._loads.resolved(load), law
         return report
 

@@ -123,6 +123,9 @@ py::class_<L> bind_law(py::module_& m, const char* name, const char* text)
       .def_property_readonly(
           "p_wave_modulus", [](const L& law) { return p_wave_modulus(law); },
           "Modulus of the compression wave, K + 4G/3 [Pa]")
+      .def_property_readonly(
+          "shear_modulus", [](const L& law) { return shear_modulus(law); },
+          "Shear modulus G [Pa]; an estimate of its size where it changes or is not known")
       .def("__eq__",
            [](const L& law, const py::object& other) { return py::isinstance<L>(other) && law == other.cast<L>(); })
       .def("update", &update_arrays<L>, py::arg("strain_increment"), py::arg("stress"), py::arg("state"),

@@ -47,9 +47,9 @@ def interior_points(n, dim, seed=0):
     return np.random.default_rng(seed).random((n, dim)) * (*width, 1.0)
 
 
-def slope_model(cell_size=0.1, dilation_angle=25.0, comm=MPI.COMM_WORLD, **options):
+def slope_model(cell_size=0.1, kind="crossed", dilation_angle=25.0, comm=MPI.COMM_WORLD, **options):
     """QuasiStatic of the paper's slope."""
-    domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=cell_size))
+    domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=cell_size, kind=kind))
     law = mpm.MohrCoulomb(
         young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0, dilation_angle=dilation_angle
     )

@@ -79,7 +79,7 @@ def newton(
             return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e} after {max_iterations} iterations")
         if not system.correction():
             return NewtonReport(False, residuals, "the linear solver failed")
-        residual = _line_search(system, max_halvings)
+        residual = line_search(system, max_halvings)
         if residual == float("inf"):
             return NewtonReport(False, residuals, system.reason)
         if residual > RUN_AWAY:
@@ -89,8 +89,8 @@ def newton(
     return NewtonReport(True, residuals)
 
 
-def _line_search(system: System, max_halvings: int) -> float:
-    """Move by a share of the correction; returns the residual there."""
+def line_search(system: System, max_halvings: int) -> float:
+    """Moves a system by a fraction of its correction, chosen as `newton` says; returns the residual there."""
     work = abs(system.work())
     best_share, best_residual = 1.0, float("inf")
     for halving in range(max_halvings + 1):

@@ -1,0 +1,147 @@
+"""Laws with their strength divided by a factor, for strength reduction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import mpm_core as mpm
+from fenics_bridge.errors import InputError
+
+
+def reduced_strength(law, factor, unreduced=()):
+    """The law with its strength divided by a factor: cohesion and tan(friction angle), or what stands for them.
+
+    law: one of `mpm_core`, or {cell tag: law}; unreduced: cell tags of laws that stay as they are
+    - MohrCoulomb (and `tresca`): c / F and tan(phi) / F. The dilation angle stays where it can, and is limited to the new
+      friction angle: associated flow stays associated.
+    - SofteningMohrCoulomb: peak and residual strength alike. - DruckerPrager: strength and slope of the cone.
+    - CamClay: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
+    - Hencky and Undrained: the law that they are made of.
+    - LinearElastic beside other laws: it has no strength to reduce and stays as it is.
+    - Any other (a UMAT, a law written in Python): give `factor_of_safety` a function of law and factor.
+    Raises InputError for a factor that is not positive, and for a law whose strength is not known.
+    """
+    if not (np.isfinite(factor) and factor > 0):
+        raise InputError(f"factor: got {factor!r}, expected a positive number")
+    if isinstance(law, dict):
+        unknown = [tag for tag in unreduced if tag not in law]
+        if unknown:
+            raise InputError(f"unreduced: there is no law for {unknown[0]!r}; laws are given for {list(law)}")
+        kept = [tag for tag, one in law.items() if tag in unreduced or isinstance(one, mpm.LinearElastic)]
+        if len(kept) == len(law):
+            raise InputError(f"unreduced: got {list(unreduced)}; no law is left whose strength could be reduced")
+        return {tag: one if tag in kept else reduced_strength(one, factor) for tag, one in law.items()}
+    for kind, reduce in _REDUCTIONS.items():
+        if isinstance(law, kind):
+            return reduce(law, factor)
+    raise InputError(
+        f"law: the strength of {type(law).__name__} is not known here; give factor_of_safety a function `reduce` of law "
+        "and factor that returns the weaker law"
+    )
+
+
+def davis_strength(law):
+    """Mohr-Coulomb law with associated flow and the strength that Davis (1968) gives to soil of less dilation.
+
+    c* = b c and tan(phi*) = b tan(phi) with b = cos(psi) cos(phi) / (1 - sin(psi) sin(phi)): collapse loads of the
+    associated soil with that strength estimate, mostly from below, those of the soil itself (Tschuchnigg, Schweiger,
+    Sloan 2015, Comput. Geotech. 70, 178-189). law: MohrCoulomb, or {cell tag: law}, of which others stay as they are.
+    """
+    if isinstance(law, dict):
+        return {tag: davis_strength(one) if isinstance(one, mpm.MohrCoulomb) else one for tag, one in law.items()}
+    if not isinstance(law, mpm.MohrCoulomb):
+        raise InputError(f"law: got {type(law).__name__}, expected MohrCoulomb")
+    phi, psi = math.radians(law.friction_angle), math.radians(law.dilation_angle)
+    factor = (1 - math.sin(psi) * math.sin(phi)) / (math.cos(psi) * math.cos(phi))
+    friction = _divided(law.friction_angle, factor)
+    return _mohr_coulomb(law, law.cohesion / factor, friction, friction)
+
+
+def davis_reduced_strength(law, factor, unreduced=()):
+    """The law with its strength divided by a factor, then by what Davis (1968) has for its flow ("Davis B").
+
+    For `factor_of_safety(..., reduce=davis_reduced_strength)`: associated flow, so a factor that is quick to find and does
+    not depend on the mesh. Arguments and errors as for `reduced_strength` and `davis_strength`.
+    """
+    return davis_strength(reduced_strength(law, factor, unreduced))
+
+
+def _divided(angle, factor):
+    """The angle [degrees] whose tangent is that of another one over a factor."""
+    return math.degrees(math.atan(math.tan(math.radians(angle)) / factor))
+
+
+def _mohr_coulomb(law, cohesion, friction_angle, dilation_angle):
+    return mpm.MohrCoulomb(
+        young=law.young,
+        poisson=law.poisson,
+        cohesion=cohesion,
+        friction_angle=friction_angle,
+        dilation_angle=dilation_angle,
+        tension_cutoff=law.tension_cutoff,
+    )
+
+
+def _limited(dilation, friction_before, friction):
+    """The dilation angle that goes with a reduced friction angle."""
+    return friction if dilation == friction_before else min(dilation, friction)
+
+
+def _reduced_mohr_coulomb(law, factor):
+    friction = _divided(law.friction_angle, factor)
+    return _mohr_coulomb(
+        law, law.cohesion / factor, friction, _limited(law.dilation_angle, law.friction_angle, friction)
+    )
+
+
+def _reduced_softening(law, factor):
+    friction = _divided(law.residual_friction_angle, factor)
+    return mpm.SofteningMohrCoulomb(
+        _reduced_mohr_coulomb(law.peak, factor),
+        residual_cohesion=law.residual_cohesion / factor,
+        residual_friction_angle=friction,
+        residual_dilation_angle=_limited(law.residual_dilation_angle, law.residual_friction_angle, friction),
+        softening_strain=law.softening_strain,
+        reference_length=law.reference_length,
+        shape=law.shape,
+    )
+
+
+def _reduced_drucker_prager(law, factor):
+    friction = law.friction / factor
+    return mpm.DruckerPrager(
+        young=law.young,
+        poisson=law.poisson,
+        strength=law.strength / factor,
+        friction=friction,
+        dilation=_limited(law.dilation, law.friction, friction),
+        tension_cutoff=law.tension_cutoff,
+    )
+
+
+def _reduced_cam_clay(law, factor):
+    angle = math.asin(3 * law.critical_slope / (6 + law.critical_slope))
+    sine = math.sin(math.atan(math.tan(angle) / factor))
+    return mpm.CamClay(
+        compression=law.compression,
+        swelling=law.swelling,
+        critical_slope=6 * sine / (3 - sine),
+        poisson=law.poisson,
+        preconsolidation=law.preconsolidation,
+        void_ratio=law.void_ratio,
+        attraction=law.attraction,
+    )
+
+
+_REDUCTIONS = {
+    mpm.MohrCoulomb: _reduced_mohr_coulomb,
+    mpm.SofteningMohrCoulomb: _reduced_softening,
+    mpm.DruckerPrager: _reduced_drucker_prager,
+    mpm.CamClay: _reduced_cam_clay,
+    mpm.Hencky: lambda law, factor: mpm.Hencky(reduced_strength(law.law, factor)),
+    mpm.Undrained: lambda law, factor: mpm.Undrained(
+        reduced_strength(law.skeleton, factor), water_modulus=law.water_modulus, porosity=law.porosity
+    ),
+}

@@ -1,0 +1,143 @@
+"""Equilibrium of soil without dilation, by relaxation where Newton's method gives up; failure that is shown."""
+
+import numpy as np
+import pytest
+from bridge_cases import MESHES, POISSON, YOUNG, column, slope_model
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.equilibration import EquilibriumReport
+from fenics_bridge.load_steps import advance
+
+
+def weight(unit_weight):
+    return bridge.Load(unit_weight=unit_weight)
+
+
+def elastic_column():
+    domain, facet_tags, supports, _ = column(2)
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports)
+
+
+def test_an_elastic_body_relaxes_at_the_rate_of_the_closed_form():
+    """A step with theta K_el du added leaves theta / (1 + theta) of the residual of an elastic body."""
+    model = elastic_column()
+    report = model.equilibrate(weight(20e3), tolerance=1e-30, max_iterations=1)
+    relaxation = report.relaxation
+    theta = 1 / np.diff([0.0, *relaxation.time])
+    expected = report.residuals[0] * np.cumprod(theta / (1 + theta))
+    above = expected > 1e-10  # the last ones are round-off
+    assert report.converged and len(relaxation.residual) >= 4
+    assert np.allclose(np.array(relaxation.residual)[above], expected[above], rtol=1e-6)
+    # On the motion of a step an elastic body carries 1 - theta / (1 + theta) of what is missing, and all of the rest.
+    carried = 1 - np.array([report.residuals[0], *expected[:-1]]) / report.residuals[0] * theta / (1 + theta)
+    assert np.allclose(np.array(relaxation.carried)[above], carried[above], rtol=1e-6)
+
+
+def test_relaxation_finds_the_equilibrium_that_newton_finds():
+    newton, relaxed = slope_model(), slope_model()
+    newton.solve(weight(15e3))
+    for load in (7.5e3, 15e3):
+        report = relaxed.equilibrate(weight(load), tolerance=1e-30, max_iterations=1, relaxed_tolerance=1e-8)
+        assert report.converged and report.relaxation is not None
+    scale = np.abs(newton.displacement.x.array).max()
+    assert np.allclose(relaxed.displacement.x.array, newton.displacement.x.array, atol=0.01 * scale)
+    assert np.allclose(relaxed.increment.x.array, report.motion)
+
+
+# Griffiths and Lane (1999), Geotechnique 49, 387-403, example 1: slope 1:2, phi = 20 degrees, c / (gamma H) = 0.05, no
+# dilation: 1.4 by their finite elements; 1.380 by Bishop and Morgenstern (1960).
+@pytest.mark.parametrize(("degree", "cell_size"), [(2, 2.0), (2, 1.0), (1, 1.0)])
+def test_factor_of_safety_without_dilation_is_the_published_one(degree, cell_size):
+    law = mpm.MohrCoulomb(young=1e8, poisson=0.3, cohesion=10e3, friction_angle=20.0)
+    background = bridge.slope_mesh(
+        MPI.COMM_WORLD, height=10.0, angle=np.degrees(np.arctan(0.5)), crest=12.0, cell_size=cell_size, kind="fitted",
+        runout=cell_size,
+    )  # fmt: skip
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports, degree=degree, nmd=degree == 1)
+    result = bridge.factor_of_safety(model, weight(20e3), start=0.8, tolerance=5e-3)
+    assert 0.98 * 1.38 < result.value < 1.02 * 1.4
+    assert result.failed and result.failed_at - result.value < 0.02 and result.residual <= 1e-5
+    # A second sign of failure: on the mechanism the stresses do less work than the weight, but nearly as much.
+    assert 0.9 < result.carried < 1
+    assert 0.9 < np.linalg.norm(result.mechanism.x.array.reshape(-1, 2), axis=1).max() <= 1.0 + 1e-12
+
+
+def test_bearing_capacity_without_dilation():
+    """Nc of phi = 30 degrees is 30.14 with associated flow; without dilation it lies between that and Davis' value."""
+    domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", MPI.COMM_WORLD)
+    law = mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=30.0)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (1, 0)), bridge.fixed(2)]
+    model = bridge.QuasiStatic(domain, law, facet_tags, supports)
+    result = bridge.collapse_load(model, lambda q: bridge.Load(pressure={5: q}), first_step=4e3, tolerance=5e-3)
+    davis = bridge.davis_strength(law)
+    tangent = np.tan(np.radians(davis.friction_angle))
+    prandtl = (np.exp(np.pi * tangent) * np.tan(np.radians(45 + davis.friction_angle / 2)) ** 2 - 1) / tangent
+    assert result.failed
+    assert davis.cohesion * prandtl < result.value < 1.02 * 30.14e3
+
+
+def test_without_relaxation_nothing_is_called_failure():
+    model = slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.Solver(relaxation=False, max_iterations=4))
+    result = bridge.collapse_load(model, weight, first_step=5e3)
+    assert not result.failed and np.isnan(result.carried) and "iterations" in result.reason
+    assert result.value < bridge.collapse_load(slope_model(0.2, "fitted", dilation_angle=0.0), weight, first_step=5e3).value
+
+
+def test_practice_accepts_more_and_says_how_much():
+    practice = bridge.factor_of_safety(slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.PRACTICE), weight(20e3))
+    fine = bridge.factor_of_safety(slope_model(0.2, "fitted", dilation_angle=0.0), weight(20e3))
+    assert 1e-5 < practice.residual <= 1e-2 and fine.residual <= 1e-5
+    assert practice.value >= fine.value
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tolerance": 0.0}, "tolerance.*0.0"),
+        ({"relaxed_tolerance": 2}, "relaxed_tolerance.*2"),
+        ({"max_steps": 0.5}, "max_steps"),
+    ],
+)
+def test_bad_options_are_named(options, words):
+    with pytest.raises(bridge.InputError, match=words):
+        bridge.Solver(**options)
+    with pytest.raises(bridge.InputError, match=words):
+        elastic_column().equilibrate(weight(1.0), **options)
+
+
+def fake(outcome, iterations=5):
+    return EquilibriumReport(outcome, [1.0, 0.0], "", iterations)
+
+
+def test_steps_grow_again_after_one_that_was_too_large():
+    """Only steps above 0.01 fail, and only below 0.1: the way to 10 is not made in steps of 0.01."""
+    value = 0.0
+
+    def equilibrate(target):
+        nonlocal value
+        good = target - value <= 0.01 or value >= 0.1
+        value = target if good else value
+        return fake("equilibrium" if good else "undecided")
+
+    steps = advance(equilibrate, 0.0, 10.0, 1.0, 1e-3)
+    assert steps[-1].value == 10.0 and steps[-1].converged
+    assert len(steps) < 60
+
+
+def test_a_value_that_fails_is_never_passed():
+    tried = []
+
+    def equilibrate(value):
+        tried.append(value)
+        return fake("equilibrium" if value < np.pi else "failure")
+
+    steps = advance(equilibrate, 0.0, np.inf, 1.0, 1e-4)
+    best = max(step.value for step in steps if step.converged)
+    assert np.pi - 2e-4 * np.pi < best < np.pi
+    failed = [value for value in tried if value > np.pi]
+    assert failed == sorted(failed, reverse=True)
