@@ -85,11 +85,16 @@ def test_without_relaxation_nothing_is_called_failure():
     model = slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.Solver(relaxation=False, max_iterations=4))
     result = bridge.collapse_load(model, weight, first_step=5e3)
     assert not result.failed and np.isnan(result.carried) and "iterations" in result.reason
-    assert result.value < bridge.collapse_load(slope_model(0.2, "fitted", dilation_angle=0.0), weight, first_step=5e3).value
+    assert (
+        result.value
+        < bridge.collapse_load(slope_model(0.2, "fitted", dilation_angle=0.0), weight, first_step=5e3).value
+    )
 
 
 def test_practice_accepts_more_and_says_how_much():
-    practice = bridge.factor_of_safety(slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.PRACTICE), weight(20e3))
+    practice = bridge.factor_of_safety(
+        slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.PRACTICE), weight(20e3)
+    )
     fine = bridge.factor_of_safety(slope_model(0.2, "fitted", dilation_angle=0.0), weight(20e3))
     assert 1e-5 < practice.residual <= 1e-2 and fine.residual <= 1e-5
     assert practice.value >= fine.value
