@@ -27,7 +27,7 @@ void solve_momentum(Model<D>& model, double damping, double dt)
     for (int a = 0; a < D; ++a)
     {
       const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double drag = local_damping(damping, residual, work.start_velocity[i][a], residual * dt * per_mass);
+      const double drag = local_damping(damping, residual, node.mass * work.start_velocity[i][a], dt);
       work.acceleration[i][a] = (residual - drag) * per_mass;
     }
   }
@@ -94,7 +94,7 @@ void tally(Model<D>& model, double damping, double dt)
       const double external = node.traction[a] + node.mass * gravity[a];
       const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
       const double residual = external - node.internal[a];
-      const double drag = local_damping(damping, residual, start[a], residual * dt / node.mass);
+      const double drag = local_damping(damping, residual, node.mass * start[a], dt);
       sums.external_work += external * u;
       sums.internal_work += node.internal[a] * u;
       sums.damping_work += drag * u;

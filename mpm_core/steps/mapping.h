@@ -4,6 +4,7 @@
 
 #include "steps/model.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace mpm
@@ -38,16 +39,19 @@ void average_strains(Model<D>& model, double dt);
 template <int D>
 void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress);
 
-/// Local damping of FLAC for one component: alpha |R| sign(v).
+/// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
 ///
-/// Where v is less than a tenth of the change that R makes of it in a step, the damping passes linearly through zero
-/// instead of jumping: a node that a wave has just reached has a residual while its velocity is still round-off, and a
-/// sign taken from round-off would let results depend on the order of summation, so on the number of ranks.
-/// @param change  R dt / m_i, what R makes of the velocity in a step [m/s]
-inline double local_damping(double alpha, double residual, double velocity, double change)
+/// A node that R slows down, with its force (1 + alpha) |R|, may come to a stop within the step; for the rest of it R
+/// speeds it up, with (1 - alpha) |R|. Taking the velocity's sign at the step's start for the whole step would throw a
+/// slow node back past its start: its velocity would change sign step by step, and differences of round-off would grow.
+/// With the mean, the new velocity rises with the old one at a slope between (1 - alpha) / (1 + alpha) and 1, so that
+/// differences never grow by the damping. The implicit scheme has the same law, solved for R (implicit_inertia.h).
+/// @param momentum  m v at the step's start [N s]
+/// @param dt        [s]
+inline double local_damping(double alpha, double residual, double momentum, double dt)
 {
-  const double width = 0.1 * std::abs(change);
-  return std::abs(velocity) < width ? alpha * std::abs(residual) * (velocity / width)
-                                    : std::copysign(alpha * std::abs(residual), velocity);
+  const double impulse = (1 + alpha) * residual * dt;
+  const double slowed = impulse == 0 ? 0 : std::clamp(-momentum / impulse, 0.0, 1.0); // part of the step until the stop
+  return alpha * residual * (1 - 2 * slowed);
 }
 } // namespace mpm
