@@ -22,20 +22,21 @@ from fenics_bridge.loads import Load
 from fenics_bridge.meshes import read_mesh
 from fenics_bridge.mixed import MixedQuasiStatic
 from fenics_bridge.names import name_tags, names_of
+from fenics_bridge.particle_site import ParticleSite
 from fenics_bridge.quasi_static import QuasiStatic
 from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.soil import soil_mesh
 from fenics_bridge.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.strength import davis_reduced_strength, davis_strength, reduced_strength
-from fenics_bridge.supports import Support, fixed, prescribed, roller
+from fenics_bridge.supports import Support, fixed, flat_normal, prescribed, roller
 
 # fmt: off
 __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
     "ElasticSolution", "EquilibriumReport", "FemSite", "Handover", "InputError", "Load", "LoadStep", "LogSpiral",
-    "MixedQuasiStatic", "PointSearch", "QuasiStatic", "Solver", "Stage", "StageError", "StageReport", "Support",
+    "MixedQuasiStatic", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage", "StageError", "StageReport", "Support",
     "background_arrays", "background_mesh", "box_mesh", "carry_out", "collapse_load", "compare",
-    "davis_reduced_strength", "davis_strength", "evaluate_at", "factor_of_safety", "fixed", "graded_tags",
+    "davis_reduced_strength", "davis_strength", "evaluate_at", "factor_of_safety", "fixed", "flat_normal", "graded_tags",
     "hydrostatic", "initialise", "k0_elastic", "k0_jaky", "k0_layered_stress", "k0_stress", "log_spiral",
     "log_spiral_safety", "name_tags", "names_of", "nodal_average", "original_cells", "prescribed", "print_step",
     "read_mesh", "reduced_strength", "roller", "slope_mesh", "soil_mesh", "solve_elastic",

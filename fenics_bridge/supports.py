@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
+from fenics_bridge.compat import facet_nodes
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.names import tag_numbers
 
@@ -82,6 +83,16 @@ class Constraints:
     def at(self, share):
         """Displacements (k,) [m] of the dofs at a share of the values."""
         return self.origin + share * self.values
+
+
+def flat_normal(domain, facet_tags, tag):
+    """The axis, such as (1, 0), to which all facets of a tag are at right angles; None where there is none. Collective."""
+    facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
+    corners = domain.geometry.x[facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
+    size = np.ptp(domain.geometry.x, axis=0).max() if len(domain.geometry.x) else 0.0
+    flat = np.ptp(corners, axis=1) <= 1e-9 * size
+    along = np.flatnonzero(np.all(domain.comm.allgather(flat.all(axis=0)), axis=0))
+    return tuple(float(k == along[0]) for k in range(domain.geometry.dim)) if len(along) == 1 else None
 
 
 def tagged_facets(comm, facet_tags, tag, argument):

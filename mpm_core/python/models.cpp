@@ -196,6 +196,13 @@ void bind_model(py::module_& m, const std::string& suffix)
              check_array<double>("position", positions, {static_cast<py::ssize_t>(model.particles.size()), D});
              place_particles<D>(model, values<double>(positions));
            })
+      .def("remove_particles",
+           [](M& model, const py::array& rows)
+           {
+             check_array<Index>("rows", rows, {-1}); // sorted, without repetition, of particles that are there
+             remove<D>(model.particles, values<Index>(rows));
+             model.work.ready = false;
+           })
       .def("set_materials",
            [](M& model, const py::array& numbers)
            {

@@ -62,3 +62,29 @@ def test_a_stage_that_fails_says_the_same_on_all_ranks(folder):
     assert len(set(COMM.allgather(str(error.value)))) == 1
     with pytest.raises(bridge.InputError, match="stage 'a': fill: no cell has the name 'sand'"):
         site.carry_out(bridge.Stage("a", fill="sand"))
+
+
+def test_particles_in_stages_are_the_same_on_all_numbers_of_ranks(folder):
+    apart = folder / f"rank {COMM.rank}"
+    apart.mkdir()
+    results = []
+    for place, comm in ((folder, COMM), (apart, MPI.COMM_SELF)):
+        laws = plastic(SOILS["pit"])
+        model = mpm.Model(bridge.background_mesh(*mesh_of("pit", place, comm)), list(laws.values()))
+        site = bridge.ParticleSite(
+            model, {s: k for k, s in enumerate(laws)}, ROLLERS, tolerance=1e-8, small_displacements=True
+        )
+        water = bridge.hydrostatic(2.0)
+        stages = [
+            bridge.Stage("in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), pore_pressure=water),
+            bridge.Stage("dig 1", excavate="pit 1"),
+            bridge.Stage("dig 2", excavate="pit 2", pressure={"floor": 5e3}),
+        ]
+        list(bridge.carry_out(site, stages))
+        p = model.particles
+        parts = comm.allgather((p.id, p.stress))
+        results.append({i: row for ids, rows in parts for i, row in zip(ids.tolist(), rows)})
+    together, alone = results
+    assert together.keys() == alone.keys()
+    largest = max(np.abs(row).max() for row in alone.values())
+    assert all(np.abs(together[i] - alone[i]).max() < 1e-8 * largest for i in alone)

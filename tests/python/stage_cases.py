@@ -56,10 +56,11 @@ def elastic(soils):
     return {soil: mpm.LinearElastic(young=YOUNG[soil], poisson=POISSON) for soil in soils}
 
 
-def site_of(mesh, laws, supports=ROLLERS, **options):
+def site_of(mesh, laws, supports=ROLLERS, first_step=0.25, **options):
     """FemSite with nothing there yet."""
     domain, cell_tags, facet_tags = mesh
-    return bridge.FemSite(bridge.QuasiStatic(domain, laws, facet_tags, supports, cell_tags=cell_tags, **options))
+    fem = bridge.QuasiStatic(domain, laws, facet_tags, supports, cell_tags=cell_tags, **options)
+    return bridge.FemSite(fem, first_step)
 
 
 def at_once(mesh, soils, laws, load, supports=ROLLERS, **options):

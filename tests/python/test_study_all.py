@@ -22,6 +22,7 @@ SMALL = {
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "element_test": "--steps 5",
+    "excavation": "--cell-size 3 --elements P1",
     "footing": "--cell-size 0.25 --meshes 1 --elements P1",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",

@@ -183,6 +183,28 @@ class Body:
             self._material(int(number))
         self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
 
+    def remove(self, chosen: ArrayLike) -> int:
+        """Take particles away, such as excavated soil; the others may have another order afterwards.
+
+        Args:
+            chosen: whether each particle of this rank goes, shape (n,) of bool, in the order of ``particles``.
+
+        Returns:
+            Number of particles taken away, over all ranks.
+        """
+
+        def rows() -> NDArray[np.int32]:
+            mask = np.asarray(chosen)
+            if mask.shape != (len(self.particles),) or mask.dtype != bool:
+                raise InputError(
+                    f"chosen has shape {mask.shape} and dtype {mask.dtype}, expected {len(self.particles)} of bool"
+                )
+            return np.flatnonzero(mask).astype(np.int32)
+
+        gone = collectively(self.comm, rows)
+        self._core.remove_particles(gone)
+        return self.comm.allreduce(len(gone))
+
     def place(self, position: ArrayLike) -> None:
         """Put the particles elsewhere: their cells are found anew, on whatever rank, and their displacement changes with it.
 

@@ -190,9 +190,11 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
             stepper.control.cuts += 1
             part /= 2
             if part < SMALLEST_PART or applied == 1.0:
-                raise RunError(
+                error = RunError(
                     f"no equilibrium at t = {model.time:.9g} s with more than {applied:.4g} of the loads: {reason}"
                 )
+                error.applied = applied
+                raise error
         applied = min(1.0, applied + part)
         if applied < 1.0:
             part *= 2 if stepper.last.easy else 1

@@ -239,6 +239,7 @@ class Model(Body):
         ghost: GhostPenalty | None = None,
         tolerance: float = 1e-6,
         max_steps: int = 20,
+        small_displacements: bool = False,
     ) -> ImplicitReport:
         """Bring the particles to equilibrium under the present loads, by quasi-static steps of no duration.
 
@@ -252,9 +253,12 @@ class Model(Body):
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: |f_ext - f_int| / |f_ext| to reach, at nodes and particles as they are after a step.
             max_steps: steps after which to give up.
+            small_displacements: change the particles' stresses but not their places and volumes; see ``implicit``.
 
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
-        options = collectively(self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost))
+        options = collectively(
+            self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
+        )
         return settle(self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps)

@@ -1,0 +1,54 @@
+"""Forces of pressures on boundaries and of pore water on particles, as the finite elements have them."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_bridge.errors import agree
+
+
+def boundary_forces(model, tag, pressure):
+    """Force on each particle by a pressure on the boundary with a tag: (n, D) [N] ([N/m] in 2D).
+
+    A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it.
+    pressure: [Pa], compression positive. Collective.
+    """
+    mesh, p, dim = model.mesh, model.particles, model.mesh.dim
+    cells, position = p.cell, p.position
+    full = np.bincount(cells, minlength=len(mesh.cells)) > 0
+    full = mesh._core.with_ghost_values(full[: mesh.owned_cells].astype(float), MPI._addressof(model.comm)) > 0
+    force, gradients = np.zeros((len(p), dim)), _gradients(mesh)
+    facets = np.argwhere((mesh._core.facet_tags[: mesh.owned_cells] == tag) & full[: mesh.owned_cells, None])
+    order = np.argsort(cells, kind="stable")
+    starts = np.searchsorted(cells[order], np.arange(mesh.owned_cells + 1))
+    for cell, k in facets:
+        neighbour = mesh._core.neighbours[cell, k]
+        if neighbour >= 0 and full[neighbour]:
+            continue
+        rows, gradient = order[starts[cell] : starts[cell + 1]], gradients[cell, k]
+        distance = (
+            position[rows] - mesh.points[mesh.cells[cell, (k + 1) % (dim + 1)]]
+        ) @ gradient  # shape function of k
+        nearest = rows[distance < distance.min() + 1e-6]
+        # The outward normal times the area is -D V grad N of the opposite corner.
+        force[nearest] += pressure * dim * mesh.cell_volumes[cell] * gradient / len(nearest)
+    any_facet = model.comm.allreduce(len(facets))
+    agree(model.comm, None if any_facet else f"pressure: no soil lies at the boundary with the tag {tag}")
+    return force
+
+
+def seepage_forces(model, pore_pressure):
+    """Force -V grad p of the pore water on each particle, p being linear in each cell: (n, D) [N] ([N/m] in 2D)."""
+    mesh, cells = model.mesh, model.particles.cell
+    p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
+    agree(model.comm, None if np.all(np.isfinite(p)) else "pore_pressure: it gives values that are not finite")
+    gradient = np.einsum("ck,ckd->cd", p[mesh.cells], _gradients(mesh))
+    return -model.particles.volume[:, None] * gradient[cells]
+
+
+def _gradients(mesh):
+    """Gradients of the shape functions of each cell: (m, D + 1, D) [1/m]."""
+    corners = mesh.points[mesh.cells]
+    inner = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
+    return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)

@@ -1,0 +1,215 @@
+"""A site as a TOML file: mesh, soils with their laws by name, supports by boundary, and stages of construction.
+
+Example of a file:
+
+    mesh = "embankment.geo"            # beside this file; or a .msh
+    cell_size = 0.5                    # and other constants of the .geo file under [constants]
+
+    [soils.clay]                       # a physical group of the mesh
+    unit_weight = 17e3                 # N/m3
+    material = "tresca"                # and the parameters of the law, named as the options of the study slope
+    young = 3e6
+    cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`
+
+    [supports]                         # by default base fixed, and left, right and sides on rollers
+    base = "fixed"
+
+    [[stages]]                         # for the studies embankment and excavation
+    name = "in situ"
+    fill = ["clay"]
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomllib
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+from .options import add_number, study_parser
+from .parameters import ParameterError, checked_values
+from .slope_case import add_soil_options
+from .soils import add_law_options, law_of
+
+KEYS = ("mesh", "cell_size", "constants", "soils", "laws", "supports", "stages", "classes")
+STAGE_KEYS = (
+    "name", "fill", "excavate", "law", "unit_weight", "pressure", "support", "release", "water_level", "reset_displacement"
+)  # fmt: skip
+DEFAULT_SUPPORTS = {"base": "fixed", "left": "roller", "right": "roller", "sides": "roller"}
+
+
+@dataclass
+class Site:
+    """A site as its file describes it, on its mesh.
+
+    domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
+    laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
+    numbers: {soil: its tags}; further_laws: those that come in by stages
+    """
+
+    domain: Any
+    cell_tags: Any
+    facet_tags: Any
+    soils: list[str]
+    laws: dict[int, Any]
+    unit_weight: dict[str, float]
+    supports: list[bridge.Support]
+    stages: list[bridge.Stage]
+    further_laws: list[Any] = field(default_factory=list)
+
+    def finite_elements(self, degree: int, laws: dict[int, Any] | None = None) -> bridge.QuasiStatic:
+        """Elements of all soils, with a law for each tag. Collective."""
+        body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
+        return bridge.QuasiStatic(body, laws or self.laws, facet_tags, self.supports, degree, cell_tags=cell_tags)
+
+    def model(self) -> tuple[mpm.Model, dict[int, int]]:
+        """A model without particles on the whole mesh, and the number of the law of each tag. Collective."""
+        mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
+        return mpm.Model(mesh, [*self.laws.values(), *self.further_laws]), {tag: k for k, tag in enumerate(self.laws)}
+
+    def load(self, factor: float = 1.0) -> bridge.Load:
+        """The weights of all soils times a factor."""
+        return bridge.Load({soil: factor * weight for soil, weight in self.unit_weight.items()})
+
+
+def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
+    """Read a site and make its mesh. Collective.
+
+    Args:
+        path: of the TOML file.
+        cell_size: [m], instead of the one in the file.
+
+    Raises:
+        InputError: on all ranks, with the file, the key and what was expected.
+    """
+    table = _table(path)
+    constants = {**table.get("constants", {}), **({"cell_size": table["cell_size"]} if "cell_size" in table else {})}
+    if cell_size is not None:
+        constants["cell_size"] = cell_size
+    domain, cell_tags, facet_tags = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    soils, laws, weights = table["soils"], {}, {}
+    for soil, given in soils.items():
+        where = f"{path}: soils.{soil}"
+        if "unit_weight" not in given:
+            raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
+        weights[soil] = float(given["unit_weight"])
+        parameters = {key: value for key, value in given.items() if key != "unit_weight"}
+        if any(isinstance(value, dict) for value in parameters.values()):
+            cell_tags, heights = bridge.graded_tags(
+                domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
+            )
+            laws |= {tag: law_at(parameters, height, where) for tag, height in heights.items()}
+        else:
+            law = law_at(parameters, 0.0, where)
+            laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
+    others = {name: law_at(given, 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()}
+    site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, _supports(table, path, domain, facet_tags), [],
+                list(others.values()))  # fmt: skip
+    site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
+    return site
+
+
+def law_at(table: dict, height: float, where: str) -> Any:
+    """The law that a table describes, where its parameters that grow with depth have their value at a height [m]."""
+    parser = study_parser(None)
+    add_soil_options(parser, dilation_angle=0.0)
+    add_law_options(parser)
+    add_number(
+        parser, "--shear-strength", None, "Pa", "undrained shear strength, for tresca: instead of cohesion", at_least=0
+    )
+    values = vars(parser.parse_args([]))
+    try:
+        here = {key.replace("_", "-"): _at_height(value, height) for key, value in table.items()}
+        values |= checked_values(where, here, parser._actions)
+    except (ParameterError, ValueError) as error:
+        raise mpm.InputError(str(error) if isinstance(error, ParameterError) else f"{where}: {error}") from None
+    if values["shear_strength"] is not None:
+        values["cohesion"] = values["shear_strength"]
+    return law_of(argparse.Namespace(**values))
+
+
+def _at_height(value: Any, height: float) -> Any:
+    """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {"value", "per_metre", "top"}:
+        raise ValueError(f"got {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]")
+    return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
+
+
+def _table(path: Path) -> dict:
+    try:
+        with open(path, "rb") as file:
+            table = tomllib.load(file)
+    except OSError as error:
+        raise mpm.InputError(f"cannot read the site {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise mpm.InputError(f"the site {path} is not TOML: {error}") from None
+    for key in table:
+        if key not in KEYS:
+            raise mpm.InputError(f"{path}: unknown key {key!r}, expected some of {', '.join(KEYS)}")
+    for key in ("mesh", "soils"):
+        if key not in table:
+            raise mpm.InputError(f"{path}: has no {key!r}")
+    return table
+
+
+def _supports(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
+    names = bridge.names_of(facet_tags)
+    given = table.get("supports") or {name: kind for name, kind in DEFAULT_SUPPORTS.items() if name in names}
+    if not given:
+        raise mpm.InputError(
+            f"{path}: has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
+        )
+    return [_support(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
+
+
+def _support(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -> bridge.Support:
+    if kind == "fixed":
+        return bridge.fixed(name)
+    if kind != "roller":
+        raise mpm.InputError(f"{where} is {kind!r}, expected 'fixed' or 'roller'")
+    normal = bridge.flat_normal(domain, facet_tags, name)
+    if normal is None:
+        raise mpm.InputError(
+            f"{where}: a roller needs a boundary at right angles to an axis, expected 'fixed' for this one"
+        )
+    return bridge.roller(name, normal)
+
+
+def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Path) -> bridge.Stage:
+    where = f"{path}: stages[{number}]"
+    for key in given:
+        if key not in STAGE_KEYS:
+            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
+    fill = given.get("fill", [])
+    fill = [fill] if isinstance(fill, str) else fill
+    for soil in [*fill, *given.get("law", {})]:
+        if soil not in site.unit_weight:
+            raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(site.unit_weight)}")
+    for soil, law in given.get("law", {}).items():
+        if law not in laws:
+            raise mpm.InputError(
+                f"{where}: law of {soil!r} is {law!r}, expected one of [laws]: {', '.join(laws) or 'there is none'}"
+            )
+    level = given.get("water_level")
+    return bridge.Stage(
+        str(given.get("name", f"stage {number + 1}")),
+        fill=fill,
+        excavate=given.get("excavate", ()),
+        law={soil: laws[law] for soil, law in given.get("law", {}).items()},
+        unit_weight={**{soil: site.unit_weight[soil] for soil in fill}, **given.get("unit_weight", {})},
+        pressure=given.get("pressure", {}),
+        support=[_support(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
+                 for name, kind in given.get("support", {}).items()],
+        release=given.get("release", ()),
+        pore_pressure=None if level is None else bridge.hydrostatic(np.asarray(level, dtype=float)),
+        reset_displacement=bool(given.get("reset_displacement", False)),
+    )  # fmt: skip

@@ -1,0 +1,134 @@
+"""What stages of finite elements look like: the soil that is there after each, coloured by a quantity, and ParaView files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from mpi4py import MPI
+from mpm_core.output import MeshOutput
+
+import fenics_bridge as bridge
+
+from .field_plots import Field, gathered
+from .plots import CURVES, Quantity, boundary_edges, colour_limits, paper_style
+
+MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
+SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
+
+
+@dataclass
+class StagePicture:
+    """A stage for pictures, on the first rank.
+
+    displacement: at the corners of all cells [m]; there: of each cell; strain: accumulated deviatoric strain of each cell [-]
+    """
+
+    name: str
+    displacement: Field
+    there: np.ndarray
+    strain: np.ndarray
+
+    def field(self) -> Field:
+        """The displacement on the cells that are there."""
+        return Field(self.displacement.points, self.displacement.cells[self.there], self.displacement.values)
+
+
+def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
+    """The site as it is now; None but on the first rank. Collective."""
+    fem, comm = site.fem, site.fem.domain.comm
+    field = gathered(fem.displacement)
+    parts = comm.gather(tuple(values[:, 0] for values in own_cell_values(fem)))
+    if field is None or parts is None:
+        return None
+    material, strain = (np.concatenate(arrays) for arrays in zip(*parts))
+    return StagePicture(name, field, material >= 0, strain)
+
+
+def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
+    """Number of the law (-1: not there) and accumulated deviatoric strain of the cells that this rank owns: (m, 1)."""
+    functions = fem.material_function(), fem.deviatoric_strain_function()
+    n = bridge.original_cells(fem.domain).size
+    return [function.x.array.reshape(-1, 1)[:n].copy() for function in functions]
+
+
+def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) -> None:
+    """One panel for each stage, above one another, with one colour scale: displacement, or strain where `quantity` is SHEAR."""
+    box = np.array([stages[0].displacement.points.min(axis=0), stages[0].displacement.points.max(axis=0)])
+    values = [
+        s.strain[s.there] if quantity is SHEAR else np.linalg.norm(s.field().values[s.field().cells], axis=2)
+        for s in stages
+    ]
+    limits = (0.0, max(float(np.quantile(v * quantity.scale, 0.995)) for v in values) or 1.0)
+    aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
+    with paper_style():
+        figure, panels = plt.subplots(len(stages), 1, figsize=(6.9, len(stages) * (5.4 * aspect + 0.35) + 0.45), sharex=True,
+                                      squeeze=False, layout="constrained")  # fmt: skip
+        for axes, stage in zip(panels[:, 0], stages):
+            field = stage.field()
+            shown = (
+                {"shading": "gouraud"}
+                if quantity is not SHEAR
+                else {"facecolors": quantity.scale * stage.strain[stage.there]}
+            )
+            lengths = () if quantity is SHEAR else (quantity.scale * np.linalg.norm(field.values, axis=1),)
+            axes.tripcolor(*field.points.T, field.cells, *lengths, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
+                           rasterized=True, **shown)  # fmt: skip
+            outline = field.points[boundary_edges(field.cells)]
+            axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
+            axes.set_title(stage.name, loc="left", pad=3)
+            axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel="$y$ [m]")
+        panels[-1, 0].set_xlabel("$x$ [m]")
+        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
+                              extend="max", pad=0.01)  # fmt: skip
+        bar.set_label(quantity.label)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequence[float]], label: str) -> None:
+    """Values after each stage, by name of the curve; NaN where there is none."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(5.4, 3.4), layout="constrained")
+        for k, (name, values) in enumerate(curves.items()):
+            axes.plot(range(1, len(names) + 1), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
+        axes.set_xticks(range(1, len(names) + 1), names, rotation=25, ha="right")
+        axes.set_ylabel(label)
+        axes.axhline(0, color="black", linewidth=0.5)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(fontsize=8)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+class StageFiles:
+    """Series for ParaView, a frame after each stage, whose time is the number of the stage. A context manager. Collective."""
+
+    def __init__(self, site: bridge.FemSite, path: Path, comm: MPI.Comm) -> None:
+        self._fem = site.fem
+        mesh = bridge.background_arrays(self._fem.domain)
+        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
+        self._output = MeshOutput(path, comm, mesh["points"], mesh["cells"][own])
+
+    def write(self, number: int) -> None:
+        """Add displacement, stress, material (-1: no soil) and strain as they are after a stage."""
+        material, strain = own_cell_values(self._fem)
+        n = len(material)
+        stress = self._fem.stress_function()
+        moved = bridge.evaluate_at(self._points, displacement=self._fem.displacement)["displacement"]
+        cells = {"material": material[:, 0], "deviatoric_strain": strain[:, 0],
+                 "stress": stress.x.array.reshape(-1, stress.ufl_shape[0])[:n]}  # fmt: skip
+        self._output.write(float(number), {"displacement": moved}, cells)
+
+    def __enter__(self) -> StageFiles:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._output.close()

@@ -1,0 +1,160 @@
+"""An excavation in stages: a pit is dug in steps while the water is drawn down, by elasto-plastic FEM.
+
+The site is a TOML file (`meshes/excavation.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
+of its physical groups, supports by boundary, and a list of stages that place and take away soil, change laws, loads, supports
+and water levels. For elastic soil what remains is, whatever the stages, as if built at once; the study measures that, and how
+far plastic soil is from it.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from common.options import add_choice, add_number, add_switch, study_parser
+from common.page import Page
+from common.ranks import run_study
+from common.site_file import Site, read_site
+from common.stage_plots import MOVED, SHEAR, StageFiles, save_over_stages, save_stages, stage_picture
+from common.summary import ROOT, OutputError, results_folder, write_summary
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "excavation.toml", metavar="FILE",
+                   help="TOML file of mesh, soils, supports and stages (default: meshes/excavation.toml)")  # fmt: skip
+    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    add_switch(p, "--compare", True, "elastic soil as well, and the same ground built at once, to compare with")
+    return p
+
+
+# --- 2. The stages ---------------------------------------------------------------------------------------------------
+
+
+def carry_out(site: Site, degree: int, folder: Path) -> tuple[bridge.FemSite, list[dict], list, str | None]:
+    """All stages: the site in the end, a row and a picture for each stage, and why it ended early if it did. Collective."""
+    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree)), [], [], None
+    with StageFiles(staged, folder / "stages", comm) as files:
+        for stage in site.stages:
+            try:
+                report = staged.carry_out(stage)
+            except bridge.StageError as error:
+                stopped = str(error)
+                break
+            files.write(report.number)
+            rows.append({**movements(staged), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
+                         "largest_displacement_m": report.largest_displacement})  # fmt: skip
+            pictures.append(stage_picture(staged, report.name))
+            if comm.rank == 0:
+                print(f"stage {report.number}, {report.name}: {report.steps} steps, largest displacement "
+                      f"{1e3 * report.largest_displacement:.1f} mm", file=sys.stderr)  # fmt: skip
+    return staged, rows, [picture for picture in pictures if picture is not None], stopped
+
+
+def movements(staged: bridge.FemSite) -> dict[str, float]:
+    """Largest heave, settlement and sideways displacement of the soil that is there [m]. Collective."""
+    fem = staged.fem
+    there = np.repeat(fem.points.material >= 0, fem.points.per_cell)
+    u = fem.evaluate_at(fem.points.coordinates())["displacement"][there]
+    largest = [comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in (u[:, 1], -u[:, 1], np.abs(u[:, 0]))]
+    return dict(zip(("heave_m", "settlement_m", "sideways_m"), largest))
+
+
+def at_once(site: Site, staged: bridge.FemSite, laws: dict | None) -> bridge.QuasiStatic | None:
+    """The soil that is there in the end, placed at once under the last loads and water; None where that is not carried."""
+    alone, state = bridge.FemSite(site.finite_elements(staged.fem.degree, laws)), staged.state
+    stage = bridge.Stage("at once", fill=state.there, unit_weight={tag: state.unit_weight[tag] for tag in state.there},
+                         pressure=state.pressure, pore_pressure=state.pore_pressure)  # fmt: skip
+    try:
+        alone.carry_out(stage)
+    except bridge.StageError:
+        return None
+    return alone.fem
+
+
+def difference(one: bridge.QuasiStatic, other: bridge.QuasiStatic | None) -> float | None:
+    """Largest difference of the stresses at the points, over the largest stress [-]. Collective."""
+    if other is None:
+        return None
+    apart = comm.allreduce(float(np.abs(one.points.stress - other.points.stress).max(initial=0.0)), MPI.MAX)
+    return apart / comm.allreduce(float(np.abs(other.points.stress).max(initial=0.0)), MPI.MAX)
+
+
+def comparison(site: Site, staged: bridge.FemSite) -> dict[str, float | None]:
+    """Staged against built at once, for the soil as it is and for elastic soil. Collective."""
+    elastic = {tag: mpm.LinearElastic(young=law.young, poisson=law.poisson) for tag, law in site.laws.items()
+               if hasattr(law, "young")}  # fmt: skip
+    found = {"difference_to_at_once": difference(staged.fem, at_once(site, staged, None))}
+    changes_laws = any(stage.law for stage in site.stages)
+    if len(elastic) < len(site.laws) or changes_laws:
+        return found  # laws without a Young's modulus have no elastic twin
+    twin = bridge.FemSite(site.finite_elements(staged.fem.degree, elastic))
+    list(bridge.carry_out(twin, site.stages))
+    return {**found, "difference_to_at_once_elastic": difference(twin.fem, at_once(site, twin, elastic))}
+
+
+# --- 3. All together -------------------------------------------------------------------------------------------------
+
+
+def draw(site: Site, rows: list[dict], pictures: list, folder: Path) -> None:
+    """The soil after each stage by displacement and by strain, and movements over the stages; on the first rank.
+
+    Stages before displacements were reset, such as the one that makes the stresses in situ, are left out.
+    """
+    if comm.rank != 0 or not pictures:
+        return
+    first = max((k for k, stage in enumerate(site.stages[: len(rows)]) if stage.reset_displacement), default=0)
+    before = pictures[first - 1].strain if first else 0.0
+    rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
+    save_stages(folder / "stages_displacement.png", pictures, MOVED)
+    save_stages(folder / "stages_strain.png", pictures, SHEAR)
+    curves = {name: [1e3 * row[key] for row in rows] for key, name in
+              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"), ("sideways_m", "largest sideways"))}  # fmt: skip
+    save_over_stages(folder / "movements.png", [row["stage"] for row in rows], curves, "Displacement [mm]")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a: Namespace = parser().parse_args(arguments)
+    start = perf_counter()
+    folder = results_folder("excavation", a.output, comm)
+    site = read_site(a.site, comm, a.cell_size)
+    staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder)
+    draw(site, rows, pictures, folder)
+    compared = comparison(site, staged) if a.compare and stopped is None else {}
+    last = rows[-1] if rows else {}
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped,
+        **{f"last_{key}": last.get(key) for key in ("heave_m", "settlement_m", "sideways_m")}, **compared,
+        "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
+        "wall_seconds": perf_counter() - start,
+    }  # fmt: skip
+    captions = {"stages_displacement": "The soil after each stage, by its displacement",
+                "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
+                "movements": "Largest movements after each stage"}  # fmt: skip
+    write_summary(folder, a, summary, comm, Page(captions=captions))
+    if comm.rank == 0:
+        for name, value in compared.items():
+            print(f"{name.replace('_', ' ')}: {'not carried at once' if value is None else f'{value:.2g}'}")
+        if stopped:
+            print(f"ended early: {stopped}", file=sys.stderr)
+        print(f"results in {folder}")
+    return 1 if stopped else 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, OutputError)
