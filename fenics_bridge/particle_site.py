@@ -127,8 +127,10 @@ class ParticleSite:
                 raise InputError(f"supports: {support} prescribes a displacement, expected only zeros for particles")
             if None not in held:
                 model.fix(support.facet_tag)
-            for axis in np.flatnonzero([v is not None for v in held]) if None in held else ():
-                model.roller(support.facet_tag, np.eye(dim)[axis])
+            else:
+                for axis in range(dim):
+                    if held[axis] is not None:
+                        model.roller(support.facet_tag, np.eye(dim)[axis])
 
     def _load(self, state):
         """Forces of pressures and pore water on the particles; they replace those of the stage before."""

@@ -15,12 +15,14 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.files import OutputError
 from common.options import add_choice, add_number, add_switch, study_parser
 from common.page import Page
 from common.ranks import run_study
+from common.results import ROOT, open_results
 from common.site_file import Site, read_site
 from common.stage_plots import MOVED, SHEAR, StageFiles, save_over_stages, save_stages, stage_picture
-from common.summary import ROOT, OutputError, results_folder, write_summary
+from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -131,7 +133,7 @@ def draw(site: Site, rows: list[dict], pictures: list, folder: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
-    folder = results_folder("excavation", a.output, comm)
+    folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
     staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder)
     draw(site, rows, pictures, folder)
