@@ -1,5 +1,6 @@
 #include "io/checkpoint.h"
 
+#include "io/checkpoint_checks.h"
 #include "io/hdf5_input.h"
 #include "io/stamp.h"
 #include "parallel/redistribution.h"
@@ -122,24 +123,13 @@ std::string put_in_place(const std::filesystem::path& aside, const std::filesyst
   return failure;
 }
 
-/// This rank's rows of an array of which each rank of the file wrote some, on as many ranks as now.
-RowSlice own_rows(Hdf5Input& file, MPI_Comm comm, const std::string& name)
-{
-  int rank = 0, size = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &size);
-  const auto counts = file.read<std::int64_t>("/ranks/rows_of_" + name, {0, size, 0}, 1);
-  RowSlice rows;
-  for (int r = 0; r < rank; ++r)
-    rows.before += counts[static_cast<std::size_t>(r)];
-  rows.local = counts[static_cast<std::size_t>(rank)];
-  return rows;
-}
-
 /// The rows of particles, and the numbers of their cells over all ranks.
 template <int D>
-std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, Particles<D>& particles)
+std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, std::size_t materials,
+                                        Particles<D>& particles)
 {
+  file.read<std::int64_t>("/particles/id", rows, 1); // so many rows are there, before there is room for them
+  file.check();
   resize(particles, static_cast<Index>(rows.local));
   if (file.has("/particles/traction"))
     require_traction(particles);
@@ -148,7 +138,9 @@ std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, P
     if (!file.has("/particles/" + field.name) && (field.name == "traction" || field.name == "state"))
       continue;
     const std::size_t width = field.columns.size();
-    const auto values = file.read<double>("/particles/" + field.name, rows, static_cast<int>(width));
+    auto values = file.read<double>("/particles/" + field.name, rows, static_cast<int>(width));
+    values.resize(static_cast<std::size_t>(rows.local) * width);
+    check_values(file, field.name, values);
     for (std::size_t k = 0; k < width; ++k)
       for (std::size_t p = 0; p < field.columns[k]->size(); ++p)
         (*field.columns[k])[p] = values[p * width + k];
@@ -157,7 +149,10 @@ std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, P
   for_each_integer_field(particles,
                          [&](const std::string& name, auto& column)
                          {
-                           const auto values = file.read<std::int64_t>("/particles/" + name, rows, 1);
+                           auto values = file.read<std::int64_t>("/particles/" + name, rows, 1);
+                           values.resize(static_cast<std::size_t>(rows.local));
+                           if (name == "material")
+                             check_materials(file, values, materials);
                            if (name == "cell")
                              cells = values;
                            else
@@ -234,25 +229,30 @@ Table owned_cells_table(const Mesh<D>& mesh)
 std::vector<GlobalIndex> checkpoint_cells(MPI_Comm comm, const std::filesystem::path& path)
 {
   Hdf5Input file(comm, path);
-  const auto cells =
-      file.read<double>(std::string("/cells/") + owned_cells_name, own_rows(file, comm, owned_cells_name), 1);
+  const std::string array = std::string("/cells/") + owned_cells_name;
+  const auto cells = file.read<double>(array, own_rows(file, comm, owned_cells_name, array), 1);
+  for (double cell : cells)
+    if (!(cell >= 0 && cell < most_exact))
+      file.reject(array, "it has the cell " + std::to_string(cell));
   file.check();
   return {cells.begin(), cells.end()};
 }
 
 template <int D>
 Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
-                              std::size_t state_columns, const StateTables& expected)
+                              std::size_t state_columns, std::size_t materials, const StateTables& expected)
 {
   Hdf5Input file(exchange.comm, path);
-  const GlobalIndex ranks = file.shape("/ranks/rows_of_particles").first;
+  const GlobalIndex ranks = countable_rows(file, "/ranks/rows_of_particles");
+  const GlobalIndex total = countable_rows(file, "/particles/id");
   Checkpoint<D> checkpoint;
   Particles<D>& particles = checkpoint.particles;
   particles.state.resize(state_columns);
   checkpoint.same_parts = false;
   if (ranks == exchange.size)
   {
-    const auto cells = read_particles(file, own_rows(file, exchange.comm, "particles"), particles);
+    const RowSlice rows = own_rows(file, exchange.comm, "particles", "/particles/id");
+    const auto cells = read_particles(file, rows, materials, particles);
     file.check();
     checkpoint.same_parts = are_same_parts(exchange, mesh, cells, particles);
   }
@@ -260,21 +260,36 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
   {
     particles = {};
     particles.state.resize(state_columns);
-    const GlobalIndex total = file.shape("/particles/id").first;
     const GlobalIndex first = total * exchange.rank / exchange.size, last = total * (exchange.rank + 1) / exchange.size;
-    const auto cells = read_particles(file, {first, last - first, total}, particles);
+    const auto cells = read_particles(file, {first, last - first, total}, materials, particles);
     file.check();
-    redistribute<D>(mesh, exchange, cells, particles);
+    try
+    {
+      redistribute<D>(mesh, exchange, cells, particles);
+    }
+    catch (const RunError& error)
+    {
+      throw RunError("cannot read /particles/cell in " + path.string() + ": " + error.what());
+    }
   }
   checkpoint.state = expected;
   const RowSlice rows = checkpoint.same_parts ? RowSlice{exchange.rank, 1, ranks} : RowSlice{0, ranks, ranks};
   for (Table& table : checkpoint.state.ranks)
+  {
     table.values = file.read<double>("/ranks/" + table.name, rows, table.width);
+    check_totals(file, table, static_cast<std::size_t>(rows.local));
+  }
   if (!checkpoint.same_parts)
     checkpoint.state.cells.clear();
   std::erase_if(checkpoint.state.cells, [&](const Table& table) { return !file.has("/cells/" + table.name); });
   for (Table& table : checkpoint.state.cells)
-    table.values = file.read<double>("/cells/" + table.name, own_rows(file, exchange.comm, table.name), table.width);
+  {
+    const std::string array = "/cells/" + table.name;
+    table.values = file.read<double>(array, own_rows(file, exchange.comm, table.name, array), table.width);
+    check_cells(file, mesh, table);
+    if (table.name == "traction_moments" && !file.has("/particles/traction"))
+      file.reject(array, "the particles have no traction");
+  }
   file.check();
   return checkpoint;
 }
@@ -310,7 +325,7 @@ std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh)
   template void write_checkpoint(MPI_Comm, const std::filesystem::path&, const Mesh<D>&, const Particles<D>&,          \
                                  const StateTables&, const std::string&);                                              \
   template Checkpoint<D> read_checkpoint(const NodeExchange&, const std::filesystem::path&, const Mesh<D>&,            \
-                                         std::size_t, const StateTables&);                                             \
+                                         std::size_t, std::size_t, const StateTables&);                                \
   template Table owned_cells_table(const Mesh<D>&);                                                                    \
   template std::uint64_t mesh_fingerprint(MPI_Comm, const Mesh<D>&);
 INSTANTIATE(2)

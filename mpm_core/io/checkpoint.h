@@ -58,12 +58,13 @@ struct Checkpoint
 
 /// Reads a checkpoint of this mesh, each rank the particles in its cells.
 /// @param state_columns  number of state variables
+/// @param materials      number of laws
 /// @param expected       names and widths of the tables to read; those of cells may be missing in the file
 /// @throws RunError on all ranks, with path and reason
 /// @note Collective
 template <int D>
 Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
-                              std::size_t state_columns, const StateTables& expected);
+                              std::size_t state_columns, std::size_t materials, const StateTables& expected);
 
 /// A number that depends on all nodes, cells and tags of a mesh, and not on its partition.
 /// @note Collective

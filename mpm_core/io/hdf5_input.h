@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// A parallel HDF5 file that all ranks read together.
+/// An HDF5 file that all ranks read together. What it says of itself is not believed: a file may come from anywhere.
 
 #include "io/hdf5_file.h"
 
@@ -27,17 +27,22 @@ public:
   /// This rank's rows of an array.
   /// @param rows   which rows; `total` is not used
   /// @param width  values per row that the array must have
-  /// @return (rows.local, width) row-major; T is double or std::int64_t
+  /// @return (rows.local, width) row-major, T is double or std::int64_t; after a failure of any length
   template <class T>
   std::vector<T> read(const std::string& name, const RowSlice& rows, int width);
 
   /// A text that `Hdf5File::write_text` wrote.
   std::string read_text(const std::string& name);
 
+  /// Takes note of content that cannot be; `check` raises the first of such notes.
+  void reject(const std::string& name, const std::string& reason);
+
   /// @throws RunError on all ranks if anything failed on any, with path and reason
   void check();
 
 private:
+  /// Bytes that the values of an array take in the file, and no more than the file has.
+  std::int64_t stored_bytes(const std::string& name);
   void note(bool succeeded, const std::string& doing);
 
   MPI_Comm _comm;

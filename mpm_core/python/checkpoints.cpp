@@ -25,7 +25,7 @@ void restore(Model<D>& model, const std::string& path)
 {
   const StateTables expected{rank_state(model), empty_cell_state<D>()};
   Checkpoint<D> checkpoint =
-      read_checkpoint<D>(model.exchange, path, model.mesh, model.particles.state.size(), expected);
+      read_checkpoint<D>(model.exchange, path, model.mesh, model.particles.state.size(), model.laws.size(), expected);
   if (checkpoint.same_parts)
     restore_same(model, std::move(checkpoint.particles), checkpoint.state.ranks, checkpoint.state.cells);
   else
@@ -43,8 +43,8 @@ void bind(py::module_& m)
 
 void bind_checkpoints(py::module_& m)
 {
-  m.def("checkpoint_description",
-        [](std::uintptr_t comm, const std::string& path) { return checkpoint_description(communicator(comm), path); });
+  m.def("checkpoint_description", [](std::uintptr_t comm, const std::string& path)
+        { return py::bytes(checkpoint_description(communicator(comm), path)); }); // bytes: it may be no text
   m.def("checkpoint_cells", [](std::uintptr_t comm, const std::string& path)
         { return copied(checkpoint_cells(communicator(comm), path)); });
   bind<2>(m);

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from . import _core, partition
 from ._core import InputError, RunError
 from .collective import collectively
+from .description import parsed
 from .fingerprint import fingerprint
 from .implicit import StepControl
 
@@ -43,14 +44,7 @@ def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.CO
         Collective.
     """
     name = os.fspath(path)
-    return _parsed(name, _core.checkpoint_description(MPI._addressof(comm), name))
-
-
-def _parsed(path: str, text: str) -> dict[str, Any]:
-    try:
-        return json.loads(text)
-    except ValueError as error:
-        raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
+    return parsed(name, _core.checkpoint_description(MPI._addressof(comm), name))
 
 
 def restore(model: Model, path: str | os.PathLike[str]) -> None:
@@ -61,6 +55,8 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     collectively(model.comm, lambda: _compare(name, there, here))
     if there.get("cuts") and there["ranks"] == model.comm.size:
         cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
+        if not partition.is_partition(model, cells):
+            raise RunError(f"cannot read /cells/owned_cells in {name}: it has not each cell of the mesh once")
         partition.take_partition(model, cells)
         model.cuts = there["cuts"]
     _core.restore(model._core, name)

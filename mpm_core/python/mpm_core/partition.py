@@ -56,6 +56,14 @@ def cut_anew(body: Body) -> None:
     body._left_imbalance = imbalance(body)
 
 
+def is_partition(body: Body, cells: NDArray) -> bool:
+    """Whether each cell of the mesh is among the numbers that the ranks give, once. Collective."""
+    mesh, comm = body.mesh, body.comm
+    ranks, _ = found(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
+    missing = comm.allreduce(int((ranks < 0).sum()))
+    return missing == 0 and comm.allreduce(len(cells)) == comm.allreduce(mesh.owned_cells)
+
+
 def take_partition(body: Body, cells: NDArray) -> None:
     """Bring the model to a partition, given by the numbers of the cells that this rank is to own, in their order. Collective."""
     mesh, comm = body.mesh, body.comm

@@ -1,0 +1,87 @@
+"""The description in a checkpoint, checked entry by entry: a file may come from anywhere."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+from ._core import RunError
+
+
+def parsed(path: str, text: bytes) -> dict[str, Any]:
+    """The entries of a description.
+
+    Raises:
+        RunError: it is no UTF-8 or no JSON, or an entry is missing or of another kind; names the file and the entry.
+    """
+    try:
+        there = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
+    if not isinstance(there, dict):
+        raise RunError(f"cannot read checkpoint {path}: its description is no table of entries")
+    for name, (is_right, expected) in _EXPECTED.items():
+        if name not in there and name in _OPTIONAL:
+            continue
+        if not is_right(there.get(name)):
+            raise RunError(
+                f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, expected {expected}"
+            )
+    last = len(there["supports"])
+    if not all(name.lstrip("-").isdigit() and _is_count(k) and k < last for name, k in there["prescribed"].items()):
+        raise RunError(f"cannot read checkpoint {path}: prescribed in its description names supports that are not there")
+    return there
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**62
+
+
+def _is_tag(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**31
+
+
+def _are(kind: Callable[[Any], bool], value: Any) -> bool:
+    return isinstance(value, list) and all(map(kind, value))
+
+
+def _is_support(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 3 and _is_tag(value[0]) and isinstance(value[1], bool) and (
+        _are(_is_number, value[2]) and len(value[2]) in (0, 2, 3)
+    )
+
+
+def _is_control(value: Any) -> bool:
+    if value is None:
+        return True
+    return (
+        isinstance(value, dict) and {"longest", "length"} <= set(value) <= {"longest", "length", "iterations", "cuts"}
+        and all(_is_number(one) and one >= 0 for one in value.values())
+    )
+
+
+_OPTIONAL = ("cuts", "left_imbalance", "implicit", "notes")
+_EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
+    "time": (_is_number, "a number [s]"),
+    "steps": (_is_count, "a whole number from 0 on"),
+    "dimension": (lambda v: v in (2, 3), "2 or 3"),
+    "mesh": (lambda v: isinstance(v, str), "a text"),
+    "materials": (lambda v: _are(lambda one: isinstance(one, str), v), "a list of texts"),
+    "gravity": (lambda v: _are(_is_number, v) and len(v) in (2, 3), "2 or 3 numbers [m/s2]"),
+    "gravity_ramp": (lambda v: _is_number(v) and v >= 0, "a number from 0 on [s]"),
+    "outflow_tags": (lambda v: _are(_is_tag, v), "a list of tags"),
+    "supports": (lambda v: _are(_is_support, v), "a list of [tag, whole, vector]"),
+    "prescribed": (lambda v: isinstance(v, dict), "a table"),
+    "next_id": (_is_count, "a whole number from 0 on"),
+    "cuts": (_is_count, "a whole number from 0 on"),
+    "left_imbalance": (_is_number, "a number"),
+    "implicit": (_is_control, "null, or the state of an implicit run"),
+    "notes": (lambda v: isinstance(v, dict), "a table"),
+}

@@ -1,0 +1,143 @@
+"""Checkpoints with a right stamp and wrong content end in an error that names the place, on all ranks alike."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from partitions import all_by_id, sliding_slope
+from test_checkpoint import mixed
+
+import mpm_core as mpm
+
+
+def stamped(path):
+    """Give a file the stamp of its content, as docs/checkpoints.md describes it."""
+    data = bytearray(path.read_bytes())
+    rest = bytes(data[512:]) + bytes(-len(data) % 8)
+    words = np.frombuffer(rest, dtype="<u8")
+    checksum = int(np.sum(mixed(words ^ mixed(np.arange(len(words), dtype=np.uint64))), dtype=np.uint64))
+    stamp = f"talus checkpoint\nformat 1\nbytes {len(data)}\nchecksum {checksum:016x}\n".encode()
+    data[:512] = stamp + bytes(512 - len(stamp))
+    path.write_bytes(data)
+
+
+def placed(name, row, value):
+    def change(file):
+        file[name][row] = value
+
+    return change
+
+
+def described(**entries):
+    def change(file):
+        text = json.loads(file.attrs["description"])
+        file.attrs["description"] = np.bytes_(json.dumps({**text, **entries}).encode())
+
+    return change
+
+
+def replaced(name, shape, dtype=np.int64):
+    """A dataset that claims a size and holds nothing."""
+
+    def change(file):
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype=dtype)
+
+    return change
+
+
+def not_utf8(file):
+    file.attrs["description"] = np.bytes_(b'{"program": "\xff\xfe"}')
+
+
+def without(name):
+    def change(file):
+        del file[name]
+
+    return change
+
+
+HOSTILE = {
+    "not UTF-8": (not_utf8, "description is damaged"),
+    "no table": (lambda file: file.attrs.__setitem__("description", np.bytes_(b"[1]")), "description is no table"),
+    "a number for a text": (lambda file: file.attrs.__setitem__("description", 3.0), "description"),
+    "time": (described(time="soon"), "time in its description"),
+    "ranks": (described(ranks=0), "ranks in its description"),
+    "gravity": (described(gravity=[1e400, 0]), "gravity in its description"),
+    "supports": (described(supports=[[1, True]]), "supports in its description"),
+    "prescribed": (described(prescribed={"2": 99}), "prescribed in its description"),
+    "implicit": (described(implicit={"pace": 1}), "implicit in its description"),
+    "huge number of particles": (replaced("particles/id", (2**40,)), "/particles/id"),
+    "particles that are not stored": (replaced("particles/id", (2**30,)), "/particles/id"),
+    "huge number of ranks": (replaced("ranks/rows_of_particles", (2**40,)), "/ranks/rows_of_particles"),
+    "material": (placed("particles/material", 3, 7), "/particles/material in .* the number 7"),
+    "negative material": (placed("particles/material", 0, -1), "/particles/material in .* the number -1"),
+    "cell": (placed("particles/cell", 5, 10**9), "in cell 1000000000, which no rank has"),
+    "negative cell": (placed("particles/cell", 5, -4), "in cell -4, which no rank has"),
+    "position": (placed("particles/position", 2, np.nan), "/particles/position in .* nan"),
+    "mass": (placed("particles/mass", 2, 0.0), "/particles/mass in .* 0.0"),
+    "negative rows": (placed("ranks/rows_of_particles", 0, -5), "/ranks/rows_of_particles"),
+    "too many rows": (placed("ranks/rows_of_particles", 0, 2**60), "/ranks/rows_of_particles"),
+    "a cell of sums": (placed("cells/moments", (0, 0), 1e9), "/cells/moments in .* cell 1000000000"),
+    "a sum": (placed("cells/moments", (0, 1), np.inf), "/cells/moments in .* inf"),
+    "total": (placed("ranks/steps", 0, np.nan), "/ranks/steps in .* nan"),
+    "a field that is missing": (without("particles/stress"), "/particles/stress"),
+}
+
+
+@pytest.mark.parametrize("change, message", HOSTILE.values(), ids=HOSTILE)
+def test_wrong_content_is_named(comm, shared_path, change, message):
+    path = shared_path / "state.h5"
+    model = sliding_slope(comm)
+    model.save(path)
+    if comm.rank == 0:
+        with h5py.File(path, "r+") as file:
+            change(file)
+        stamped(path)
+    comm.barrier()
+    before = all_by_id(model)["position"]
+    with pytest.raises(mpm.RunError, match=message) as raised:
+        model.restore(path)
+    assert len(set(comm.allgather(str(raised.value)))) == 1 and "state.h5" in str(raised.value)
+    np.testing.assert_array_equal(all_by_id(model)["position"], before)
+
+
+@pytest.mark.parametrize("cell", [-1.0, 1e9, np.nan, 0.0])
+def test_a_partition_that_is_none_is_refused(comm, shared_path, cell):
+    path = shared_path / "state.h5"
+    model = sliding_slope(comm)
+    list(model.explicit(0.01))
+    model.cuts = 1  # as after the mesh was partitioned anew
+    model.save(path)
+    if comm.rank == 0:
+        with h5py.File(path, "r+") as file:
+            file["cells/owned_cells"][1:3] = cell
+        stamped(path)
+    comm.barrier()
+    with pytest.raises(mpm.RunError, match="/cells/owned_cells"):
+        model.restore(path)
+
+
+def test_what_has_its_stamp_anew_and_is_right_is_taken(comm, shared_path):
+    path = shared_path / "state.h5"
+    model = sliding_slope(comm)
+    model.save(path)
+    comm.barrier()
+    if comm.rank == 0:
+        stamped(path)
+    comm.barrier()
+    model.restore(path)
+
+
+def test_a_long_path_can_be_read_too(comm, shared_path):
+    folder = shared_path
+    while len(str(folder)) < 450:
+        folder = folder / ("x" * 60)
+    if comm.rank == 0:
+        folder.mkdir(parents=True)
+    comm.barrier()
+    model = sliding_slope(comm)
+    model.save(folder / "state.h5")
+    model.restore(folder / "state.h5")
+    assert mpm.checkpoint_description(folder / "state.h5", comm)["ranks"] == comm.size
