@@ -17,6 +17,8 @@ namespace
 constexpr std::int64_t table_size = 4096;
 /// HDF5 sets aside so many bytes at once for tables, so that they lie together, before the values.
 constexpr std::int64_t table_block = 1 << 13;
+/// Open MPI 4 aborts a little above 240 characters: it puts the path, and more, into a buffer of 256.
+constexpr std::size_t longest_mpi_path = 200;
 
 /// Reserves space on the disk for the first bytes of a file, which is created if it is not there. A disk that fills up
 /// while HDF5 writes leaves a file that HDF5 cannot even close. File systems that cannot reserve are taken at their
@@ -63,6 +65,9 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, in
   _by_mpi = _compression > 0 && size > 1;
   if (!is_same_on_all_ranks(_comm, _path))
     _failure = "path is not the same on all ranks; here: " + _path.string();
+  if (_by_mpi && _path.string().size() > longest_mpi_path)
+    note_obstacle("several ranks can compress only under a path of at most " + std::to_string(longest_mpi_path) +
+                  " characters; it has " + std::to_string(_path.string().size()));
   check();
   const Quiet quiet;
   if ((_rank == 0 || _by_mpi) && has_room(table_block))

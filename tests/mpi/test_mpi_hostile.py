@@ -5,6 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from mpm_core.output import ModelOutput
 from partitions import all_by_id, sliding_slope
 from test_checkpoint import mixed
 
@@ -141,3 +142,6 @@ def test_a_long_path_can_be_read_too(comm, shared_path):
     model.save(folder / "state.h5")
     model.restore(folder / "state.h5")
     assert mpm.checkpoint_description(folder / "state.h5", comm)["ranks"] == comm.size
+    if comm.size > 1:  # MPI's own files have no such paths
+        with pytest.raises(mpm.RunError, match="only under a path of at most 200 characters; it has"):
+            ModelOutput(model, folder / "particles", folder / "mesh", compression=1).write()
