@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import signal
-import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -28,8 +26,8 @@ with _own_ctrl_c():
 
 _SIMPLEX = {2: "triangles", 3: "tetrahedra"}
 _GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh
-REFUSED = 3
-"""Exit code of the process when the mesh cannot be used; the reason is on its standard error."""
+REFUSED, TOO_LARGE = 3, 4
+"""Exit codes of the process when the mesh cannot be used, the reason is on its standard error, and when it needs more memory."""
 
 
 class MeshError(Exception):
@@ -140,11 +138,3 @@ def _check_cells(nodes, dim):
         lower = dim == 3 and len(gmsh.model.mesh.getElements(2)[0]) > 0
         detail = ", its cells have dimension 2" if lower else ""
         raise MeshError(f"has no cells of dimension {dim}{detail}")
-
-
-if __name__ == "__main__":
-    try:
-        np.savez(sys.argv[3], **read_file(Path(sys.argv[1]), int(sys.argv[2])))
-    except MeshError as refused:
-        print(refused, file=sys.stderr)
-        sys.exit(REFUSED)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -12,25 +10,34 @@ import numpy as np
 
 from fenics_bridge import gmsh_reader
 from fenics_bridge.errors import InputError, agree, on_root
+from fenics_bridge.gmsh_process import Limits, read_apart
 from fenics_bridge.mesh_checks import check_cells_fit
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 
-def read_mesh(path, comm, dim=2, parameters=None):
+TIME_LIMIT = 600.0
+"""[s] that gmsh may take for a file, unless told otherwise"""
+
+
+def read_mesh(path, comm, dim=2, parameters=None, *, time_limit=TIME_LIMIT, memory_limit=None, allow_commands=False):
     """Mesh and tags from a file of gmsh; rank 0 reads, DOLFINx partitions.
 
     path: .msh (any version that gmsh reads) or .geo (meshed here)
     comm: MPI communicator; dim: 2 for triangles in the plane z = 0, 3 for tetrahedra
     parameters: for .geo, values for its `DefineConstant` names, e.g. {"cell_size": 0.1}
+    time_limit: [s] that gmsh may take; memory_limit: bytes that it may take, by default half of the machine's memory
+    allow_commands: let a .geo file run commands by `SystemCall`; it is a program, so trust it first
     Returns (domain, cell_tags, facet_tags). Tags are gmsh's physical groups, whose names stand for them wherever a tag
     is asked for. When the file has physical groups of dimension `dim`, only their cells belong to the mesh, as when
     gmsh saves a mesh; otherwise all do, untagged. Nodes at one place are merged, so that soils hold together.
     Raises InputError, on all ranks, for a file that is missing or cannot be read, another extension, a mesh without
-    cells, of another dimension, with quadrilaterals or hexahedra, or with curved (second-order) elements.
+    cells, of another dimension, with quadrilaterals or hexahedra, or with curved (second-order) elements; one that runs
+    commands, or that takes more time or memory than it may.
     Collective.
     """
     _check_arguments(comm, path, dim, parameters)
-    arrays = on_root(comm, lambda: _arrays_from_file(Path(path), dim, parameters or {}))
+    limits = Limits(time_limit, memory_limit, allow_commands)
+    arrays = on_root(comm, lambda: _arrays_from_file(Path(path), dim, parameters or {}, limits))
     return distributed_mesh(comm, arrays if arrays is not None else empty_arrays(dim), dim)
 
 
@@ -55,7 +62,7 @@ def _check_arguments(comm, path, dim, parameters):
     agree(comm, message)
 
 
-def _arrays_from_file(path, dim, parameters):
+def _arrays_from_file(path, dim, parameters, limits):
     if not path.is_file():
         raise InputError(f"path: there is no file {str(path)!r}")
     try:
@@ -66,24 +73,9 @@ def _arrays_from_file(path, dim, parameters):
         raise InputError(f"path: {str(path)!r} is not a gmsh mesh (it does not begin with $MeshFormat)")
     constants = _constants(parameters, text, path)
     with tempfile.TemporaryDirectory() as folder:
-        arrays = _read_apart(_with_constants(path, constants, folder), dim, Path(folder) / "arrays.npz", str(path))
+        given = _with_constants(path, constants, folder)
+        arrays = read_apart(given, dim, Path(folder) / "arrays.npz", str(path), limits)
     return _mesh_arrays(arrays, str(path))
-
-
-def _read_apart(path, dim, result, name):
-    """What `gmsh_reader.read_file` gives, by a process of its own."""
-    reader = subprocess.run([sys.executable, gmsh_reader.__file__, str(path), str(dim), str(result)],
-                            stdin=subprocess.DEVNULL, capture_output=True, text=True)  # fmt: skip
-    if reader.returncode == gmsh_reader.REFUSED:
-        raise InputError(f"path: {name!r}: {reader.stderr.strip()}")
-    if reader.returncode != 0:
-        how = f"signal {-reader.returncode}" if reader.returncode < 0 else f"code {reader.returncode}"
-        last = reader.stderr.strip().rsplit("\n", 1)[-1]
-        raise InputError(
-            f"path: gmsh crashed while it read {name!r} ({how}{': ' + last if last else ''}); it is damaged"
-        )
-    with np.load(result) as arrays:
-        return dict(arrays)
 
 
 def _mesh_arrays(arrays, name):

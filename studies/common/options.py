@@ -223,7 +223,9 @@ def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str
     action.runs_code = True  # type: ignore[attr-defined]
     if "--allow-code" not in parser._option_string_actions:
         add_flag(
-            parser, "--allow-code", "run the code that a file of parameters or a checkpoint names; see docs/safety.md"
+            parser,
+            "--allow-code",
+            "run the code that a file of parameters or a checkpoint names; see docs/howto/trust.md",
         )
 
 

@@ -1,0 +1,89 @@
+"""The process that reads a mesh by gmsh: bounded in memory, without the right to start programs, and gone with its parent.
+
+A .geo file is a program: `SystemCall` runs commands. A damaged .msh makes gmsh read for ever, or take all memory.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import resource
+import sys
+import threading
+from pathlib import Path
+
+import gmsh_reader  # beside this file, which is started as a script
+import numpy as np
+
+ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.EPERM
+"""SCMP_ACT_ALLOW and SCMP_ACT_ERRNO(EPERM) of libseccomp"""
+
+
+def end_with_parent():
+    """End this process when the parent has: then its end of our standard input is closed, however it ended."""
+
+    def wait():
+        while os.read(0, 1024):  # not sys.stdin, whose lock would be held when this process ends
+            pass
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def limit_memory(size):
+    """No more than `size` bytes of address space beyond what is used by now."""
+    used = (
+        int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if sys.platform == "linux" else 0
+    )
+    resource.setrlimit(resource.RLIMIT_AS, (used + size, used + size))
+
+
+def forbid_programs():
+    """From now on this process and its children cannot start programs. Returns whether the system can do that."""
+    try:
+        library = ctypes.CDLL("libseccomp.so.2")
+    except OSError:
+        return False
+    library.seccomp_init.restype = ctypes.c_void_p
+    rules = ctypes.c_void_p(library.seccomp_init(ctypes.c_uint32(ALLOW)))
+    for name in (b"execve", b"execveat"):
+        number = library.seccomp_syscall_resolve_name(name)
+        if library.seccomp_rule_add(rules, ctypes.c_uint32(REFUSE), number, 0) != 0:
+            return False
+    return library.seccomp_load(rules) == 0
+
+
+def children():
+    """What the children of this process have used. It changes when one is started, even if it could not become a program."""
+    return tuple(resource.getrusage(resource.RUSAGE_CHILDREN))
+
+
+def mentions_system_call(path):
+    return path.suffix.lower() == ".geo" and b"SystemCall" in path.read_bytes()
+
+
+def main(path, dim, result, memory, allow_commands):
+    end_with_parent()
+    limit_memory(int(memory))
+    confined = allow_commands == "no" and forbid_programs()
+    before = children()
+    refused = "it runs commands by SystemCall; allow_commands=True lets it, if you trust it"
+    if allow_commands == "no" and not confined and mentions_system_call(path):
+        raise gmsh_reader.MeshError(refused)
+    try:
+        arrays = gmsh_reader.read_file(path, int(dim))
+    except MemoryError:
+        sys.exit(gmsh_reader.TOO_LARGE)
+    finally:
+        if confined and children() != before:
+            raise gmsh_reader.MeshError(refused)
+    np.savez(result, **arrays)
+
+
+if __name__ == "__main__":
+    try:
+        main(Path(sys.argv[1]), *sys.argv[2:])
+    except gmsh_reader.MeshError as error:
+        print(error, file=sys.stderr)
+        sys.exit(gmsh_reader.REFUSED)
