@@ -13,7 +13,7 @@ import sys
 import threading
 from pathlib import Path
 
-import gmsh_reader  # beside this file, which is started as a script
+import gmsh_reader  # type: ignore[import]  # beside this file, which is started as a script
 import numpy as np
 
 ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.EPERM

@@ -65,6 +65,7 @@ def _ran(path, dim, result, name, limits):
         ) from None
     finally:
         reader.kill()
-        reader.stdin.close()
+        if reader.stdin is not None:
+            reader.stdin.close()
         reader.wait()
     return code, errors.read_text(errors="replace").strip()

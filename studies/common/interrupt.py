@@ -1,7 +1,8 @@
 """Ctrl-C and SIGTERM end a run cleanly: the loop sees a flag, and the results so far are written.
 
-So does the end of the terminal (SIGHUP), unless nohup keeps it away, and SIGUSR1, which mpirun hands on to its ranks;
-`studies/run --ranks` turns the others into it, since mpirun itself kills its ranks a second after Ctrl-C.
+So does the end of the terminal (SIGHUP), unless nohup keeps it away, and what schedulers send before the time is up: SIGUSR1,
+which mpirun hands on to its ranks, SIGUSR2 and SIGXCPU. `studies/run --ranks` turns the others into SIGUSR1, since mpirun
+itself kills its ranks a second after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -9,15 +10,19 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import time
 from types import FrameType
 
 from mpi4py import MPI
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU, signal.SIGHUP)
+AGAIN = 3.0
+"""Seconds after which a second signal is one of its own: a scheduler signals the ranks, mpirun and its shell, and each hands on"""
 
 
 class Interrupt:
-    """Catches the first of these signals while the context lasts; a second one, but SIGHUP, ends the program at once.
+    """Catches the first of these signals while the context lasts. `AGAIN` seconds later and more, another Ctrl-C or SIGTERM ends
+    the program at once.
 
     Example:
         >>> with Interrupt() as interrupt:
@@ -31,17 +36,22 @@ class Interrupt:
         self._comm = comm
         # Set by the handler alone: were the exchange to set it too, a signal that comes in its middle would be lost.
         self._caught = 0
+        self._when = 0.0
         self._agreed = 0  # what came on any rank, as far as all know of it
         self._before: dict[int, object] = {}
 
     def _catch(self, number: int, _: FrameType | None) -> None:
-        self._caught = number
-        if number != signal.SIGHUP:  # which a shell repeats to its jobs
-            self._restore()  # so that the next one has its usual effect
+        if self._caught:
+            if number in (signal.SIGINT, signal.SIGTERM) and time.monotonic() - self._when > AGAIN:
+                self._restore()
+                os.kill(os.getpid(), number)
+            return
+        self._caught, self._when = number, time.monotonic()
         if self._comm.rank == 0:
             # Past Python's buffer, which the signal may have found half-way through another line.
+            text = "ending after this step and writing what there is; again, some seconds later, to end at once"
             with contextlib.suppress(OSError):
-                os.write(2, b"\ninterrupted: ending after this step and writing what there is; again to end at once\n")
+                os.write(2, f"\ninterrupted: {text}\n".encode())
 
     def requested(self) -> bool:
         """Whether the run should end; true on all ranks once a signal came on any.

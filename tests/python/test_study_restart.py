@@ -87,7 +87,17 @@ def test_a_restart_on_two_ranks(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_an_interrupted_slope_leaves_a_checkpoint(tmp_path, number):
-    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    command = [
+        sys.executable,
+        str(STUDIES / "slope.py"),
+        "--output",
+        str(tmp_path),
+        *SMALL,
+        "--time",
+        "1e4",
+        "--frames",
+        "100000",
+    ]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (tmp_path / "history.csv").exists() and child.poll() is None:
         time.sleep(0.05)
@@ -116,7 +126,9 @@ def stopped_with_a_checkpoint(folder):
 @pytest.mark.parametrize("ranks", [[], ["--ranks", "2"]], ids=["alone", "ranks"])
 def test_ctrl_c_that_ends_the_reader_too_leaves_a_checkpoint(tmp_path, ranks):
     folder = tmp_path / "slope"
-    study = shlex.join([str(STUDIES / "run"), *ranks, "slope", "--output", str(folder), *SMALL, "--time", "1e4"])
+    study = shlex.join(
+        [str(STUDIES / "run"), *ranks, "slope", "--output", str(folder), *SMALL, "--time", "1e4", "--frames", "1000"]
+    )
     shell = subprocess.Popen(["bash", "-o", "pipefail", "-c", f"{study} 2>&1 | tee '{tmp_path}/log'"],
                              stdout=subprocess.PIPE, text=True, start_new_session=True, env=ENVIRONMENT)  # fmt: skip
     while not rows_are_there(folder) and shell.poll() is None:
@@ -132,7 +144,11 @@ def test_the_end_of_the_terminal_leaves_a_checkpoint(tmp_path, ranks):
     child, terminal = pty.fork()
     if child == 0:
         study = str(STUDIES / "run")
-        os.execve(study, [study, *ranks, "slope", "--output", str(tmp_path), *SMALL, "--time", "1e4"], ENVIRONMENT)
+        os.execve(
+            study,
+            [study, *ranks, "slope", "--output", str(tmp_path), *SMALL, "--time", "1e4", "--frames", "1000"],
+            ENVIRONMENT,
+        )
     deadline = time.monotonic() + 60
     while not rows_are_there(tmp_path) and time.monotonic() < deadline:
         if select.select([terminal], [], [], 0.05)[0]:
@@ -252,7 +268,17 @@ def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
 
 
 def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
-    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    command = [
+        sys.executable,
+        str(STUDIES / "slope.py"),
+        "--output",
+        str(tmp_path),
+        *SMALL,
+        "--time",
+        "1e4",
+        "--frames",
+        "100000",
+    ]
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while not rows_are_there(tmp_path) and child.poll() is None:
         time.sleep(0.05)
@@ -266,7 +292,17 @@ def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
 
 
 def test_a_second_run_in_the_folder_is_refused_while_the_first_goes_on(tmp_path):
-    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(tmp_path), *SMALL, "--time", "1e4"]
+    command = [
+        sys.executable,
+        str(STUDIES / "slope.py"),
+        "--output",
+        str(tmp_path),
+        *SMALL,
+        "--time",
+        "1e4",
+        "--frames",
+        "100000",
+    ]
     first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while not rows_are_there(tmp_path) and first.poll() is None:
         time.sleep(0.05)

@@ -31,12 +31,16 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
             )
     last = len(there["supports"])
     if not all(name.lstrip("-").isdigit() and _is_count(k) and k < last for name, k in there["prescribed"].items()):
-        raise RunError(f"cannot read checkpoint {path}: prescribed in its description names supports that are not there")
+        raise RunError(
+            f"cannot read checkpoint {path}: prescribed in its description names supports that are not there"
+        )
     return there
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
+    )
 
 
 def _is_count(value: Any) -> bool:
@@ -52,8 +56,12 @@ def _are(kind: Callable[[Any], bool], value: Any) -> bool:
 
 
 def _is_support(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 3 and _is_tag(value[0]) and isinstance(value[1], bool) and (
-        _are(_is_number, value[2]) and len(value[2]) in (0, 2, 3)
+    return (
+        isinstance(value, list)
+        and len(value) == 3
+        and _is_tag(value[0])
+        and isinstance(value[1], bool)
+        and (_are(_is_number, value[2]) and len(value[2]) in (0, 2, 3))
     )
 
 
@@ -61,7 +69,8 @@ def _is_control(value: Any) -> bool:
     if value is None:
         return True
     return (
-        isinstance(value, dict) and {"longest", "length"} <= set(value) <= {"longest", "length", "iterations", "cuts"}
+        isinstance(value, dict)
+        and {"longest", "length"} <= set(value) <= {"longest", "length", "iterations", "cuts"}
         and all(_is_number(one) and one >= 0 for one in value.values())
     )
 
