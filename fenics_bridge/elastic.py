@@ -106,9 +106,7 @@ def solve_nearly_incompressible(
         return (ufl.inner(stress, strain(v)) - q * ufl.div(u) - flexibility * p * q) * ufl.dx
 
     load = elastic_load(v, domain, facet_tags, unit_weight, traction or {})
-    both = _solved(
-        space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix, factor="mumps"
-    )
+    both = _solved(space, constraints, internal(*trial), lambda w: load - internal(*ufl.split(w)), options_prefix)
     moved, pressed = ufl.split(both)
     u = both.sub(0).collapse()
     u.name = "displacement"
@@ -121,15 +119,16 @@ def _mixed_stress(u, p, shear):
     return ufl.as_vector([2 * shear * e[i] - p for i in range(3)] + [shear * e[i] for i in range(3, e.ufl_shape[0])])
 
 
-def _solved(space, constraints, tangent, residual_of, options_prefix, factor=None):
+def _solved(space, constraints, tangent, residual_of, options_prefix):
     """Solution of a linear problem: from the supports' displacements, one correction by the tangent."""
     solution, increment = fem.Function(space), fem.Function(space)
     solution.x.array[constraints.dofs] = constraints.values
     residual = assembled(fem.form(residual_of(solution)), space)
     residual.array[constraints.dofs] = 0.0
     matrix = Stiffness(tangent, space, constraints).assembled()
-    if not LinearSolver(space, options_prefix, factor).solve(matrix, residual, increment):
-        raise RuntimeError("the linear solver failed; do the supports hold the body?")
+    failure = LinearSolver(space, options_prefix).solve(matrix, residual, increment)
+    if failure:
+        raise RuntimeError(failure)
     solution.x.array[:] += increment.x.array
     return solution
 

@@ -58,7 +58,7 @@ class EquilibriumStep:
         self._external, self._before = external, before
         self.scale = scale
         self.reason = ""
-        """Why the last move could not be made"""
+        """Why the last correction or move could not be made"""
         self._moved = body.constraints.at(displacement) - body.solution.x.array[self._fixed]
         self._base = np.zeros_like(body.increment.x.array)
         self._correction = fem.Function(self._space)
@@ -75,9 +75,10 @@ class EquilibriumStep:
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def correction(self):
-        """Solve the tangent system for the residual; tells whether that worked."""
+        """Solve the tangent system for the residual; tells whether that worked, else `reason` says why not."""
         matrix = self._body.kinematics.stiffness()
-        return self._body.solver.solve(matrix, self._residual_vector, self._correction)
+        self.reason = self._body.solver.solve(matrix, self._residual_vector, self._correction)
+        return not self.reason
 
     def move(self, step):
         """Add a share of the correction to the last point of the iteration; returns the residual there."""

@@ -2,43 +2,101 @@
 
 from __future__ import annotations
 
-from mpm_core.petsc import DIRECT_LIMIT, defaults, direct_options, solved
+from mpm_core.petsc import DIRECT_LIMIT, defaults, direct_options, multigrid_options, rigid_body_motions, solved
 from petsc4py import PETSc
+
+EXACT = 1e-10
+"""Relative tolerance of a single linear system."""
+
+LOOSEST, TIGHTEST = 1e-2, 1e-6
+"""Bounds of the relative tolerance in an iteration of Newton's method."""
+
+PARTS = (0.01, 0.1)
+"""of the first matrix, in most cases the elastic one, that are added to a tangent that cannot be solved with"""
+
+MOST_ITERATIONS = 100
+"""Krylov iterations in an iteration of Newton's method; a tangent that needs more is close to singular"""
 
 
 class LinearSolver:
-    """Solution of linear systems on a displacement space by PETSc.
+    """Solution of linear systems on a space by PETSc.
 
-    The default is a direct solver (LU), on one rank unless the system is large; PETSc options with `options_prefix` change
-    it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    The default is LU by MUMPS on all ranks up to `DIRECT_LIMIT` nodes and for mixed spaces, and GMRES with algebraic
+    multigrid above; PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    iterations: Krylov iterations of the solutions so far, a list
     """
 
-    def __init__(self, space, options_prefix, factor=None):
-        """factor: PETSc's name of the package for LU, e.g. "mumps"; by default PETSc's own choice."""
-        ranks, index_map, bs = space.mesh.comm.size, space.dofmap.index_map, space.dofmap.index_map_bs
+    def __init__(self, space, options_prefix, newton=False):
+        """newton: systems are those of Newton's iterations: an iterative solver need not solve the first ones well, and
+        a tangent that is singular, as where all soil around a node has failed in tension, gets a part of the first matrix.
+        """
+        self._comm, index_map = space.mesh.comm, space.dofmap.index_map
+        dim, bs = space.mesh.geometry.dim, space.dofmap.index_map_bs
         self._n_owned = index_map.size_local * bs
-        dim = space.mesh.geometry.dim
-        on_one = ranks == 1 or index_map.size_global * bs <= dim * DIRECT_LIMIT[dim]
-        choice = {"pc_factor_mat_solver_type": factor} if factor else {}
-        if on_one and not factor:  # half the time of PETSc's default, nested dissection
-            choice["pc_factor_mat_ordering_type"] = "amd"
-        self._options = direct_options(ranks if on_one else 1, choice)
-        self._options_prefix = options_prefix
-        self._ksp = PETSc.KSP().create(space.mesh.comm)
+        displacements = bs == dim
+        direct = not displacements or index_map.size_global <= DIRECT_LIMIT[dim]
+        self._options = direct_options(self._comm.size) if direct else multigrid_options(dim, EXACT)
+        if newton and not direct:
+            self._options["ksp_max_it"] = MOST_ITERATIONS
+        self._options_prefix, self._newton, self._last = options_prefix, newton, None
+        self._first: PETSc.Mat | None = None
+        self._rigid = None
+        if displacements:
+            points = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
+            self._rigid = rigid_body_motions(points, self._comm)
+        self._ksp = PETSc.KSP().create(self._comm)
         self._ksp.setOptionsPrefix(options_prefix)
+        self.iterations = []
 
     def solve(self, matrix, residual, increment):
-        """Write matrix^-1 residual to `increment`. True when the solver converged.
+        """Write matrix^-1 residual to `increment`. Returns why that failed, in words; nothing when it did not.
 
-        residual: vector (`dolfinx.la`); increment: function on the same space. Collective.
+        residual: vector (`dolfinx.la`); increment: function on the same space. The matrix may be changed. Collective.
         """
-        right, left = matrix.createVecs()
-        left.array[:] = residual.array[: self._n_owned]
+        solution, right = matrix.createVecs()
+        right.array[:] = residual.array[: self._n_owned]
+        options = dict(self._options)
+        if self._newton and "ksp_rtol" in options:
+            options["ksp_rtol"] = self._tolerance(right.norm())
+        self.iterations.append(0)
+        failure = self._solved(matrix, right, solution, options)
+        if self._newton and not failure and self._first is None:
+            self._first = matrix.copy()
+        if failure and self._first is not None:
+            failure = self._solved_stiffer(matrix, right, solution, options)
+        if not failure:
+            increment.x.array[: self._n_owned] = solution.array_r
+            increment.x.scatter_forward()
+        return failure
+
+    def _solved(self, matrix, right, solution, options):
+        if self._rigid is not None:
+            matrix.setNearNullSpace(self._rigid)
         self._ksp.setOperators(matrix)
-        with defaults(self._options_prefix, self._options):
+        with defaults(self._options_prefix, options):
             self._ksp.setFromOptions()
-            if not solved(self._ksp, left, right):
-                return False
-        increment.x.array[: self._n_owned] = right.array_r
-        increment.x.scatter_forward()
-        return True
+            failure = solved(self._ksp, right, solution)
+        self.iterations[-1] += self._ksp.getIterationNumber()
+        return failure
+
+    def _solved_stiffer(self, matrix, right, solution, options):
+        """Solution with a matrix to which parts of the first one are added."""
+        failure, before = "", 0.0
+        for part in PARTS:
+            matrix.axpy(part - before, self._first, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            before = part
+            solution.set(0.0)
+            failure = self._solved(matrix, right, solution, options)
+            if not failure:
+                break
+        return failure
+
+    def _tolerance(self, size):
+        """Relative tolerance for a residual of Newton's method, from how fast the last ones fell.
+
+        Choice 2 of Eisenstat and Walker (1996, SIAM J. Sci. Comput. 17, 16-32), 0.9 of the square of the reduction, keeps
+        convergence quadratic. A residual that has grown begins a new step.
+        """
+        tolerance = LOOSEST if self._last is None else min(LOOSEST, 0.9 * (size / self._last) ** 2)
+        self._last = size if size > 0 else None
+        return max(TIGHTEST, tolerance)

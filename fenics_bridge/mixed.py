@@ -50,7 +50,7 @@ class MixedQuasiStatic:
         self.load, self.converged = Load(), False
         unknowns = fem.Function(space), fem.Function(space)
         self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law)
-        linear = LinearSolver(space, options_prefix, "mumps")
+        linear = LinearSolver(space, options_prefix, newton=True)
         self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
         self.solver = solver or Solver()
         self._facet_tags = facet_tags

@@ -64,7 +64,7 @@ class QuasiStatic:
         """Put together what a step works on, with the present points and the given constraints. Collective."""
         kinematics: type = AveragedKinematics if self._nmd else Kinematics
         self._kinematics = kinematics(self.increment, self.points, constraints)
-        linear = LinearSolver(self.displacement.function_space, self._options_prefix)
+        linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
     def reconfigure(self, off=(), supports=None, pore_pressure=None, stress=None, law=None):
@@ -99,6 +99,11 @@ class QuasiStatic:
             tags = tuple(known_tags(self.domain.comm, self.cell_tags))
             laws = laws * len(tags)
         return dict(zip(tags, laws))
+
+    @property
+    def linear_iterations(self):
+        """Krylov iterations of each linear system so far, a list; a direct solver takes one."""
+        return self._body.solver.iterations
 
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.

@@ -9,21 +9,19 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from .petsc import DIRECT_LIMIT, coo_matrix, defaults, direct_options, set_values, solved
+from .petsc import (
+    DIRECT_LIMIT,
+    coo_matrix,
+    defaults,
+    direct_options,
+    multigrid_options,
+    rigid_body_motions,
+    set_values,
+    solved,
+)
 
-_MULTIGRID: dict[str, Any] = {
-    "ksp_type": "fgmres",
-    "ksp_rtol": 1e-6,
-    "ksp_gmres_restart": 100,
-    "pc_type": "gamg",
-    "pc_gamg_aggressive_coarsening": 0,
-    "mg_levels_ksp_type": "gmres",
-    "mg_levels_pc_type": "jacobi",
-}
-"""PETSc options for large systems. Soil that yields has an unsymmetric tangent with weak directions, where the customary
-smoother, Chebyshev's polynomials for a positive spectrum, fails; GMRES does not. With the first coarsening not aggressive,
-two smoothing steps for each direction in space, and W-cycles in three dimensions, iterations hardly grow as the mesh becomes
-finer."""
+RTOL = 1e-6
+"""of the linear systems, to which multigrid solves them"""
 
 
 class Tangent:
@@ -55,13 +53,15 @@ class Tangent:
             self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, dim), step.mean_stress_places())
             self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
-        multigrid = {**_MULTIGRID, "mg_levels_ksp_max_it": 2 * dim, "pc_mg_cycle_type": "v" if dim == 2 else "w"}
-        self._options = direct_options(comm.size, _factor()) if step.total_nodes <= DIRECT_LIMIT[dim] else multigrid
+        direct = step.total_nodes <= DIRECT_LIMIT[dim]
+        self._options = direct_options(comm.size) if direct else multigrid_options(dim, RTOL)
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(prefix)
-        self._near_null_space = _rigid_body_motions(step, comm, dim)
+        self._near_null_space = rigid_body_motions(step.points, comm)
         self.iterations = 0
         """Krylov iterations of the last solution."""
+        self.failure = ""
+        """Why the last solution failed; empty if it did not"""
 
     def update(self, step: Any) -> None:
         """Take the values of the step's present iterate."""
@@ -78,8 +78,7 @@ class Tangent:
             set_values(self._mean_stress_by_strain, step.mean_stress_by_strain_values())
             work = self._mean_stress_by_strain.matMult(self._strain)
             work.axpy(1.0, self._mean_stress, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            # A product with the transpose itself would add up what ranks send in the order in which it arrives.
-            self.matrix = self._strain.transpose(PETSc.Mat()).matMult(work)
+            self.matrix = self._strain.transposeMatMult(work)
             self.matrix.setBlockSize(self._stiffness.getBlockSize())
             self.matrix.axpy(1.0, self._product, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         self.matrix.setNearNullSpace(self._near_null_space)
@@ -89,20 +88,9 @@ class Tangent:
             self._ksp.setUp()
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """J^-1 times this rank's part of a vector; None when the solver failed."""
+        """J^-1 times this rank's part of a vector; None when the solver failed, for the reason in `failure`."""
         x, b = self.matrix.createVecs()
         b.array[:] = right
-        good = solved(self._ksp, b, x)
+        self.failure = solved(self._ksp, b, x)
         self.iterations = self._ksp.getIterationNumber()
-        return x.array.copy() if good else None
-
-
-def _rigid_body_motions(step: Any, comm: MPI.Comm, dim: int) -> PETSc.NullSpace:
-    """What multigrid must keep on its coarse levels."""
-    points = PETSc.Vec().createWithArray(np.ascontiguousarray(step.points).ravel(), bsize=dim, comm=comm)
-    return PETSc.NullSpace().createRigidBody(points)
-
-
-def _factor() -> dict[str, Any]:
-    """MUMPS, where PETSc has it."""
-    return {"pc_factor_mat_solver_type": "mumps"} if PETSc.Sys.hasExternalPackage("mumps") else {}
+        return None if self.failure else x.array.copy()

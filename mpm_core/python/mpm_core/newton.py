@@ -28,7 +28,7 @@ class System(Protocol):
         """The first residual."""
 
     def correction(self) -> bool:
-        """Solve the tangent system for the residual; whether that worked."""
+        """Solve the tangent system for the residual; whether that worked, else `reason` says why not."""
 
     def move(self, share: float) -> float:
         """Add a share of the correction to the last point of the iteration; the residual there."""
@@ -78,7 +78,7 @@ def newton(
         if len(residuals) > max_iterations:
             return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e} after {max_iterations} iterations")
         if not system.correction():
-            return NewtonReport(False, residuals, "the linear solver failed")
+            return NewtonReport(False, residuals, system.reason or "the linear solver failed")
         residual = line_search(system, max_halvings)
         if residual == float("inf"):
             return NewtonReport(False, residuals, system.reason)
@@ -195,6 +195,7 @@ class _StepSystem:
         du = tangent.solve(self._step.residual)
         self.linear_iterations.append(tangent.iterations)
         if du is None:
+            self.reason = tangent.failure
             return False
         self._correction = du / self._dt
         return True

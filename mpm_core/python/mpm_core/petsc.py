@@ -1,4 +1,4 @@
-"""PETSc as implicit steps and the finite elements use it: so that two runs are the same to the last bit."""
+"""PETSc as implicit steps and the finite elements use it: solvers by the size of the system, and what failed in words."""
 
 from __future__ import annotations
 
@@ -12,19 +12,67 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-DIRECT_LIMIT = {2: 150_000, 3: 20_000}
-"""Nodes up to which one rank factorises the whole system by default, by dimension."""
+DIRECT_LIMIT = {2: 150_000, 3: 6_000}
+"""Nodes up to which the system is factorised by default, by dimension; larger ones are solved by multigrid."""
+
+MOST_ITERATIONS = 1000
+"""Krylov iterations after which a system counts as not solved."""
 
 
-def direct_options(ranks: int, factor: dict[str, Any]) -> dict[str, Any]:
-    """PETSc options for LU, with options of the factorisation. On several ranks the system is gathered and factorised on one
-    of them: MUMPS spread over ranks adds up in the order in which messages arrive, so that no two runs would be the same to
-    the last bit."""
-    lu = {"ksp_type": "preonly", "pc_type": "lu", **factor}
+def direct_options(ranks: int) -> dict[str, Any]:
+    """PETSc options for LU: by MUMPS on all ranks or, where PETSc is built without MUMPS, by PETSc itself on one of them.
+
+    Two runs of MUMPS on several ranks agree to round-off: it adds up in the order in which messages arrive.
+    """
+    lu: dict[str, Any] = {"ksp_type": "preonly", "pc_type": "lu"}
+    if PETSc.Sys.hasExternalPackage("mumps"):
+        return {**lu, "pc_factor_mat_solver_type": "mumps"}
+    lu["pc_factor_mat_ordering_type"] = "amd"  # half the time of PETSc's default, nested dissection
     if ranks == 1:
         return lu
     gathered = {"ksp_type": "preonly", "pc_type": "telescope", "pc_telescope_reduction_factor": ranks}
     return {**gathered, **{f"telescope_{name}": value for name, value in lu.items()}}
+
+
+def multigrid_options(dim: int, rtol: float) -> dict[str, Any]:
+    """PETSc options for GMRES with algebraic multigrid: BoomerAMG of hypre or, where PETSc is built without it, GAMG.
+
+    GMRES is preconditioned from the right, so that it stops by the residual itself. BoomerAMG gets displacement components
+    as functions of their own, from the block size of the matrix.
+    """
+    krylov = {
+        "ksp_type": "fgmres",
+        "ksp_rtol": rtol,
+        "ksp_gmres_restart": 100,
+        "ksp_max_it": MOST_ITERATIONS,
+    }
+    if PETSc.Sys.hasExternalPackage("hypre"):
+        boomer = "pc_hypre_boomeramg_"
+        return {
+            **krylov,
+            "pc_type": "hypre",
+            "pc_hypre_type": "boomeramg",
+            f"{boomer}strong_threshold": {2: 0.5, 3: 0.7}[dim],
+            f"{boomer}coarsen_type": "HMIS",
+            f"{boomer}interp_type": "ext+i",
+            f"{boomer}P_max": 4,
+        }
+    # Soil that yields has an unsymmetric tangent, where GAMG's own smoother, Chebyshev's polynomials, fails.
+    return {
+        **krylov,
+        "pc_type": "gamg",
+        "pc_gamg_threshold": 0.01,
+        "mg_levels_ksp_type": "gmres",
+        "mg_levels_ksp_max_it": 2 * dim,
+        "mg_levels_pc_type": "jacobi",
+    }
+
+
+def rigid_body_motions(points: NDArray[np.float64], comm: MPI.Comm) -> PETSc.NullSpace:
+    """What multigrid must keep on its coarse levels. points: (n, D) of this rank's own nodes [m]. Collective."""
+    coordinates = np.ascontiguousarray(points)
+    vector = PETSc.Vec().createWithArray(coordinates.ravel(), bsize=coordinates.shape[1], comm=comm)
+    return PETSc.NullSpace().createRigidBody(vector)
 
 
 @contextmanager
@@ -41,17 +89,40 @@ def defaults(prefix: str, values: dict[str, Any]) -> Iterator[None]:
             options.delValue(name)
 
 
-def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> bool:
-    """Solve; whether that worked, on all ranks alike: one that factorises for all may be alone in knowing. Collective."""
+def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
+    """Solve; why that failed, empty if it did not, on all ranks alike: one that factorises for all may be alone in knowing.
+
+    Collective.
+    """
+    reason, iterations = 0, 0
     try:
         ksp.solve(right, solution)
-        good = ksp.getConvergedReason() > 0 and bool(np.all(np.isfinite(solution.array_r)))
+        reason, iterations = ksp.getConvergedReason(), ksp.getIterationNumber()
+        if reason > 0 and not np.all(np.isfinite(solution.array_r)):
+            reason = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
     except PETSc.Error:  # MUMPS could not factorise: the matrix is singular, or not finite
-        good = False
-    if not ksp.comm.tompi4py().allreduce(int(good), MPI.MIN):
-        ksp.reset()  # MUMPS cannot be used again
-        return False
-    return True
+        reason = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
+    reason = ksp.comm.tompi4py().allreduce(int(reason), MPI.MIN)
+    if reason > 0:
+        return ""
+    words = _failure(ksp, reason, iterations)
+    ksp.reset()  # MUMPS cannot be used again
+    return words
+
+
+def _failure(ksp: PETSc.KSP, reason: int, iterations: int) -> str:
+    """A failure in words: the solver, PETSc's reason, iterations and what to try."""
+    prefix, method, pc = ksp.getOptionsPrefix() or "", ksp.getType(), ksp.getPC().getType()
+    names = {
+        v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if isinstance(v, int) and k.startswith("DIVERGED")
+    }
+    failed = f"the linear solver failed ({method} with {pc}: {names.get(reason, reason)}"
+    if method == "preonly":
+        return f"{failed}: the matrix is singular, or not finite; do the supports hold the body?)"
+    return (
+        f"{failed} after {iterations} iterations; do the supports hold the body? Near collapse a smaller step or a direct "
+        f"solver may help: -{prefix}ksp_type preonly -{prefix}pc_type lu -{prefix}pc_factor_mat_solver_type mumps)"
+    )
 
 
 def coo_matrix(comm: MPI.Comm, sizes: tuple[int, int], blocks: tuple[int, int], places: Any) -> PETSc.Mat:
