@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from mpm_core.petsc import DIRECT_LIMIT, defaults, direct_options, multigrid_options, rigid_body_motions, solved
+from mpm_core.petsc import (
+    ALONE_LIMIT,
+    DIRECT_LIMIT,
+    defaults,
+    direct_options,
+    multigrid_options,
+    rigid_body_motions,
+    solved,
+)
 from petsc4py import PETSc
 
 EXACT = 1e-10
@@ -21,8 +29,8 @@ MOST_ITERATIONS = 100
 class LinearSolver:
     """Solution of linear systems on a space by PETSc.
 
-    The default is LU by MUMPS on all ranks up to `DIRECT_LIMIT` nodes and for mixed spaces, and GMRES with algebraic
-    multigrid above; PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
+    `ALONE_LIMIT`, and GMRES with algebraic multigrid above; PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
     iterations: Krylov iterations of the solutions so far, a list
     """
 
@@ -35,7 +43,9 @@ class LinearSolver:
         self._n_owned = index_map.size_local * bs
         displacements = bs == dim
         direct = not displacements or index_map.size_global <= DIRECT_LIMIT[dim]
-        self._options = direct_options(self._comm.size) if direct else multigrid_options(dim, EXACT)
+        alone = index_map.size_global <= ALONE_LIMIT[dim]
+        choice = direct_options(self._comm.size, alone, pivoting=not displacements)
+        self._options = choice if direct else multigrid_options(dim, EXACT)
         if newton and not direct:
             self._options["ksp_max_it"] = MOST_ITERATIONS
         self._options_prefix, self._newton, self._last = options_prefix, newton, None

@@ -65,11 +65,12 @@ class Particles:
     """Quasi-static steps of particles, one in each cell."""
 
     def __init__(self, cells: int, soil: Any, nmd: bool) -> None:
-        self._model = mpm.Model(bridge.background_mesh(*slope(cells)), soil)
+        parts = slope(cells)
+        self._model = mpm.Model(bridge.background_mesh(*parts), soil)
         self.tetrahedra = self._model.seed(density=1e3 / 9.81, per_cell=1)
         for tag, axis in SUPPORTS:
             self._model.fix(tag) if axis is None else self._model.roller(tag, axis)
-        self.nodes = comm.allreduce(int(self._model.mesh.owned_nodes))
+        self.nodes = parts[0].topology.index_map(0).size_global
         self._nmd, self._solver, self._time = nmd, _Watched(), 0.0
 
     def step(self, unit_weight: float) -> tuple[int, list[int], str]:

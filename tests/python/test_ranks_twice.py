@@ -15,6 +15,8 @@ import numpy as np
 from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
+from mpm_core import petsc
+petsc.ALONE_LIMIT[2] = 0  # all ranks factorise together
 comm = MPI.COMM_WORLD
 found = {}
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from .petsc import (
+    ALONE_LIMIT,
     DIRECT_LIMIT,
     coo_matrix,
     defaults,
@@ -54,7 +55,8 @@ class Tangent:
             self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
         direct = step.total_nodes <= DIRECT_LIMIT[dim]
-        self._options = direct_options(comm.size) if direct else multigrid_options(dim, RTOL)
+        alone = step.total_nodes <= ALONE_LIMIT[dim]
+        self._options = direct_options(comm.size, alone) if direct else multigrid_options(dim, RTOL)
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(prefix)
         self._near_null_space = rigid_body_motions(step.points, comm)

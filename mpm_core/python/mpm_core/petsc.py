@@ -15,20 +15,29 @@ from petsc4py import PETSc
 DIRECT_LIMIT = {2: 150_000, 3: 6_000}
 """Nodes up to which the system is factorised by default, by dimension; larger ones are solved by multigrid."""
 
+ALONE_LIMIT = {2: 6_000, 3: 700}
+"""Nodes up to which one rank factorises the whole system faster than all ranks together, by dimension."""
+
 MOST_ITERATIONS = 1000
 """Krylov iterations after which a system counts as not solved."""
 
 
-def direct_options(ranks: int) -> dict[str, Any]:
-    """PETSc options for LU: by MUMPS on all ranks or, where PETSc is built without MUMPS, by PETSc itself on one of them.
+SINGULAR = 1e-3
+"""Relative residual of a direct solution above which the matrix counts as singular."""
 
-    Two runs of MUMPS on several ranks agree to round-off: it adds up in the order in which messages arrive.
+
+def direct_options(ranks: int, alone: bool, pivoting: bool = True) -> dict[str, Any]:
+    """PETSc options for LU: by MUMPS or, where it can do without pivoting and is small, by PETSc itself.
+
+    alone: gather the system on one rank and factorise it there, rather than on all. Two runs on all ranks agree to round-off:
+    MUMPS adds up in the order in which messages arrive.
     """
     lu: dict[str, Any] = {"ksp_type": "preonly", "pc_type": "lu"}
-    if PETSc.Sys.hasExternalPackage("mumps"):
-        return {**lu, "pc_factor_mat_solver_type": "mumps"}
-    lu["pc_factor_mat_ordering_type"] = "amd"  # half the time of PETSc's default, nested dissection
-    if ranks == 1:
+    mumps = PETSc.Sys.hasExternalPackage("mumps") and (pivoting or not alone)
+    # Of PETSc's own orderings, approximate minimum degree needs half the time of the default, nested dissection.
+    choice = {"pc_factor_mat_solver_type": "mumps"} if mumps else {"pc_factor_mat_ordering_type": "amd"}
+    lu.update(choice)
+    if ranks == 1 or (mumps and not alone):
         return lu
     gathered = {"ksp_type": "preonly", "pc_type": "telescope", "pc_telescope_reduction_factor": ranks}
     return {**gathered, **{f"telescope_{name}": value for name, value in lu.items()}}
@@ -103,11 +112,21 @@ def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
     except PETSc.Error:  # MUMPS could not factorise: the matrix is singular, or not finite
         reason = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
     reason = ksp.comm.tompi4py().allreduce(int(reason), MPI.MIN)
+    if reason > 0 and ksp.getType() == "preonly" and _remaining(ksp, right, solution) > SINGULAR:
+        reason = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
     if reason > 0:
         return ""
     words = _failure(ksp, reason, iterations)
     ksp.reset()  # MUMPS cannot be used again
     return words
+
+
+def _remaining(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> float:
+    """Residual relative to the right side. A pivot of round-off in place of zero does not stop a factorisation."""
+    residual, size = right.duplicate(), right.norm()
+    ksp.getOperators()[0].mult(solution, residual)
+    residual.axpy(-1.0, right)
+    return residual.norm() / size if size > 0 else 0.0
 
 
 def _failure(ksp: PETSc.KSP, reason: int, iterations: int) -> str:
