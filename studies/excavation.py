@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -21,7 +20,8 @@ from common.page import Page
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.site_file import Site, read_site
-from common.stage_plots import MOVED, SHEAR, StageFiles, save_over_stages, save_stages, stage_picture
+from common.stage_plots import draw_stages
+from common.stage_runs import carry_out
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -46,35 +46,6 @@ def parser() -> ArgumentParser:
 
 
 # --- 2. The stages ---------------------------------------------------------------------------------------------------
-
-
-def carry_out(site: Site, degree: int, folder: Path) -> tuple[bridge.FemSite, list[dict], list, str | None]:
-    """All stages: the site in the end, a row and a picture for each stage, and why it ended early if it did. Collective."""
-    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree)), [], [], None
-    with StageFiles(staged, folder / "stages", comm) as files:
-        for stage in site.stages:
-            try:
-                report = staged.carry_out(stage)
-            except bridge.StageError as error:
-                stopped = str(error)
-                break
-            files.write(report.number)
-            rows.append({**movements(staged), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
-                         "largest_displacement_m": report.largest_displacement})  # fmt: skip
-            pictures.append(stage_picture(staged, report.name))
-            if comm.rank == 0:
-                print(f"stage {report.number}, {report.name}: {report.steps} steps, largest displacement "
-                      f"{1e3 * report.largest_displacement:.1f} mm", file=sys.stderr)  # fmt: skip
-    return staged, rows, [picture for picture in pictures if picture is not None], stopped
-
-
-def movements(staged: bridge.FemSite) -> dict[str, float]:
-    """Largest heave, settlement and sideways displacement of the soil that is there [m]. Collective."""
-    fem = staged.fem
-    there = np.repeat(fem.points.material >= 0, fem.points.per_cell)
-    u = fem.evaluate_at(fem.points.coordinates())["displacement"][there]
-    largest = [comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in (u[:, 1], -u[:, 1], np.abs(u[:, 0]))]
-    return dict(zip(("heave_m", "settlement_m", "sideways_m"), largest))
 
 
 def at_once(site: Site, staged: bridge.FemSite, laws: dict | None) -> bridge.QuasiStatic | None:
@@ -113,30 +84,13 @@ def comparison(site: Site, staged: bridge.FemSite) -> dict[str, float | None]:
 # --- 3. All together -------------------------------------------------------------------------------------------------
 
 
-def draw(site: Site, rows: list[dict], pictures: list, folder: Path) -> None:
-    """The soil after each stage by displacement and by strain, and movements over the stages; on the first rank.
-
-    Stages before displacements were reset, such as the one that makes the stresses in situ, are left out.
-    """
-    if comm.rank != 0 or not pictures:
-        return
-    first = max((k for k, stage in enumerate(site.stages[: len(rows)]) if stage.reset_displacement), default=0)
-    before = pictures[first - 1].strain if first else 0.0
-    rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
-    save_stages(folder / "stages_displacement.png", pictures, MOVED)
-    save_stages(folder / "stages_strain.png", pictures, SHEAR)
-    curves = {name: [1e3 * row[key] for row in rows] for key, name in
-              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"), ("sideways_m", "largest sideways"))}  # fmt: skip
-    save_over_stages(folder / "movements.png", [row["stage"] for row in rows], curves, "Displacement [mm]")
-
-
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
     folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
-    staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder)
-    draw(site, rows, pictures, folder)
+    staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder, comm)
+    draw_stages(site.stages, rows, pictures, folder)
     compared = comparison(site, staged) if a.compare and stopped is None else {}
     last = rows[-1] if rows else {}
     summary = {

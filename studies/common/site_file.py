@@ -22,6 +22,7 @@ Example of a file:
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -69,10 +70,11 @@ class Site:
         body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
         return bridge.QuasiStatic(body, laws or self.laws, facet_tags, self.supports, degree, cell_tags=cell_tags)
 
-    def model(self) -> tuple[mpm.Model, dict[int, int]]:
-        """A model without particles on the whole mesh, and the number of the law of each tag. Collective."""
+    def model(self, more: Sequence[Any] = ()) -> tuple[mpm.Model, dict[int, int]]:
+        """A model without particles on the whole mesh, and the number of the law of each tag; `more` laws last. Collective."""
         mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
-        return mpm.Model(mesh, [*self.laws.values(), *self.further_laws]), {tag: k for k, tag in enumerate(self.laws)}
+        laws = [*self.laws.values(), *self.further_laws, *more]
+        return mpm.Model(mesh, laws), {tag: k for k, tag in enumerate(self.laws)}
 
     def load(self, factor: float = 1.0) -> bridge.Load:
         """The weights of all soils times a factor."""

@@ -13,6 +13,7 @@ import mpm_core as mpm
 
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene
+from .scenes import scene_of
 from .soils import add_law_options, law_of
 
 GRAVITY = 9.81
@@ -84,15 +85,7 @@ class SlopeCase:
 
     def scene(self) -> Scene | None:
         """The whole background mesh for pictures, on the first rank; None on the others. Collective."""
-        comm, mesh = self.model.comm, self.model.mesh
-        n = mesh.owned_cells
-        corners = comm.gather(mesh.points[mesh.cells[:n]])
-        tags = comm.gather(mesh.cell_tags[:n])
-        if comm.rank != 0:
-            return None
-        corners = np.concatenate(corners)
-        points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-        return Scene(points, cells.reshape(-1, 3), np.concatenate(tags) == bridge.SOIL)
+        return scene_of(self.model, [bridge.SOIL])
 
     def crest_particle(self) -> int:
         """Number of the particle that started nearest to the crest, of several as near the highest number. Collective."""

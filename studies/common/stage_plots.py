@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,23 @@ def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequenc
         axes.legend(fontsize=8)
         figure.savefig(path)
         plt.close(figure)
+
+
+def draw_stages(stages: Sequence[bridge.Stage], rows: list[dict], pictures: list[StagePicture], folder: Path) -> None:
+    """The soil after each stage by displacement and by strain, and movements over the stages; on the first rank.
+
+    Stages before displacements were reset, such as the one that makes the stresses in situ, are left out.
+    """
+    if not pictures:
+        return
+    first = max((k for k, stage in enumerate(stages[: len(rows)]) if stage.reset_displacement), default=0)
+    before = pictures[first - 1].strain if first else 0.0
+    rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
+    save_stages(folder / "stages_displacement.png", pictures, MOVED)
+    save_stages(folder / "stages_strain.png", pictures, SHEAR)
+    curves = {name: [1e3 * row[key] for row in rows] for key, name in
+              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"), ("sideways_m", "largest sideways"))}  # fmt: skip
+    save_over_stages(folder / "movements.png", [row["stage"] for row in rows], curves, "Displacement [mm]")
 
 
 class StageFiles:

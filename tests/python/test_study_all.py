@@ -22,6 +22,7 @@ SMALL = {
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "element_test": "--steps 5",
+    "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",
     "excavation": "--cell-size 3 --elements P1",
     "footing": "--cell-size 0.25 --meshes 1 --elements P1",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
@@ -35,7 +36,7 @@ SMALL = {
 }
 """Each study at a size that takes a second or less; a new study needs its line here."""
 ON_TWO_RANKS = ("balance",)
-WITH_PARTICLES = ("balance", "compare_fem", "handover", "retrogression", "slope", "slope_schemes")
+WITH_PARTICLES = ("balance", "compare_fem", "embankment", "handover", "retrogression", "slope", "slope_schemes")
 NAMES = sorted(
     [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
 )

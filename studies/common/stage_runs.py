@@ -1,0 +1,47 @@
+"""Stages of construction by finite elements, with a row of results, a picture and a frame for ParaView after each."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+from .site_file import Site
+from .stage_plots import StageFiles, stage_picture
+
+
+def carry_out(
+    site: Site, degree: int, folder: Path, comm: MPI.Comm
+) -> tuple[bridge.FemSite, list[dict], list, str | None]:
+    """All stages: the site in the end, a row and a picture for each stage, and why it ended early if it did. Collective."""
+    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree)), [], [], None
+    with StageFiles(staged, folder / "stages", comm) as files:
+        for stage in site.stages:
+            try:
+                report = staged.carry_out(stage)
+            except bridge.StageError as error:
+                stopped = str(error)
+                break
+            files.write(report.number)
+            rows.append({**movements(staged), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
+                         "largest_displacement_m": report.largest_displacement})  # fmt: skip
+            pictures.append(stage_picture(staged, report.name))
+            if comm.rank == 0:
+                print(f"stage {report.number}, {report.name}: {report.steps} steps, largest displacement "
+                      f"{1e3 * report.largest_displacement:.1f} mm", file=sys.stderr)  # fmt: skip
+    return staged, rows, [picture for picture in pictures if picture is not None], stopped
+
+
+def movements(staged: bridge.FemSite) -> dict[str, float]:
+    """Largest heave, settlement and sideways displacement of the soil that is there [m]. Collective."""
+    fem = staged.fem
+    there = np.repeat(fem.points.material >= 0, fem.points.per_cell)
+    u = fem.evaluate_at(fem.points.coordinates())["displacement"][there]
+    largest = [
+        fem.domain.comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in (u[:, 1], -u[:, 1], np.abs(u[:, 0]))
+    ]
+    return dict(zip(("heave_m", "settlement_m", "sideways_m"), largest))

@@ -1,0 +1,224 @@
+"""An embankment built in layers on soft clay: settlement by FEM and particles, then failure and slide by particles.
+
+The site is a TOML file (`meshes/embankment.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
+of its physical groups, supports by boundary, and a list of stages. Finite elements and quasi-static particles carry out the
+same list. Then the strength of all soils is divided by --factor, and the explicit scheme follows what happens; a stage that
+has no equilibrium is followed as it is.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from common.animation import Frame, save_animation
+from common.files import OutputError
+from common.history import History
+from common.interrupt import Interrupt
+from common.movie import Movie, particle_frame
+from common.options import add_choice, add_count, add_number, add_switch, study_parser
+from common.page import Page
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_history, save_particles
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import ROOT, open_results
+from common.scenes import scene_of
+from common.site_file import Site, read_site
+from common.stage_plots import draw_stages
+from common.stage_runs import carry_out
+from common.summary import write_summary
+from mpi4py import MPI
+from mpm_core.output import ModelOutput
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_share"]
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "embankment.toml", metavar="FILE",
+                   help="TOML file of mesh, soils, supports and stages (default: meshes/embankment.toml)")  # fmt: skip
+    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_choice(p, "--elements", "P1", ("P1", "P2"), "linear triangles, as the particles have them, or quadratic ones")
+    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_number(p, "--factor", 1.5, "-", "by what the strength of all soils is divided before the slide", at_least=1)
+    add_number(p, "--damping", 0.05, "-", "local damping of the slide", at_least=0, below=1)
+    add_number(
+        p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1
+    )
+    add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
+    add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
+    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
+    return p
+
+
+# --- 2. The same stages by particles ---------------------------------------------------------------------------------
+
+
+def build(site: Site, per_cell: int, factor: float) -> tuple[bridge.ParticleSite, str | None]:
+    """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective."""
+    weaker = (
+        [bridge.reduced_strength(law, factor) for law in [*site.laws.values(), *site.further_laws]]
+        if factor > 1
+        else []
+    )
+    model, materials = site.model(weaker)
+    particles = bridge.ParticleSite(model, materials, site.supports, per_cell=per_cell, small_displacements=True)
+    try:
+        for report in bridge.carry_out(particles, site.stages):
+            if comm.rank == 0:
+                print(
+                    f"particles, stage {report.number}, {report.name}: {report.iterations} iterations", file=sys.stderr
+                )
+    except bridge.StageError as error:
+        return particles, str(error)
+    return particles, None
+
+
+def stress_difference(particles: bridge.ParticleSite, staged: bridge.FemSite) -> float:
+    """Largest difference between the particles' stresses and those of the finite elements, over the largest [-]. Collective."""
+    p = particles.model.particles
+    expected = staged.fem.evaluate_at(p.position)["stress"]
+    apart, largest = (
+        comm.allreduce(float(np.abs(v).max(initial=0.0)), MPI.MAX) for v in (p.stress - expected, expected)
+    )
+    return apart / largest
+
+
+# --- 3. Failure and slide --------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Slide:
+    """What came of the slide."""
+
+    model: mpm.Model
+    history: History
+    files: ModelOutput
+    frames: list[dict] = field(default_factory=list)
+
+    def look(self, report: mpm.Report) -> None:
+        """Note how far the particles have moved, and keep a frame. Collective."""
+        moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
+        self.history.add(
+            time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
+            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share,
+        )  # fmt: skip
+        self.files.write()
+        frame = particle_frame(self.model, report.time)
+        if frame is not None:
+            self.frames.append(frame)
+
+
+def weaken(site: Site, model: mpm.Model, factor: float) -> None:
+    """Give all particles the laws whose strength is divided by the factor."""
+    if factor > 1:
+        model.assign(model.particles.material + len(site.laws) + len(site.further_laws))
+
+
+def slide(a: Namespace, site: Site, model: mpm.Model, folder: Path, interrupt: Interrupt) -> tuple[Slide, str | None]:
+    """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective."""
+    with (
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        ModelOutput(model, folder / "particles", folder / "mesh") as files,
+        Progress("slide", a.time, comm) as progress,
+    ):
+        result = Slide(model, history, files)
+        result.look(model.report())
+        try:
+            for report in model.explicit(
+                model.time + a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd
+            ):
+                result.look(report)
+                progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")
+                if interrupt.requested():
+                    return result, f"interrupted at {report.time:g} s"
+        except mpm.RunError as error:
+            return result, str(error)
+    return result, None
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(result: Slide, scene: Scene | None, folder: Path) -> None:
+    """Displacement and strain in the end, the largest displacement over time, and a film; on the first rank."""
+    if scene is None:
+        return
+    last, history = result.frames[-1], result.history
+    for name, key, quantity in (
+        ("slide_displacement", "displacement", DISPLACEMENT),
+        ("slide_strain", "shear_strain", SHEAR_STRAIN),
+    ):
+        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+                       title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
+    save_history(folder / "largest_displacement.png", history["time_s"], {"largest": history["largest_displacement_m"]},
+                 "Largest displacement [m]", limits=(0, max(0.1, 1.05 * history["largest_displacement_m"].max())))  # fmt: skip
+    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
+    save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
+
+
+CAPTIONS = {
+    "stages_displacement": "The soil after each stage, by its displacement",
+    "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
+    "movements": "Largest movements after each stage", "slide_displacement": "Displacement at the end of the slide",
+    "slide_strain": "Accumulated plastic shear strain at the end of the slide",
+    "largest_displacement": "Largest displacement of a particle during the slide",
+}  # fmt: skip
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parser().parse_args(arguments)
+    start = perf_counter()
+    folder = open_results(a, comm)
+    site = read_site(a.site, comm, a.cell_size)
+    staged, rows, pictures, failed = carry_out(site, int(a.elements[1]), folder, comm)
+    draw_stages(site.stages, rows, pictures, folder)
+    built = perf_counter()
+    particles, failed_particles = build(site, a.particles_per_cell, a.factor)
+    apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
+    model = particles.model
+    model.particles.set("initial_position", model.particles.position)
+    if not failed_particles:
+        weaken(site, model, a.factor)
+    scene = scene_of(model, sorted(site.laws))
+    with Interrupt(comm) as interrupt:
+        result, stopped = slide(a, site, model, folder, interrupt)
+    moved = result.history["largest_displacement_m"][-1]
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped, "stage_without_equilibrium_fem": failed,
+        "stage_without_equilibrium_particles": failed_particles,
+        "settlement_m": rows[-1]["settlement_m"] if rows else None, "sideways_m": rows[-1]["sideways_m"] if rows else None,
+        "stress_difference_of_particles_to_fem": apart, "factor": a.factor, "largest_displacement_of_slide_m": moved,
+        "particles": comm.allreduce(len(model.particles)),
+        "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
+        "wall_seconds": {"stages_fem": built - start, "all": perf_counter() - start},
+    }  # fmt: skip
+    draw(result, scene, folder)
+    movie = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
+    write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS))
+    if comm.rank == 0:
+        for who, message in (("finite elements", failed), ("particles", failed_particles), ("slide", stopped)):
+            if message:
+                print(f"{who}: {message}", file=sys.stderr)
+        print(f"slide with the strength divided by {a.factor:g}: largest displacement {moved:.3f} m after "
+              f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip
+    return interrupt.exit_code or (1 if stopped else 0)
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, OutputError)
