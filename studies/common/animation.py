@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import itertools
 import shutil
-from collections.abc import Sequence
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
+from PIL import Image
 
+from .files import expendable
 from .plots import Quantity, Scene, colour_limits, disc_diameter, draw_bar, draw_scene, figure_with_bar, paper_style
 
 
@@ -37,6 +43,10 @@ class Frame:
         self.values = np.array(self.values, np.float32)
 
 
+FASTEST, SHORTEST = 25, 4.0
+"""Frames per second of a film, at most, and how many seconds it lasts, at least"""
+
+
 def save_animation(
     path: Path,
     scene: Scene,
@@ -45,14 +55,16 @@ def save_animation(
     *,
     limits: tuple[float, float] | None = None,
     seconds: float = 10.0,
+    progress: Callable[[Sequence], Iterable] = iter,
 ) -> Path:
-    """Draw a film with one colour scale over time.
+    """Draw a film with one colour scale over time; see `expendable` for a disk that is full.
 
     Args:
         path: without suffix; ``.mp4`` or ``.gif`` is added.
         frames: in the order shown, at least one.
         limits: of the colour scale; found from all frames if not given.
-        seconds: how long the film lasts; it shows at most 12 frames per second.
+        seconds: how long the film lasts at most; of more than 25 frames per second some are left out.
+        progress: passes the frames on one by one, and may show how far it is.
 
     Returns:
         The file that was written.
@@ -60,27 +72,64 @@ def save_animation(
     if not frames:
         raise ValueError("frames is empty, expected at least one")
     limits = limits or colour_limits(quantity, [frame.values for frame in frames])
-    shown = frames[:: max(1, -(-len(frames) // int(12 * seconds)))]
-    rate = max(1, round(len(shown) / seconds))
+    shown = frames[:: max(1, -(-len(frames) // int(FASTEST * seconds)))]
+    rate = min(FASTEST, max(1, round(len(shown) / min(SHORTEST, seconds))))
     has_ffmpeg = shutil.which("ffmpeg") is not None
     path = path.with_suffix(".mp4" if has_ffmpeg else ".gif")
-    # The pixel format is the one that every player knows; it needs even numbers of pixels.
-    even = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-loglevel", "error"]
-    writer = FFMpegWriter(fps=rate, extra_args=even, bitrate=3000) if has_ffmpeg else PillowWriter(fps=rate)
-    # Matplotlib may not crop frames, so the style's tight borders are off here.
+    with expendable(path) as aside:
+        pictures = _pictures(scene, progress(shown), quantity, limits, [frame.position for frame in frames])
+        (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures, rate)
+    return path
+
+
+def _pictures(
+    scene: Scene, frames: Iterable[Frame], quantity: Quantity, limits: tuple[float, float], positions: list[np.ndarray]
+) -> Iterator[np.ndarray]:
+    """Frames as pixels (height, width, 4), even numbers of them as films need. What does not move is drawn once."""
     with paper_style():
-        figure, axes, bar_axes = figure_with_bar(*scene.limits([frame.position for frame in frames]))
-        draw_scene(axes, scene)
+        figure, axes, bar_axes = figure_with_bar(*scene.limits(positions))
+        figure.set_dpi(150)
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        background = canvas.copy_from_bbox(figure.bbox)
+        still = list(axes.collections)
+        draw_scene(axes, scene)
+        lines = sorted((c for c in axes.collections if c not in still), key=lambda c: c.get_zorder())
         title = axes.set_title("", loc="left", pad=4)
         points = axes.scatter([], [], c=[], cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
         points_per_metre = 72 * figure.get_figwidth() * axes.get_position().width / np.ptp(axes.get_xlim())
-        with writer.saving(figure, str(path), dpi=150):
-            for frame in shown:
-                title.set_text(f"$t$ = {frame.time:.2f} s")
-                points.set_offsets(frame.position)
-                points.set_sizes((disc_diameter(frame.volume) * points_per_metre) ** 2)
-                points.set_array(quantity.scale * frame.values)
-                writer.grab_frame()
+        for frame in frames:
+            canvas.restore_region(background)
+            title.set_text(f"$t$ = {frame.time:.2f} s")
+            points.set_offsets(frame.position)
+            points.set_sizes((disc_diameter(frame.volume) * points_per_metre) ** 2)
+            points.set_array(quantity.scale * frame.values)
+            for artist in (points, *lines, title):
+                axes.draw_artist(artist)
+            pixels = np.asarray(canvas.buffer_rgba())
+            yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2]
         plt.close(figure)
-    return path
+
+
+def _save_mp4(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
+    first = next(pictures)
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    # The pixel format is the one that every player knows.
+    words = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", size, "-r", str(rate), "-i", "-", "-f", "mp4", "-vcodec", "h264",
+             "-preset", "veryfast", "-pix_fmt", "yuv420p", str(path)]  # fmt: skip
+    with subprocess.Popen(["ffmpeg", "-loglevel", "error", "-y", *words], stdin=subprocess.PIPE,
+                          stderr=subprocess.PIPE) as encoder:  # fmt: skip
+        assert encoder.stdin is not None and encoder.stderr is not None
+        with contextlib.suppress(BrokenPipeError):  # then it says why
+            for picture in itertools.chain([first], pictures):
+                encoder.stdin.write(picture.tobytes())
+            encoder.stdin.close()
+        reason = encoder.stderr.read().decode(errors="replace").strip()
+    if encoder.returncode != 0:
+        raise OSError(errno.EIO, f"ffmpeg: {reason.splitlines()[-1] if reason else 'it failed'}")
+
+
+def _save_gif(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
+    first, *others = (Image.fromarray(picture[..., :3]) for picture in pictures)
+    first.save(path, format="GIF", save_all=True, append_images=others, duration=1000 / rate, loop=0)
