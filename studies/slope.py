@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -22,20 +23,21 @@ from common.interrupt import Interrupt
 from common.movie import PORE, Movie, fem_frame, has_pore_pressure
 from common.notes import notes_of
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
-from common.output_options import add_output_options
+from common.output_options import add_output_options, check_frames
 from common.page import Page
 from common.plots import (
     DISPLACEMENT,
     PORE_PRESSURE,
     SHEAR_STRAIN,
     VERTICAL_STRESS,
+    Quantity,
     Scene,
     colour_limits,
     save_history,
     save_mesh,
     save_particles,
 )
-from common.progress import Progress
+from common.progress import Progress, counted
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
@@ -54,7 +56,7 @@ COLUMNS = [
 ]  # fmt: skip
 MAY_CHANGE = {
     "time", "dt", "damping", "pic", "nmd", "solver", "frames", "frame-steps", "rebalance", "checkpoint-every", "fields", "float64",
-    "compression",
+    "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
 
@@ -81,6 +83,8 @@ def parser() -> ArgumentParser:
         p, "--frame-steps", None, "steps between further times at which particles are stored, not drawn (default: none)"
     )
     add_output_options(p, PARTICLE_FIELDS)
+    add_switch(p, "--pictures", True, "draw figures and film; without them the page has the player and the curves")
+    add_switch(p, "--film", True, "draw a film, the longest of the pictures to draw")
     add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
                above=1)  # fmt: skip
     add_checkpoint_options(p)
@@ -111,6 +115,9 @@ class Files:
     section under its edge, and totals.
     """
 
+    failure: str | None = None
+    """Why the files could not be ended, on a disk that is full"""
+
     def __init__(self, case: SlopeCase, folder: Path) -> None:
         self.model = case.model
         restarted = case.args.restart is not None
@@ -136,7 +143,10 @@ class Files:
 
     def __exit__(self, *error: Any) -> None:
         for file in (self.frames, *self.probes):
-            file.__exit__(*error)
+            try:
+                file.__exit__(*error)
+            except mpm.RunError as failure:  # on all ranks alike; the results so far are still to be told
+                self.failure = self.failure or str(failure)
 
 
 def slide(
@@ -198,10 +208,11 @@ def slide(
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(scene: Scene, frames: list[dict], history: History, folder: Path) -> None:
+def draw(a: Namespace, scene: Scene, frames: list[dict], history: History, folder: Path) -> None:
     """Figures 2 to 6 of the paper and a film, from the stored frames; on the first rank."""
+    if not a.pictures:
+        return
     first, last = frames[0], frames[-1]
-    save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"])
     drawn = [
         ("figure_3_displacement", "displacement", DISPLACEMENT),
         ("figure_4_shear_strain", "shear_strain", SHEAR_STRAIN),
@@ -210,15 +221,26 @@ def draw(scene: Scene, frames: list[dict], history: History, folder: Path) -> No
     if PORE in last:
         drawn.append(("figure_7_excess_pore_pressure", PORE, PORE_PRESSURE))
     title = f"$t$ = {last['time']:.1f} s"
-    for name, key, quantity in drawn:
+
+    def particles(name: str, key: str, quantity: Quantity) -> None:
         limits = colour_limits(quantity, [frame[key] for frame in frames])
         save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
                        limits=limits, title=title)  # fmt: skip
-    save_history(folder / "figure_6_crest.png", history["time_s"], {"crest": history["crest_displacement_m"]},
-                 "Displacement of the particle at the crest [m]",
-                 limits=(0, max(0.5, 1.05 * history["crest_displacement_m"].max())))  # fmt: skip
-    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
-    save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
+
+    crest = history["crest_displacement_m"]
+    figures = [
+        lambda: save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"]),
+        *(partial(particles, *each) for each in drawn),
+        lambda: save_history(folder / "figure_6_crest.png", history["time_s"], {"crest": crest},
+                             "Displacement of the particle at the crest [m]", limits=(0, max(0.5, 1.05 * crest.max()))),
+    ]  # fmt: skip
+    for figure in counted("figures", figures):
+        figure()
+    if a.film:
+        film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
+        save_animation(
+            folder / "slide", scene, film, SHEAR_STRAIN, progress=lambda shown: counted("film, frames", shown)
+        )
 
 
 def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
@@ -252,6 +274,7 @@ def main(arguments: list[str] | None = None) -> int:
     clock = {"start": perf_counter()}
     folder = open_results(a, comm)
     case = build_slope(a, comm)
+    check_frames(case.model, a, folder)
     clock["mesh_and_particles"] = perf_counter()
     if a.restart is not None:
         case.model.restore(a.restart)
@@ -276,11 +299,12 @@ def main(arguments: list[str] | None = None) -> int:
             notes = notes_of(a.study, a.parameters(), a.restarts, start)
             checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every, notes)
             loop = slide(case, watch, history, files, interrupt, checkpoints)
+        loop["stopped"] = loop["stopped"] or files.failure
         clock["slide"] = perf_counter()
         summary = summarised(case, start, loop, history, clock)
         frames, scene = watch.frames(), case.scene()
         write_summary(
-            folder, a, summary, comm, page(case, frames, summary), lambda: draw(scene, frames, history, folder)
+            folder, a, summary, comm, page(case, frames, summary), lambda: draw(a, scene, frames, history, folder)
         )
     if comm.rank == 0:
         tell(summary, folder)

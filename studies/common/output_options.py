@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
 from collections.abc import Sequence
+from pathlib import Path
+
+import mpm_core as mpm
+
+FRAME_BYTES = 44
+"""That a particle takes in memory in each frame for pictures: nine numbers in single precision, and its number"""
 
 
 def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
@@ -37,3 +45,37 @@ def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) ->
         metavar="N",
         help="level of compression of the files, 0 to 9 (default: 0)",
     )
+
+
+def check_frames(model: mpm.Model, options: argparse.Namespace, folder: Path) -> None:
+    """Refuse more frames than the machine's memory, or the disk of the results folder, can take.
+
+    Args:
+        options: with ``frames``, ``fields``, ``float64`` and ``compression``.
+
+    Raises:
+        InputError: on all ranks alike, with the bytes that they would take and those that there are.
+
+    Note:
+        Collective.
+    """
+    comm = model.comm
+    particles, frames = comm.allreduce(len(model.particles)), options.frames
+    numbers = 3 + sum(_width(model, name) for name in options.fields.split(","))
+    needed = {
+        "memory": (frames * particles * FRAME_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")),
+        "disk": (frames * particles * numbers * (8 if options.float64 else 4), shutil.disk_usage(folder).free),
+    }
+    if options.compression > 0:
+        del needed["disk"]
+    for where, (bytes_needed, there) in comm.bcast(needed).items():
+        if bytes_needed > there:
+            raise mpm.InputError(
+                f"--frames is {frames}: {particles} particles would take {bytes_needed:.3g} bytes of {where}, but there are {there:.3g}"
+            )
+
+
+def _width(model: mpm.Model, name: str) -> int:
+    """Numbers of a field per particle; one, where the model has it under another name."""
+    values = getattr(model.particles, name, None)
+    return 1 if values is None or values.ndim == 1 else values.shape[1]

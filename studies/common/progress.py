@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import sys
 import time as clock
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 from mpi4py import MPI
 from tqdm import tqdm
+
+T = TypeVar("T")
 
 
 class Progress:
@@ -69,6 +73,16 @@ class Progress:
             self._bar.close()
         elif self._shown:
             self._print_last()
+
+
+def counted(title: str, items: Sequence[T]) -> Iterator[T]:
+    """Passes items on one by one, with a bar on a terminal, elsewhere with one line; for the first rank."""
+    if not sys.stderr.isatty():
+        print(f"{title}: {len(items)}", file=sys.stderr, flush=True)
+    form = "{desc}: {percentage:3.0f}% |{bar}| {n}/{total} [{elapsed} < {remaining}]"
+    yield from tqdm(
+        items, desc=title, bar_format=form, file=sys.stderr, dynamic_ncols=True, disable=not sys.stderr.isatty()
+    )
 
 
 def _duration(seconds: float) -> str:

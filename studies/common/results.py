@@ -24,6 +24,8 @@ from .parameters import write_parameters
 ROOT = Path(__file__).parents[2]
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""
+ROOM = 1 << 16
+"""Bytes reserved on the disk, so that there is a summary however full it becomes."""
 NAMES = ("summary.json", "verification.json", "history.csv", "checkpoint.h5", "report.html")
 """By which results are known in a folder without that file."""
 BY_HAND = "empty it, or choose another folder by --output"
@@ -77,6 +79,13 @@ def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
     if problem is not None:
         raise OutputError(problem)
     return path
+
+
+def give_room(folder: Path) -> None:
+    """Give back what was reserved for the summary, just before it is written. Call it on the first rank."""
+    lock = _locks.get(folder)
+    if lock is not None:
+        _store(lock, _known(lock))
 
 
 def note_what_was_written(folder: Path) -> None:
@@ -166,7 +175,7 @@ def _locked(folder: Path, keeps: bool, overwrite: bool) -> str | None:
             _remove(folder / name)
     others = sorted((names if known else names - set(NAMES)) - earlier - {"parameters.toml"})
     now = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    _store(lock, {"host": socket.gethostname(), "process": os.getpid(), "started": now, "there_before": others})
+    _store(lock, {"host": socket.gethostname(), "process": os.getpid(), "started": now, "there_before": others}, ROOM)
     _locks[folder] = lock
     return None
 
@@ -208,15 +217,18 @@ def _known(lock: TextIO) -> dict[str, Any]:
     """What a mark says; nothing when it is new or damaged."""
     lock.seek(0)
     try:
-        known = json.loads(lock.read())
+        known = json.loads(lock.read().rstrip("\0"))
     except ValueError:
         return {}
     return known if isinstance(known, dict) and "there_before" in known else {}
 
 
-def _store(lock: TextIO, known: dict[str, Any]) -> None:
+def _store(lock: TextIO, known: dict[str, Any], room: int = 0) -> None:
+    """Write a mark, with so many bytes of room behind it."""
     # In place: the lock is on the file, not on its name.
     lock.seek(0)
     lock.truncate()
     json.dump(known, lock, indent=1)
     lock.flush()
+    if room:
+        os.posix_fallocate(lock.fileno(), 0, room)

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
-from .results import ROOT, note_what_was_written
+from .results import ROOT, give_room, note_what_was_written
 
 
 def versions() -> dict[str, str]:
@@ -105,6 +105,7 @@ def _write(
     }
     if isinstance(options, Options) and options.restarts:
         summary["restarts"] = options.restarts
+    give_room(folder)
     write_text(folder / "summary.json", json.dumps(summary, indent=2, default=_plain) + "\n")
     if draw is not None:
         draw()

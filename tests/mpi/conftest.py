@@ -1,5 +1,11 @@
-"""Tests under mpirun: every rank runs every test, and a failure on one rank is a failure on all."""
+"""Tests under mpirun: every rank runs every test, and a failure on one rank is a failure on all.
 
+Each test has a time limit of its own: a rank that waits for another would wait for ever. Past it, the rank prints where it is,
+with the test's name in the list, and ends, upon which mpirun ends the others.
+"""
+
+import faulthandler
+import os
 import sys
 from pathlib import Path
 
@@ -7,6 +13,19 @@ import pytest
 from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))  # cases that tests on one rank use too
+
+
+LIMIT = float(os.environ.get("TALUS_TEST_LIMIT", 300))
+"""[s] for one test; far more than any takes on a machine that is busy"""
+ERRORS = os.dup(2)  # which pytest does not capture
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item):
+    # In a thread of C: a rank that waits inside MPI may hold Python's lock.
+    faulthandler.dump_traceback_later(LIMIT, exit=True, file=ERRORS)
+    yield
+    faulthandler.cancel_dump_traceback_later()
 
 
 @pytest.hookimpl(hookwrapper=True)

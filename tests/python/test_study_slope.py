@@ -87,6 +87,7 @@ def test_frames_by_steps_are_for_the_files_alone(tmp_path):
         (["--cell-size", "0.3"], ["0.3", "height"]),
         (["--dt", "1"], ["dt", "1 s", "critical"]),
         (["--output", "/proc/nowhere"], ["/proc/nowhere"]),
+        (["--frames", "100000000"], ["--frames", "100000000", "bytes of memory, but there are"]),
     ],
 )
 def test_wrong_options_are_named(tmp_path, options, words):
