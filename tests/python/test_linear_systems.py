@@ -74,6 +74,12 @@ def test_supports_that_do_not_hold_the_body_are_asked_about():
         bridge.solve_elastic(domain, facet_tags, [bridge.roller(bridge.LEFT, (1, 0))], YOUNG, POISSON, UNIT_WEIGHT)
 
 
+def test_multigrid_does_not_believe_a_solution_without_bound(multigrid):
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0, 1.0), (5, 5, 5))
+    with pytest.raises(RuntimeError, match="fgmres.*do the supports hold the body"):
+        bridge.solve_elastic(domain, facet_tags, [bridge.roller(1, (1, 0, 0))], YOUNG, POISSON, UNIT_WEIGHT)
+
+
 @pytest.mark.parametrize("iterative", [False, True])
 def test_a_singular_tangent_gets_a_part_of_the_first_one(iterative, monkeypatch):
     """A node without stiffness, as where all soil around it has failed in tension: the system solved is that of the tangent
