@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
+from mpm_core.mesh import cell_sizes
 
 from fenics_bridge import compat
 from fenics_bridge.fields import N_STRESS
@@ -58,7 +59,8 @@ class QuadraturePoints:
             self.state = np.pad(self.state, ((0, 0), (0, missing)))
             self.trial_state = self.state.copy()
         self.state[points], self.deviatoric_strain[points] = 0.0, 0.0
-        size = np.repeat(cell_volumes(self._domain)[self.cells] ** (1 / self._domain.geometry.dim), self.per_cell)
+        sizes = cell_sizes(cell_volumes(self._domain)[self.cells], self._domain.geometry.dim)
+        size = np.repeat(sizes, self.per_cell)
         chosen = np.zeros(self.n, dtype=bool)
         chosen[points] = True
         for law, piece in zip(laws, self._pieces):

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from mpm_core.probes import nearest_particle
 
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene
@@ -89,12 +90,7 @@ class SlopeCase:
 
     def crest_particle(self) -> int:
         """Number of the particle that started nearest to the crest, of several as near the highest number. Collective."""
-        p, comm = self.model.particles, self.model.comm
-        distance = np.linalg.norm(p.initial_position[:, :2] - (self.args.crest, self.args.height), axis=1)
-        nearest = comm.allreduce(distance.min(initial=np.inf), MPI.MIN)
-        # Round-off, which depends on the partition, must not choose between them.
-        near = p.id[distance <= nearest + 1e-9 * self.args.height]
-        return comm.allreduce(int(near.max(initial=-1)), MPI.MAX)
+        return nearest_particle(self.model, (self.args.crest, self.args.height))
 
     @property
     def surface(self) -> np.ndarray:

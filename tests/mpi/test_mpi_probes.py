@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 from mpi4py import MPI
-from mpm_core.probes import ParticleProbe, PointProbe, ProbeFile, SectionProbe, TotalsProbe
+from mpm_core.probes import ParticleProbe, PointProbe, ProbeFile, SectionProbe, TotalsProbe, nearest_particle
 from partitions import bands, one_does_all, scattered, sliding_slope, spread_box
 
 import mpm_core as mpm
@@ -58,6 +58,18 @@ def test_points_see_what_is_there(comm, dim):
     )  # that cell reaches from 0.25 to 0.5
     with pytest.raises(mpm.InputError, match="points has .* outside of the mesh"):
         PointProbe(model, [[*middle, 2.7]])
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_of_several_nearest_particles_the_one_with_the_highest_number_is_followed(comm, owners_of):
+    model = sliding_slope(comm, owners_of)
+    points = [(0.6, 0.4), (0.35, 0.2), (0.1, 0.0)]
+    start = all_by_id(model, ("initial_position",))
+    for point, number in zip(points, ParticleProbe(model, points).ids):
+        distance = np.hypot(*(start["initial_position"] - point).T)
+        ties = start["id"][np.isclose(distance, distance.min(), rtol=1e-9, atol=0)]
+        assert number == ties.max() == nearest_particle(model, point)
+        assert point != points[1] or len(ties) > 1
 
 
 @pytest.mark.parametrize("owners_of", [bands, one_does_all])

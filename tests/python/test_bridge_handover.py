@@ -63,6 +63,31 @@ def test_particles_take_the_values_of_the_finite_elements():
     bridge.initialise(slope_particles(UNIT_WEIGHT), fem_model, count_displacement=False, equilibrate=False)
 
 
+@pytest.mark.parametrize(("fem_size", "cell_size"), [(0.1, 0.1), (0.1, 0.05), (0.05, 0.1)])
+def test_soil_that_is_handed_over_softens_as_seeded_soil_does(fem_size, cell_size):
+    """The particles keep the size of their own cells, and the strength that the finite elements left them."""
+    peak = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0)
+    law = mpm.SofteningMohrCoulomb(peak, residual_cohesion=0.5e3, residual_friction_angle=25.0, softening_strain=0.02,
+                                   reference_length=0.1)  # fmt: skip
+    body, _, facets = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, cell_size=fem_size))
+    held = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    fem_model = bridge.QuasiStatic(body, law, facets, held, degree=1)
+    fem_model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    assert fem_model.converged
+    model = slope_particles(UNIT_WEIGHT, cell_size, law=law)
+    size = model.state("cell_size")
+    # Squares cut in four by their diagonals: triangles that are halves of squares of this side.
+    assert np.allclose(size, cell_size / np.sqrt(2))
+    bridge.initialise(model, fem_model, equilibrate=False)
+    assert np.array_equal(model.state("cell_size"), size)
+    plastic, sized, _ = law.state_names
+    state = fem_model.evaluate_at(model.particles.position)["state"]
+    before = dict(zip(law.state_names, state.T))
+    assert before[plastic].max() > 1e-4
+    # Strength is lost by plastic strain times size
+    assert np.allclose(model.state("plastic_strain") * size, before[plastic] * before[sized], rtol=1e-12, atol=0)
+
+
 @pytest.mark.parametrize("count", [True, False])
 def test_particles_move_with_the_body(count):
     """Then they no longer fill cells as before; a zero-load equilibration brings them back into balance."""

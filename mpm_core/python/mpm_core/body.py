@@ -48,9 +48,13 @@ class Body:
     def _seeded(self, added: int, ids: int) -> int:
         self._next_id += ids
         if any("cell_size" in law.state_names for law in self.laws):
-            sizes, seen = cell_sizes(self.mesh)[self.particles.cell], self.state("cell_size")
+            sizes, seen = self._cell_sizes(), self.state("cell_size")
             self.set_state("cell_size", np.where(seen == 0, sizes, seen))
         return self.comm.allreduce(added)
+
+    def _cell_sizes(self) -> Any:
+        """Size of the cell of each particle [m]."""
+        return cell_sizes(self.mesh.cell_volumes, self.mesh.dim)[self.particles.cell]
 
     def _material(self, material: int) -> int:
         if not 0 <= material < len(self.laws):

@@ -210,6 +210,14 @@ class Mesh:
         return tuple(dict.fromkeys(tags))
 
 
-def cell_sizes(mesh: Mesh) -> NDArray[np.float64]:
-    """Size h of each cell [m], shape (cells,): side of the square or cube that D! cells of its volume fill, (D! V)^(1/D)."""
-    return (2.0 * mesh.cell_volumes) ** 0.5 if mesh.dim == 2 else np.cbrt(6.0 * mesh.cell_volumes)
+def cell_sizes(volumes: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
+    """Size h of simplices [m]: side of the square or cube that D! of their volume fill, (D! V)^(1/D).
+
+    Softening spreads over a band one row of cells wide, and rows of simplices are as wide as the squares or cubes that they come
+    from; V^(1/D) would be 1 / sqrt(2) of that in the plane and 0.55 in space (Rots 1988, Computational modeling of concrete
+    fracture, Delft: sqrt(2 A) for linear triangles).
+
+    Args:
+        volumes: of the cells [m2 or m3].
+    """
+    return (2.0 * volumes) ** 0.5 if dim == 2 else np.cbrt(6.0 * volumes)

@@ -61,8 +61,27 @@ def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
     return found
 
 
+def nearest_particle(model: Model, place: ArrayLike) -> int:
+    """Number of the particle that started nearest to a point, of several as near as each other the highest number. Collective.
+
+    Args:
+        place: [m], shape (D,).
+
+    Raises:
+        InputError: a point of another shape, or a model without particles.
+    """
+    point = collectively(model.comm, lambda: floats("place", place, (model.mesh.dim,)))
+    distance = np.linalg.norm(model.particles.initial_position - point, axis=1)
+    least = model.comm.allreduce(float(distance.min(initial=np.inf)), MPI.MIN)
+    if not np.isfinite(least):
+        raise InputError("the model has no particles, seed some first")
+    # Round-off, which depends on the partition, must not choose between them.
+    near = model.particles.id[distance <= least * (1 + 1e-9)]
+    return model.comm.allreduce(int(near.max(initial=-1)), MPI.MAX)
+
+
 class ParticleProbe:
-    """Follows the particles that started nearest to some points: position, displacement, velocity and stress.
+    """Follows the particles that started nearest to some points (see `nearest_particle`): position, displacement, velocity, stress.
 
     Args:
         model: the model, seeded.
@@ -75,21 +94,8 @@ class ParticleProbe:
     def __init__(self, model: Model, points: ArrayLike) -> None:
         self.model = model
         places = collectively(model.comm, lambda: floats("points", points, (None, model.mesh.dim)))
-        start, ids = model.particles.initial_position, model.particles.id
-        self.ids: list[int] = []
+        self.ids = [nearest_particle(model, place) for place in places]
         """Numbers of the particles."""
-        for place in places:
-            distance = np.linalg.norm(start - place, axis=1)
-            # Of several as near as each other the one with the lowest number, on any partition.
-            mine = (np.inf, -1)
-            if len(distance):
-                near = distance <= distance.min() * (1 + 1e-12)
-                mine = (float(distance.min()), int(ids[near].min()))
-            found = model.comm.allgather(mine)
-            least = min(distance for distance, _ in found)
-            if not np.isfinite(least):
-                raise InputError("the model has no particles, seed some first")
-            self.ids.append(min(number for distance, number in found if distance <= least * (1 + 1e-12)))
         dim = model.mesh.dim
         self._columns = _vectors(dim, ("position", "m"), ("displacement", "m"), ("velocity", "m/s"))
         self._columns += _components("stress", "Pa", STRESSES[dim])
