@@ -77,7 +77,7 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
 def _take_stress_and_state(model, fem, search, smooth):
     """Give the particles what the finite elements have where they are; returns how many stresses had to be returned."""
     particles = model.particles
-    stress, state = search.values(fem.stress_function(smooth)), particles.state
+    stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
     if isinstance(fem, QuasiStatic):
         values = search.values(fem.state_function())
         own = state.copy()

@@ -23,10 +23,12 @@ from ._core import (
     Undrained,
 )
 from ._core import compiler as compiler
+from ._core import law_types
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
 from .element import ElementTest
 from .ghost import GhostPenalty
+from .law_arguments import explain_arguments
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
@@ -34,6 +36,10 @@ from .newton import Newton
 from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
+from .reports import Reports
+
+for _law in law_types:
+    explain_arguments(_law)
 
 __all__ = [
     "CamClay",
@@ -55,6 +61,7 @@ __all__ = [
     "Relaxation",
     "RelaxationKind",
     "Report",
+    "Reports",
     "RunError",
     "Softening",
     "SofteningMohrCoulomb",

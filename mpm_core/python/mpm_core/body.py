@@ -21,6 +21,12 @@ class Body:
     """The part of a model that does not know how it is run; see `Model`."""
 
     def __init__(self, mesh: Mesh, laws: Any | Sequence[Any]) -> None:
+        if not isinstance(mesh, Mesh):
+            kind = f"{type(mesh).__module__}.{type(mesh).__name__}"
+            raise InputError(
+                f"mesh is a {kind}, expected an mpm_core.Mesh; fenics_bridge.background_mesh(domain, cell_tags, facet_tags) makes "
+                "one of a mesh of DOLFINx"
+            )
         self.mesh = mesh
         self.comm: MPI.Comm = mesh.comm
         self.laws = list(laws) if isinstance(laws, (list, tuple)) else [laws]
@@ -74,7 +80,8 @@ class Body:
             Number of particles placed, over all ranks.
 
         Raises:
-            InputError: a density that is not positive, a number that does not fill a cell evenly, an unknown tag or law.
+            InputError: a density that is not positive, a number that does not fill a cell evenly, an unknown tag or law, or
+                cells that hold particles already.
         """
 
         def place() -> int:
@@ -83,9 +90,20 @@ class Body:
             if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
                 raise InputError(f"per_cell is {per_cell}, expected a whole number")
             number = self._material(material)
+            self._require_empty(cell_tag, tags)
             return sum(self._core.seed_cells(tag, int(per_cell), number, rho, self._next_id) for tag in tags)
 
         return self._seeded(collectively(self.comm, place), self.mesh.cell_numbers * int(per_cell))
+
+    def _require_empty(self, cell_tag: Tag | None, tags: Sequence[int | None]) -> None:
+        filled = np.unique(self.particles.cell)
+        again = filled if tags == [None] else filled[np.isin(self.mesh.cell_tags[filled], np.array(tags))]
+        if len(again):
+            where = "mesh" if cell_tag is None else f"part with the tag {cell_tag!r}"
+            raise InputError(
+                f"cell_tag is {cell_tag!r}, but {len(again)} cells of that {where} hold particles already, and would hold their "
+                "soil twice; seed each cell once, and choose laws by material= or model.assign()"
+            )
 
     def seed_points(self, points: ArrayLike, volumes: ArrayLike, *, density: float, material: int = 0) -> int:
         """Place one particle at each given point. Every rank gives the same points.
@@ -156,7 +174,7 @@ class Body:
 
     def set_state(self, name: str, values: ArrayLike) -> None:
         """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
-        state, material = self.particles.state, self.particles.material
+        state, material = self.particles.state.copy(), self.particles.material
         new = np.asarray(values, dtype=np.float64)
         if new.shape != material.shape:
             raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")

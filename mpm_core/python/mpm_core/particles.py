@@ -13,7 +13,7 @@ from .mesh import floats
 
 
 class Particles:
-    """The particles of a model on this rank. Every attribute is a copy, one row per particle.
+    """The particles of a model on this rank. Every attribute is a copy, one row per particle, and read-only: `set` writes.
 
     The order of rows changes when particles are sorted or move to another rank; ``id`` tells who is who. Of a few particles
     attributes are had sooner than by copying those of all:
@@ -52,7 +52,9 @@ class Particles:
             raise InputError(f"{what} is for all particles, not for those in some rows")
 
     def _column(self, name: str) -> NDArray[Any]:
-        return self._core.column(name, self._rows)
+        values = self._core.column(name, self._rows)
+        values.flags.writeable = False  # a value written into a copy would be lost without a word
+        return values
 
     @property
     def id(self) -> NDArray[np.int64]:

@@ -1,0 +1,47 @@
+"""The reports of a run, one by one as the run goes on."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+R = TypeVar("R")
+
+
+class Reports(Generic[R]):
+    """Iterator over the reports of a run; the run goes on as they are asked for.
+
+    Example:
+        >>> for report in model.explicit(until=2.0, every=0.5):
+        ...     print(report.time)
+        >>> report = model.explicit(until=4.0).last()
+
+    A run whose reports nobody asks for makes no step, and says so by a RuntimeWarning.
+    """
+
+    def __init__(self, steps: Iterator[R], scheme: str) -> None:
+        self._steps, self._scheme, self._begun = steps, scheme, False
+
+    def __iter__(self) -> Reports[R]:
+        return self
+
+    def __next__(self) -> R:
+        self._begun = True
+        return next(self._steps)
+
+    def last(self) -> R | None:
+        """Run to the end. Returns the last report; None when the time was reached before."""
+        report = None
+        for report in self:
+            pass
+        return report
+
+    def __del__(self) -> None:
+        if not getattr(self, "_begun", True):
+            warnings.warn(
+                f"Model.{self._scheme}(...) made no step, since nothing asked for its reports: write "
+                f"`for report in model.{self._scheme}(...)`, or model.{self._scheme}(...).last() to run to the end",
+                RuntimeWarning,
+                stacklevel=2,
+            )
