@@ -68,7 +68,7 @@ def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -
     with Progress("as cut at first" if threshold is None else "cut anew", until, comm) as progress:
         look(0.0)
         started = perf_counter()
-        for report in model.explicit(until, every=until / frames, pic=0.01, rebalance=threshold):
+        for report in model.explicit(until, every=until / frames, pic=0.02, rebalance=threshold):
             run.seconds += perf_counter() - started
             look(report.time)
             progress.show(report.time, report.steps)

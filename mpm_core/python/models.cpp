@@ -243,7 +243,6 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
       .def_readwrite("damping", &ExplicitOptions::damping)
-      .def_readwrite("pic_share", &ExplicitOptions::pic_share)
       .def_readwrite("mixed_discretisation", &ExplicitOptions::mixed_discretisation)
       .def_readwrite("integration", &ExplicitOptions::integration);
   py::class_<RunOptions>(m, "RunOptions")
@@ -251,6 +250,7 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def_readwrite("until", &RunOptions::until)
       .def_readwrite("dt", &RunOptions::dt)
       .def_readwrite("courant", &RunOptions::courant)
+      .def_readwrite("pic", &RunOptions::pic)
       .def_readwrite("allow_unstable", &RunOptions::allow_unstable)
       .def_readwrite("max_steps", &RunOptions::max_steps);
   m.attr("control_interval") = control_interval;

@@ -194,6 +194,11 @@ double critical_time_step(const Model<D>& model)
   return std::sqrt(squared);
 }
 
+double pic_share_of_step(double share, double dt, double critical)
+{
+  return share == 0 ? 0 : -std::expm1(dt / critical * std::log1p(-share)); // 1 for a share of 1
+}
+
 #define INSTANTIATE(D)                                                                                                 \
   template void explicit_step(Model<D>&, const ExplicitOptions&, double);                                              \
   template double out_of_balance<D>(const Model<D>&, const Vector<D>&);                                                \

@@ -18,7 +18,7 @@ struct ExplicitOptions
 {
   StressUpdate stress_update = StressUpdate::modified_last;
   double damping = 0;   ///< local damping alpha of FLAC, in [0, 1)
-  double pic_share = 0; ///< in [0, 1]
+  double pic_share = 0; ///< of a step, in [0, 1]
   bool mixed_discretisation = false;
   Integration integration = Integration::particles;
 };
@@ -41,4 +41,9 @@ double out_of_balance(const Model<D>& model, const Vector<D>& gravity);
 /// @note Collective
 template <int D>
 double critical_time_step(const Model<D>& model);
+
+/// The PIC share of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the step:
+/// 1 - (1 - share)^(dt / dt_cr).
+/// @param share  of a critical time step, in [0, 1]
+double pic_share_of_step(double share, double dt, double critical);
 } // namespace mpm

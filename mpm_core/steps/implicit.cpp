@@ -1,5 +1,6 @@
 #include "steps/implicit.h"
 
+#include "steps/explicit.h"
 #include "steps/implicit_trial.h"
 #include "steps/mapping.h"
 #include "steps/particle_pass.h"
@@ -208,7 +209,9 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
     average_strains(model, step.dt);
   const Particles<D> start = model.particles;
   // Quasi-static: PIC with grid velocities of zero leaves the particles at rest.
-  const double pic = options.quasi_static ? 1 : options.pic_share;
+  double pic = options.quasi_static ? 1 : 0;
+  if (!options.quasi_static && options.pic > 0)
+    pic = pic_share_of_step(options.pic, step.dt, critical_time_step(model));
   find_velocity_change(model, pic, step.dt);
   particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation,
                            options.hold_positions}); // (18), (20), stresses

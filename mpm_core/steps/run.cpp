@@ -56,9 +56,8 @@ std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble)
 namespace
 {
 template <int D>
-double next_step(const Model<D>& model, const RunOptions& run)
+double next_step(const Model<D>& model, const RunOptions& run, double critical)
 {
-  const double critical = critical_time_step(model);
   if (run.dt && *run.dt > critical * (1 + 1e-12) && !run.allow_unstable)
   {
     std::ostringstream out;
@@ -77,14 +76,19 @@ template <int D>
 std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run)
 {
   prepare(model);
+  ExplicitOptions of_step = options;
   std::int64_t done = 0;
   double dt = 0;
   const double closeness = 1e-9 * std::abs(run.until);
   while (run.until - model.time > closeness && (run.max_steps == 0 || done < run.max_steps))
   {
     if (done % control_interval == 0)
-      dt = next_step(model, run);
-    explicit_step(model, options, dt);
+    {
+      const double critical = critical_time_step(model);
+      dt = next_step(model, run, critical);
+      of_step.pic_share = pic_share_of_step(run.pic, dt, critical);
+    }
+    explicit_step(model, of_step, dt);
     if (model.work.trouble)
       throw RunError(trouble_text(model, *model.work.trouble));
     ++done;

@@ -20,7 +20,8 @@ SURFACE = np.array([(0, 99.2), (100, 77.6), (200, 47.4), (302, 21.5), (402, 3.7)
 RUN_OUT = SURFACE[-1, 0]
 SIDE, GROUND = 1, 3
 TIME = 1.0  # s
-PIC_SHARE = 0.003
+PIC_SHARE = 0.006
+"""Of a critical time step"""
 
 
 def run(quick: bool, folder) -> Result:

@@ -27,7 +27,7 @@ import mpm_core as mpm
 WIDTH, REPOSE = 0.1, 31.0  # m, degrees: sand
 FRICTION = np.degrees(np.arcsin(np.tan(np.radians(REPOSE))))
 SAND = mpm.MohrCoulomb(young=0.5e6, poisson=0.3, cohesion=0.0, friction_angle=FRICTION)
-PIC_SHARE, LARGER_SHARE = 0.003, 0.01
+PIC_SHARE, LARGER_SHARE = 0.006, 0.02  # of a critical time step
 SIDE, GROUND, GRAVITY = 1, 3, 9.81
 RATIOS = (0.5, 1.0, 1.5, 3.0, 4.5, 6.0)
 

@@ -67,7 +67,7 @@ def test_particles_take_the_values_of_the_finite_elements():
 def test_soil_that_is_handed_over_softens_as_seeded_soil_does(fem_size, cell_size):
     """The particles keep the size of their own cells, and the strength that the finite elements left them."""
     peak = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0)
-    law = mpm.SofteningMohrCoulomb(peak, residual_cohesion=0.5e3, residual_friction_angle=25.0, softening_strain=0.02,
+    law = mpm.SofteningMohrCoulomb(peak, residual_cohesion=0.9e3, residual_friction_angle=25.0, softening_strain=0.1,
                                    reference_length=0.1)  # fmt: skip
     body, _, facets = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, cell_size=fem_size))
     held = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]

@@ -97,3 +97,30 @@ def test_spinning_block_keeps_its_shape_without_stress(dim, cells, turns, lag):
     assert angle == pytest.approx(turns * 2 * np.pi, rel=lag)  # the lumped mass of few cells costs spin
     assert stretches == pytest.approx(1, abs=0.01)
     assert np.abs(model.particles.stress).mean(axis=0).max() < DENSITY * omega**2
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize("pic", [0.05, 1.0])
+@pytest.mark.parametrize("courant", [0.1, 0.25, 0.5, 1.0])
+def test_pic_takes_the_same_in_the_same_time_whatever_the_step(dim, pic, courant):
+    # Two particles in one place with opposite velocities: the nodes see none, so that the particles lose theirs, a fraction
+    # `pic` in each critical time step, and keep their place.
+    model = mpm.Model(box([2] * dim), ELASTIC)
+    place = np.full(dim, 0.4) + 0.05 * np.arange(dim)
+    model.seed_points([place, place], [0.05, 0.05], density=DENSITY)
+    velocity = np.outer([1.0, -1.0], np.arange(1, dim + 1))
+    model.particles.set("velocity", velocity)
+    run(model, 12 * model.critical_time_step(), courant=courant, pic=pic)
+    assert np.allclose(by_id(model, "velocity"), velocity * (1 - pic) ** 12, rtol=1e-9, atol=1e-12)
+    assert np.allclose(by_id(model, "position"), place, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [1, 3, 10])
+def test_pic_of_implicit_steps_is_that_of_the_time_they_take(steps):
+    model = mpm.Model(box([2, 2]), ELASTIC)
+    model.seed_points([[0.4, 0.45], [0.4, 0.45]], [0.05, 0.05], density=DENSITY)
+    velocity = np.outer([1.0, -1.0], [1.0, 2.0])
+    model.particles.set("velocity", velocity)
+    until = 30 * model.critical_time_step()
+    list(model.implicit(until, dt=until / steps, pic=0.05))
+    assert np.allclose(by_id(model, "velocity"), velocity * 0.95**30, rtol=1e-9, atol=1e-12)

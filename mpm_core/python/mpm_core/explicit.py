@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -19,24 +20,24 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def explicit_options(damping: float, pic: float, nmd: bool, integration: Any, stress_update: Any) -> Any:
+def explicit_options(damping: float, nmd: bool, integration: Any, stress_update: Any) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
-    options.pic_share = within("pic", pic, 0, 1)
     options.mixed_discretisation = bool(nmd)
     options.integration = integration
     options.stress_update = stress_update
     return options
 
 
-def run_options(dt: float | None, courant: float, allow_unstable: bool) -> Any:
+def run_options(dt: float | None, courant: float, pic: float, allow_unstable: bool) -> Any:
     """The core's options of the time step; see `Model.explicit`."""
     run = _core.RunOptions()
     run.dt = None if dt is None else positive("dt", dt, "s")
     if not 0 < courant <= 1:
         raise InputError(f"courant is {courant}, expected 0 < courant <= 1")
     run.courant = courant
+    run.pic = within("pic", pic, 0, 1)
     run.allow_unstable = bool(allow_unstable)
     return run
 
@@ -45,6 +46,20 @@ def require_particles(model: Model) -> None:
     """Raises InputError where no rank has any. Collective."""
     if model.comm.allreduce(len(model.particles)) == 0:
         raise InputError("the model has no particles, seed some first")
+
+
+def warn_if_nothing_acts(model: Model) -> None:
+    """Warns where nothing can set the particles in motion: most often gravity has been forgotten. Collective."""
+    p = model.particles
+    acts = bool(np.any(model.gravity)) or bool(model._prescribed)
+    acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
+    if not model.comm.allreduce(int(acts)) and model.comm.rank == 0:
+        warnings.warn(
+            "nothing acts on the particles: gravity is zero, and so are tractions, prescribed velocities, and the particles' own "
+            "velocities and stresses; gravity is given by model.set_gravity",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:

@@ -42,7 +42,7 @@ def implicit_options(
     """The core's options of the scheme; see `Model.implicit`."""
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
-    options.pic_share = within("pic", pic, 0, 1)
+    options.pic = within("pic", pic, 0, 1)
     options.mixed_discretisation = bool(nmd)
     if integration == Integration.DUAL_DOMAIN:
         raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")

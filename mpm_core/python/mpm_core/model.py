@@ -1,7 +1,7 @@
 """A model: background mesh, particles, laws, loads and supports; and the schemes that move it."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -11,7 +11,15 @@ from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .collective import collectively
-from .explicit import explicit_options, report_times, require_particles, run_explicit, run_options, steps_between
+from .explicit import (
+    explicit_options,
+    report_times,
+    require_particles,
+    run_explicit,
+    run_options,
+    steps_between,
+    warn_if_nothing_acts,
+)
 from .ghost import GhostPenalty
 from .implicit import implicit_options, run_implicit, settle
 from .mesh import floats
@@ -19,6 +27,7 @@ from .newton import Newton
 from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
+from .reports import Reports
 
 
 class Model(Body):
@@ -127,7 +136,7 @@ class Model(Body):
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         allow_unstable: bool = False,
         rebalance: float | None = None,
-    ) -> Iterator[Report]:
+    ) -> Reports[Report]:
         """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
 
         Args:
@@ -141,7 +150,8 @@ class Model(Body):
             dt: time step [s]; by default ``courant`` times the critical one, which is found anew as the soil changes.
             courant: alpha_c of (17), in (0, 1].
             damping: local damping alpha, in [0, 1).
-            pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
+            pic: fraction of the particles' own velocities that the grid's takes the place of in a critical time step, in [0, 1]; 0 is
+                FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
@@ -156,15 +166,16 @@ class Model(Body):
         options, run, times, threshold, steps = collectively(
             self.comm,
             lambda: (
-                explicit_options(damping, pic, nmd, integration, stress_update),
-                run_options(dt, courant, allow_unstable),
+                explicit_options(damping, nmd, integration, stress_update),
+                run_options(dt, courant, pic, allow_unstable),
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),
                 steps_between(every_steps),
             ),
         )
         require_particles(self)
-        return run_explicit(self, options, run, times, watch, threshold, steps)
+        warn_if_nothing_acts(self)
+        return Reports(run_explicit(self, options, run, times, watch, threshold, steps), "explicit")
 
     def implicit(
         self,
@@ -184,7 +195,7 @@ class Model(Body):
         ghost: GhostPenalty | None = None,
         small_displacements: bool = False,
         rebalance: float | None = None,
-    ) -> Iterator[ImplicitReport]:
+    ) -> Reports[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
 
         A step that does not converge is tried again with half its length; the length grows again when it is easy.
@@ -201,7 +212,8 @@ class Model(Body):
             quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
             damping: local damping alpha, in [0, 1). What it does to elastic oscillations that the step does not resolve
                 acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
-            pic: share of the grid's velocity in the particles', in [0, 1]; 0 is FLIP.
+            pic: fraction of the particles' own velocities that the grid's takes the place of in a critical time step, in [0, 1]; 0 is
+                FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
@@ -226,9 +238,11 @@ class Model(Body):
             ),
         )
         require_particles(self)
-        return run_implicit(
+        warn_if_nothing_acts(self)
+        reports = run_implicit(
             self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold
         )  # fmt: skip
+        return Reports(reports, "implicit")
 
     def equilibrate(
         self,
