@@ -68,7 +68,13 @@ def parser() -> ArgumentParser:
     )
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
     add_number(
-        p, "--pic", 0.1, "-", "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)", at_least=0, at_most=1
+        p,
+        "--pic",
+        0.1,
+        "-",
+        "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
+        at_least=0,
+        at_most=1,
     )
     add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")

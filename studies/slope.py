@@ -73,7 +73,13 @@ def parser() -> ArgumentParser:
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_number(
-        p, "--pic", 0.0, "-", "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)", at_least=0, at_most=1
+        p,
+        "--pic",
+        0.0,
+        "-",
+        "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
+        at_least=0,
+        at_most=1,
     )
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)

@@ -73,7 +73,7 @@ def test_values_that_are_not_numbers_cannot_be_set(dim):
 @pytest.mark.parametrize(("name", "value"), [("mass", 0.0), ("mass", -1.0), ("volume", 0.0), ("volume", -1.0)])
 def test_mass_and_volume_stay_positive(name, value):
     model = moving_block(2)
-    values = getattr(model.particles, name)
+    values = getattr(model.particles, name).copy()
     values[5] = value
     model.particles.set(name, values)
     with pytest.raises(mpm.InputError, match=f"mass and volume of particle {model.particles.id[5]}"):

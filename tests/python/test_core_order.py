@@ -70,6 +70,9 @@ def test_values_that_were_set_stay_with_their_particles(dim):
 
 def test_attributes_are_copies():
     model = sliding_block(2)
-    model.particles.position[:] = 7.0
-    model.particles.mass[:] = 7.0
-    assert model.particles.position.max() < 1 and model.particles.mass.max() < 7
+    before = model.particles.position
+    kept = before.copy()
+    model.particles.set("initial_position", kept + 1.0)
+    list(model.explicit(0.01))
+    assert np.array_equal(before, kept) and not np.array_equal(model.particles.position, kept)
+    assert not before.flags.writeable

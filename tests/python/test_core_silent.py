@@ -80,9 +80,24 @@ SOIL = dict(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0)
 @pytest.mark.parametrize(
     ("law", "args", "change", "words"),
     [
-        (mpm.MohrCoulomb, (), {"frictionangle": 3.0}, "frictionangle is no parameter of MohrCoulomb; did you mean friction_angle"),
-        (mpm.MohrCoulomb, (), {"colour": 3.0}, r"colour is no parameter of MohrCoulomb\. MohrCoulomb has young, poisson"),
-        (mpm.MohrCoulomb, (5.0,), {}, "MohrCoulomb got 5.0 without a name, expected parameters by name, such as young="),
+        (
+            mpm.MohrCoulomb,
+            (),
+            {"frictionangle": 3.0},
+            "frictionangle is no parameter of MohrCoulomb; did you mean friction_angle",
+        ),
+        (
+            mpm.MohrCoulomb,
+            (),
+            {"colour": 3.0},
+            r"colour is no parameter of MohrCoulomb\. MohrCoulomb has young, poisson",
+        ),
+        (
+            mpm.MohrCoulomb,
+            (5.0,),
+            {},
+            "MohrCoulomb got 5.0 without a name, expected parameters by name, such as young=",
+        ),
         (mpm.MohrCoulomb, (), {"cohesion": "1 kPa"}, "cohesion of MohrCoulomb is '1 kPa', expected a number"),
         (mpm.LinearElastic, (), {}, "cohesion is no parameter of LinearElastic"),
     ],

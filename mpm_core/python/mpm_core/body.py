@@ -90,7 +90,8 @@ class Body:
             if isinstance(per_cell, bool) or not isinstance(per_cell, (int, np.integer)):
                 raise InputError(f"per_cell is {per_cell}, expected a whole number")
             number = self._material(material)
-            self._require_empty(cell_tag, tags)
+            if per_cell > 0:
+                self._require_empty(cell_tag, tags)
             return sum(self._core.seed_cells(tag, int(per_cell), number, rho, self._next_id) for tag in tags)
 
         return self._seeded(collectively(self.comm, place), self.mesh.cell_numbers * int(per_cell))

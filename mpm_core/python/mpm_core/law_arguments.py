@@ -16,7 +16,9 @@ def _parameters(law: Any) -> tuple[dict[str, bool], list[str]]:
     positional, _, keywords = signature.partition("*, ")
     names = r"(\w+): (.*?)(?=, \w+: |, $|\) -> )"
     before = re.findall(names, positional.partition(", ")[2])
-    return {name: " = " not in rest for name, rest in before + re.findall(names, keywords)}, [name for name, _ in before]
+    return {name: " = " not in rest for name, rest in before + re.findall(names, keywords)}, [
+        name for name, _ in before
+    ]
 
 
 def _complaint(
@@ -31,7 +33,9 @@ def _complaint(
     if len(args) > len(positional):
         first = args[len(positional)]
         return f"{name} got {first!r} without a name, expected parameters by name, such as {[*known][len(positional)]}=. {everything}"
-    missing = [key for key, needed in known.items() if needed and key not in given and key not in positional[: len(args)]]
+    missing = [
+        key for key, needed in known.items() if needed and key not in given and key not in positional[: len(args)]
+    ]
     if missing:
         return f"{name} lacks {', '.join(missing)}. {everything}"
     for key, value in given.items():
