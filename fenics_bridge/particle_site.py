@@ -87,7 +87,7 @@ class ParticleSite:
         model.seed(density=unit_weight / self._g, per_cell=self._per_cell, cell_tag=tag, material=self._material[tag])
         self._seeded.append((first, model._next_id, tag))
         if stage.stress is not None:
-            stress, rows = model.particles.stress, self.rows_of(tag) & (model.particles.id >= first)
+            stress, rows = model.particles.stress.copy(), self.rows_of(tag) & (model.particles.id >= first)
             stress[rows] = stage.stress(model.particles.position[rows])
             model.particles.set("stress", stress)
 
@@ -99,7 +99,7 @@ class ParticleSite:
 
     def _change_laws(self, material):
         model = self.model
-        numbers, state, changed = model.particles.material, model.particles.state, False
+        numbers, state, changed = model.particles.material.copy(), model.particles.state.copy(), False
         for tag, number in material.items():
             if number != self._material.get(tag):
                 rows = self.rows_of(tag)
@@ -112,7 +112,7 @@ class ParticleSite:
 
     def _weigh(self, state):
         """Mass from the unit weights in force; a particle's volume before it was deformed is not kept, so by the ratio."""
-        mass = self.model.particles.mass
+        mass = self.model.particles.mass.copy()
         for tag in self.state.there:
             if tag in state.there and state.unit_weight[tag] != self.state.unit_weight[tag]:
                 mass[self.rows_of(tag)] *= state.unit_weight[tag] / self.state.unit_weight[tag]

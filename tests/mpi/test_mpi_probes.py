@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from mpm_core.probes import ParticleProbe, PointProbe, ProbeFile, SectionProbe, TotalsProbe, nearest_particle
-from partitions import bands, one_does_all, scattered, sliding_slope, spread_box
+from partitions import all_by_id, bands, one_does_all, scattered, sliding_slope, spread_box
 
 import mpm_core as mpm
 
