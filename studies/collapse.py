@@ -16,6 +16,7 @@ from common.files import OutputError
 from common.options import check, study_parser
 from common.ranks import run_study
 from common.results import open_results
+from common.site_runs import add_site_option, site_study
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -41,6 +42,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_fem_slope_options(p)
     add_flow_options(p)
+    add_site_option(p)
     return p
 
 
@@ -94,6 +96,9 @@ def draw(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
+    if a.site is not None:
+        return site_study(a, lambda site, model, progress: bridge.collapse_load(model, site.load, 0.1, progress=progress),
+                          "collapse_weight_factor", "Factor of all unit weights [-]")  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest)

@@ -17,6 +17,7 @@ from common.files import OutputError
 from common.options import add_number, study_parser
 from common.ranks import run_study
 from common.results import open_results
+from common.site_runs import add_site_option, site_study
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -44,6 +45,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
     add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
     add_flow_options(p)
+    add_site_option(p)
     return p
 
 
@@ -96,6 +98,9 @@ def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
+    if a.site is not None:
+        return site_study(a, lambda site, model, progress: bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress),
+                          "factor_of_safety", "Factor of safety [-]")  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
     limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight)

@@ -118,6 +118,11 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
     return site
 
 
+def cell_size_of(path: Path) -> float | None:
+    """Cell size [m] that a site names; None where it names none."""
+    return _table(path).get("cell_size")
+
+
 def law_at(table: dict, height: float, where: str) -> Any:
     """The law that a table describes, where its parameters that grow with depth have their value at a height [m]."""
     parser = study_parser(None)

@@ -1,0 +1,75 @@
+"""Collapse and factor of safety of a site of several soils, from a TOML file, on meshes of several sizes."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from .results import open_results
+from .site_file import Site, cell_size_of, read_site
+from .slope_fem import step_line
+from .summary import write_summary
+
+
+def add_site_option(parser: argparse.ArgumentParser) -> None:
+    """Option ``--site``."""
+    parser.add_argument("--site", type=Path, default=None, metavar="FILE", help="TOML file of a mesh and its soils by name, such "
+                        "as meshes/embankment.toml, in place of the slope; its options are then without effect")  # fmt: skip
+
+
+def site_study(
+    a: Namespace, find: Callable[[Site, bridge.QuasiStatic, Callable], bridge.Collapse], name: str, label: str
+) -> int:
+    """A study on a site instead of the slope; returns its exit code. Collective.
+
+    Args:
+        a: options, with site, meshes and elements; each mesh is twice as fine as the one before, the last as the site says.
+        find: function of the site, its elements (unloaded) and a progress that gives the last equilibrium.
+        name: of the value in the summary; label: of its axis, with unit.
+    """
+    comm, start = MPI.COMM_WORLD, perf_counter()
+    folder = open_results(a, comm)
+    finest = cell_size_of(a.site)
+    sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
+    runs = []
+    for size in sizes:
+        site = read_site(a.site, comm, size)
+        progress = step_line("site" if size is None else f"cells of {size:g} m")
+        runs.append(find(site, site.finite_elements(int(a.elements[1])), progress))
+    rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
+             "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
+            for size, run in zip(sizes, runs)]  # fmt: skip
+    _draw(folder, sizes, runs, label)
+    summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
+               "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
+    write_summary(folder, a, summary, comm)
+    if comm.rank == 0:
+        for row in rows:
+            sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
+            print(f"cells of {row['cell_size_m'] or np.nan:g} m: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
+        print(f"results in {folder}")
+    return 0
+
+
+def _draw(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str) -> None:
+    """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
+    field = gathered(runs[-1].mechanism)
+    if field is None:
+        return
+    save_mechanism(folder / "mechanism.png", field, f"{label.split(' [')[0]} {runs[-1].value:.3f}")
+    names = ["site" if size is None else f"{size:g} m" for size in sizes]
+    curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
+    wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
+    save_curves(folder / "value_displacement.png", curves, ("Largest displacement [mm]", label),
+                limits=((0, wide), (lowest, None)))  # fmt: skip
+    if None not in sizes:
+        save_convergence(folder / "convergence.png", sizes, {"site": [run.value for run in runs]}, label, None)
