@@ -23,6 +23,8 @@ class FemSite:
         """first_step, tolerance, progress: of each stage, as for `QuasiStatic.solve`."""
         comm = fem.domain.comm
         agree(comm, None if fem.cell_tags is not None else "fem: it has no cell_tags, by which stages know soils")
+        fresh = fem.load == Load() and not fem.off
+        agree(comm, None if fresh else "fem: it is loaded already, expected a new one, whose soils the stages place")
         self.fem, self.number = fem, 0
         self._options = {"first_step": first_step, "tolerance": tolerance, "progress": progress}
         self.state = SiteState(

@@ -251,6 +251,13 @@ def test_soil_without_unit_weight_is_named(pit):
         carried_out(site_of(pit, elastic(SOILS["pit"])), bridge.Stage("in situ", fill="ground"))
 
 
+def test_a_body_that_is_loaded_already_is_refused(pit):
+    site = site_of(pit, elastic(SOILS["pit"]))
+    carried_out(site, IN_SITU)
+    with pytest.raises(bridge.InputError, match="fem: it is loaded already"):
+        bridge.FemSite(site.fem)
+
+
 def failure(pit, laws, *stages, supports=ROLLERS):
     site = site_of(pit, laws, supports, degree=1)
     with pytest.raises(bridge.StageError) as error:
