@@ -11,7 +11,7 @@ import numpy as np
 from fenics_bridge import gmsh_reader
 from fenics_bridge.errors import InputError, agree, on_root
 from fenics_bridge.gmsh_process import Limits, read_apart
-from fenics_bridge.mesh_checks import check_cells_fit
+from fenics_bridge.mesh_checks import check_cells_fit, check_conforming
 from fenics_bridge.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 
@@ -80,6 +80,8 @@ def _arrays_from_file(path, dim, parameters, limits):
 
 def _mesh_arrays(arrays, name):
     check_cells_fit(arrays["cells"], name)
+    if arrays["cells"].shape[1] == 3:
+        check_conforming(arrays["points"], arrays["cells"], name)
     keys = "points", "cells", "cell_values", "facets", "facet_values"
     return MeshArrays(*(arrays[key] for key in keys), *(_names(arrays, kind) for kind in ("cell", "facet")))
 
