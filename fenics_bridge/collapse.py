@@ -17,9 +17,10 @@ from fenics_bridge.strength import reduced_strength
 class Collapse:
     """The last equilibrium that was found on the way to collapse, and what is above it.
 
-    value: of the load or of the factor of safety there; failed_at: smallest value above it that was tried
+    value: of the load or of the factor of safety there
     failed: whether the body was shown to fail at `failed_at`: it flows in a mechanism under a load that its stresses do not
         carry. If not, the solver gave up there, and `value` is a lower bound only; reason: in words
+    failed_at: smallest value above `value` at which it was shown to fail, or that was tried if it was shown at none
     carried: fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if not shown
     residual: largest out-of-balance force that was accepted on the way, over the forces at work [-]
     curve: (k, 2), value and largest displacement of a node [m] at every equilibrium on the way
@@ -104,7 +105,9 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
         return report
 
     steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
-    last = min((step for step in steps if step.value > curve[-1][0]), key=lambda step: step.value)
+    above = [step for step in steps if step.value > curve[-1][0]]
+    failures = [step for step in above if step.report.outcome == "failure"]
+    last = min(failures or above, key=lambda step: step.value)
     agree(
         comm,
         None

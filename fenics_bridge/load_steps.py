@@ -32,12 +32,12 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
 
     equilibrate: function of the value that returns an EquilibriumReport
     first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without
-        equilibrium halves it. A value at which the body fails is never passed.
+        equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
     tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end
     progress: called with each LoadStep, or None. Returns all steps; the last converged one is the last equilibrium.
     """
     steps: list[LoadStep] = []
-    value, size, easy, failed_at = start, min(first_step, end - start), 0, math.inf
+    value, size, easy, failed_at, undecided = start, min(first_step, end - start), 0, math.inf, False
     while value < end and len(steps) < _MOST_STEPS:
         smallest = tolerance * max(abs(value), first_step)
         size = min(size, 0.5 * (failed_at - value))
@@ -52,8 +52,11 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
             easy = easy + 1 if steps[-1].report.easy else 0
             if easy == 2:
                 size, easy = 2 * size, 0
+            if failed_at < math.inf and not undecided:
+                size = 0.5 * (failed_at - value)
         else:
             size, easy = (target - value) / 2, 0
+            undecided = undecided or steps[-1].report.outcome == "undecided"
             if steps[-1].report.outcome == "failure":
                 failed_at = target
                 size = max(_below_failure(value, target, steps[-1].report.carried), smallest)

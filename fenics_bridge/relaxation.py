@@ -30,6 +30,9 @@ from fenics_bridge.equilibrium import EquilibriumStep
 FIRST, LARGEST = 1.0, 100.0
 """theta at the start, and the one at which the relaxation is given up [-]"""
 
+ELASTIC = 4.0
+"""Elastic displacements under a change of load that the growth must exceed before it counts as failure"""
+
 RUN_AWAY = 5.0
 """Growth over the reference, at which the motion counts as failure even if its rate still changes"""
 
@@ -70,8 +73,8 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
 
     external, before: nodal forces of the load and of the load before it; displacement: fraction of the prescribed displacements
     tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-]
-    max_steps: of pseudo-time; reference: displacement at the start [m]; the growth must exceed it, and the elastic
-        displacement of the change of load besides, before it counts as failure
+    max_steps: of pseudo-time; reference: displacement at the start [m]; the growth must exceed it, and some times the
+        elastic displacement of the change of load besides, before it counts as failure
     Returns a Relaxation. The body is left where the relaxation ended, whatever the outcome. Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
@@ -91,7 +94,7 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
             continue
         _record(result, body, step, theta, start)
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
-            reference += (1 + theta) * result.growth[0]
+            reference += ELASTIC * (1 + theta) * result.growth[0]
         if result.residual[-1] <= tolerance:
             result.outcome = "equilibrium"
             return result

@@ -67,9 +67,10 @@ def target(spiral: bridge.LogSpiral) -> Target:
     )  # fmt: skip
 
 
-def collapse(a: Namespace, cell_size: float, dilation_angle: float, first_step: float) -> bridge.Collapse:
-    """Raise the unit weight to the last equilibrium on one mesh."""
+def collapse(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
+    """Raise the unit weight to the last equilibrium on one mesh; the first step knows nothing of the answer."""
     model = slope_fem(a, comm, cell_size, dilation_angle)
+    first_step = a.cohesion / a.height
     title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"
     return bridge.collapse_load(model, weight, first_step=first_step, progress=step_line(title))
 
@@ -103,9 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest)
     sizes = mesh_sizes(a)
-    runs = {
-        angle: [collapse(a, size, angle, 0.1 * spiral.unit_weight) for size in sizes] for angle in dilation_angles(a)
-    }
+    runs = {angle: [collapse(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(spiral), a.friction_angle, sizes, runs)
     draw(found, spiral, folder)
 
@@ -126,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
         if spiral.curve[0, 0] < 0:
             print("its slip line starts behind the mesh: --crest is too short to compare")
         print(f"{found.lines()}\nresults in {folder}")
-    return 0
+    return found.exit_code()
 
 
 if __name__ == "__main__":

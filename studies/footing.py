@@ -13,11 +13,11 @@ from time import perf_counter
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.files import OutputError
-from common.options import add_choice, add_count, add_number, check, study_parser
+from common.options import add_count, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.slope_case import soil_of
-from common.slope_fem import step_line
+from common.slope_fem import add_element_options, finite_elements, step_line
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -46,7 +46,7 @@ def parser() -> ArgumentParser:
         p, "--cell-size", 0.05, "m", "triangles below the footing; a fifth of it at its edge, more far away", above=0
     )
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
-    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    add_element_options(p)
     add_flow_options(p)
     return p
 
@@ -109,7 +109,7 @@ def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[brid
                   "edge_size": 0.2 * cell_size, "near_size": cell_size, "far_size": 6 * cell_size}  # fmt: skip
     domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
     supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
-    model = bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, degree=int(a.elements[1]))
+    model = bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, **finite_elements(a))
     show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees")
     curve, centre = [(0.0, 0.0)], np.zeros((1, 2))
 
@@ -120,8 +120,7 @@ def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[brid
             curve.append((step.value, -moved[0, 1]))
 
     load = lambda pressure: bridge.Load(pressure={FOOTING: pressure})  # noqa: E731
-    first_step = 0.03 * prandtl_factor(a.friction_angle) * a.cohesion
-    return bridge.collapse_load(model, load, first_step=first_step, progress=look), np.array(curve)
+    return bridge.collapse_load(model, load, first_step=a.cohesion, progress=look), np.array(curve)
 
 
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
@@ -162,7 +161,7 @@ def main(arguments: list[str] | None = None) -> int:
     write_summary(folder, a, summary, comm)
     if comm.rank == 0:
         print(f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}\nresults in {folder}")
-    return 0
+    return found.exit_code()
 
 
 if __name__ == "__main__":

@@ -119,7 +119,7 @@ def main(arguments: list[str] | None = None) -> int:
     write_summary(folder, a, summary, comm)
     if comm.rank == 0:
         print(f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}\nresults in {folder}")
-    return 0
+    return found.exit_code()
 
 
 if __name__ == "__main__":

@@ -15,6 +15,10 @@ from .field_plots import bend, gathered, save_convergence, save_curves, save_mec
 from .options import add_switch
 
 
+UNDECIDED = 3
+"""Exit code of a study that found a lower bound, but no failure above it"""
+
+
 def add_flow_options(parser: ArgumentParser) -> None:
     """Option ``--without-dilation``."""
     add_switch(parser, "--without-dilation", True, "flow without dilation as well, to compare with")
@@ -79,6 +83,7 @@ class CollapseRuns:
         return {
             target.name: value,
             target.failed_name: chosen.failed_at / target.unit,
+            "failure_shown": all(run.failed for run in self._all_runs()),
             target.reference_name: target.reference,
             "relative_difference_to_limit_analysis": value / target.reference - 1,
             "dilation_angle_degrees": next(iter(self.runs)),
@@ -91,7 +96,8 @@ class CollapseRuns:
         target = self.target
         return [
             {"cell_size_m": size, "dilation_angle_degrees": angle, target.name: self._value(run),
-             target.failed_name: run.failed_at / target.unit,
+             target.failed_name: run.failed_at / target.unit, "failure_shown": run.failed,
+             "carried_fraction_of_mechanism": run.carried if run.failed else None, "largest_out_of_balance_ratio": run.residual,
              "relative_difference_to_limit_analysis": self._value(run) / target.reference - 1,
              "largest_displacement_m": run.curve[-1, 1], "steps": len(run.steps)}
             for angle, runs in self.runs.items() for size, run in zip(self.sizes, runs)
@@ -99,12 +105,25 @@ class CollapseRuns:
 
     def lines(self) -> str:
         """The rows as text."""
-        return "\n".join(
-            f"cells of {row['cell_size_m']:<7g} m, dilation angle {row['dilation_angle_degrees']:4g} degrees: "
-            f"{self.target.line.format(self.target.shown(row[self.target.name]))} "
-            f"({row['relative_difference_to_limit_analysis']:+.1%})"
-            for row in self.rows()
+        return "\n".join(self._line(row, run) for row, run in zip(self.rows(), self._all_runs()))
+
+    def _line(self, row: dict[str, object], run: bridge.Collapse) -> str:
+        shown = self.target.line.format(self._shown(run.value))
+        next_one = self.target.line.format(self._shown(run.failed_at)).strip()
+        end = (
+            f"{shown} ({row['relative_difference_to_limit_analysis']:+.1%}), fails at {next_one}, "
+            f"where the mechanism carries {run.carried:.1%} of the load"
+            if run.failed
+            else f"AT LEAST {shown.strip()}: the solver gave up at {next_one} without a mechanism ({run.reason})"
         )
+        return f"cells of {row['cell_size_m']:<7g} m, dilation angle {row['dilation_angle_degrees']:4g} degrees: {end}"
+
+    def exit_code(self) -> int:
+        """0 where failure was shown in all runs, otherwise `UNDECIDED`."""
+        return 0 if all(run.failed for run in self._all_runs()) else UNDECIDED
+
+    def _all_runs(self) -> list[bridge.Collapse]:
+        return [run for runs in self.runs.values() for run in runs]
 
     def finest_curve(self) -> np.ndarray:
         """Values and displacements [m] on the finest mesh: (k, 2)."""
@@ -139,7 +158,8 @@ class CollapseRuns:
             field = gathered(runs[-1].mechanism)
             if field is not None:
                 name = "mechanism" if number == 0 else "mechanism_without_dilation"
-                title = f"{self.target.title.format(self._shown(runs[-1].value))}, {self._flow(angle)}"
+                bound = "" if runs[-1].failed else "Lower bound: "
+                title = f"{bound}{self.target.title.format(self._shown(runs[-1].value))}, {self._flow(angle)}"
                 save_mechanism(folder / f"{name}.png", field, title, line=line(), line_name=line_name, **options)
 
     def _value(self, run: bridge.Collapse) -> float:

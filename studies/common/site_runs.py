@@ -13,10 +13,11 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 
+from .collapse_runs import UNDECIDED
 from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
 from .results import open_results
 from .site_file import Site, cell_size_of, read_site
-from .slope_fem import step_line
+from .slope_fem import finite_elements, step_line
 from .summary import write_summary
 
 
@@ -44,12 +45,13 @@ def site_study(
     for size in sizes:
         site = read_site(a.site, comm, size)
         progress = step_line("site" if size is None else f"cells of {size:g} m")
-        runs.append(find(site, site.finite_elements(int(a.elements[1])), progress))
+        runs.append(find(site, site.finite_elements(**finite_elements(a)), progress))
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
              "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
     _draw(folder, sizes, runs, label)
-    summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
+    summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at,
+               "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
     write_summary(folder, a, summary, comm)
     if comm.rank == 0:
@@ -57,7 +59,7 @@ def site_study(
             sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
             print(f"cells of {row['cell_size_m'] or np.nan:g} m: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
         print(f"results in {folder}")
-    return 0
+    return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
 def _draw(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str) -> None:

@@ -18,8 +18,26 @@ def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
     """Options of the slope, without particles, for studies that look for its collapse."""
     add_geometry_options(parser, cell_size=0.025)
     add_count(parser, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
-    add_choice(parser, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    add_element_options(parser)
     add_soil_options(parser, dilation_angle=None)
+
+
+def add_element_options(parser: argparse.ArgumentParser) -> None:
+    """Options ``--elements`` and ``--equilibrium``."""
+    add_choice(parser, "--elements", "P2", ("P1", "P1-averaged", "P2"),
+               "linear triangles, the same with averaged volumetric strains, or quadratic triangles")  # fmt: skip
+    add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
+               "out-of-balance force that is accepted, over the forces at work: 1e-8 by Newton's method and 1e-5 by "
+               "relaxation, or 1e-2 as in practice")  # fmt: skip
+
+
+def finite_elements(options: argparse.Namespace) -> dict[str, object]:
+    """Arguments of `QuasiStatic` that follow from those options."""
+    return {
+        "degree": int(options.elements[1]),
+        "nmd": options.elements.endswith("averaged"),
+        "solver": bridge.PRACTICE if options.equilibrium == "practice" else bridge.Solver(),
+    }
 
 
 def check_fem_slope_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
@@ -56,7 +74,7 @@ def slope_fem(
     )  # fmt: skip
     domain, _, facet_tags = bridge.soil_mesh(*background)
     law = soil_of(options, dilation_angle)
-    return bridge.QuasiStatic(domain, law, facet_tags, SUPPORTS, degree=int(options.elements[1]))
+    return bridge.QuasiStatic(domain, law, facet_tags, SUPPORTS, **finite_elements(options))
 
 
 def weight(unit_weight: float) -> bridge.Load:

@@ -24,7 +24,7 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica"),
-    "Limit analysis": ("limit_slopes", "limit_footing"),
+    "Limit analysis": ("limit_slopes", "limit_footing", "published_slopes"),
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),
@@ -42,7 +42,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p.add_argument("--cases", default=",".join(CASES), metavar="NAME,...", help=f"cases to run, of {', '.join(CASES)} "
                    "(default: all)")  # fmt: skip
     add_flag(p, "--quick", "small sizes, as the tests run them; tolerances are wider where sizes matter")
-    add_flag(p, "--docs", "also write docs/verification.md with its table and pictures")
+    add_flag(
+        p,
+        "--docs",
+        "also write docs/verification.md with its table and pictures; cases left out by --cases stay as they are there",
+    )
     options = p.parse_args(arguments)
     for name in options.cases.split(","):
         check(p, name in CASES, f"--cases names '{name}', expected some of {', '.join(CASES)}")
@@ -88,7 +92,7 @@ def main(arguments: list[str] | None = None) -> int:
     if comm.rank == 0:
         note_what_was_written(folder)
         if a.docs:
-            save_docs(ROOT / "docs", folder, table)
+            save_docs(ROOT / "docs", folder, table, CASES)
         print(f"{table.summary()}; report in {folder / 'report.html'}")
     return 0 if table.passed else 1
 

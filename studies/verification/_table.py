@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -179,14 +178,24 @@ def _made(table: Table) -> str:
     )
 
 
-def save_docs(docs: Path, folder: Path, table: Table) -> None:
-    """Write verification.md, and beside it what it is made from: verification.json and the pictures."""
+def save_docs(docs: Path, folder: Path, table: Table, order: Sequence[str]) -> None:
+    """Write verification.md, and beside it what it is made from: verification.json and the pictures.
+
+    Cases that this run left out keep their rows and pictures. order: names of all cases there are.
+    """
     images = docs / "images" / "verification"
-    shutil.rmtree(images, ignore_errors=True)
-    images.mkdir(parents=True)
+    images.mkdir(parents=True, exist_ok=True)
+    rows = {case.name: case for case in read_table(docs / "verification.json").cases}
+    rows |= {case.name: case for case in table.cases}
+    table = replace(table, cases=[rows[name] for name in order if name in rows])
     for case in table.cases:
         for name in case.figures:
-            save_small(folder / case.name / name, images / f"{case.name}_{name}")
+            if (folder / case.name / name).exists():
+                save_small(folder / case.name / name, images / f"{case.name}_{name}")
+    wanted = {f"{case.name}_{name}" for case in table.cases for name in case.figures}
+    for path in images.iterdir():
+        if path.name not in wanted:
+            path.unlink()
     save_table(docs / "verification.json", table)
     (docs / "verification.md").write_text(docs_page(table), "utf-8")
 

@@ -47,7 +47,7 @@ def nq(friction: float, size: float) -> float:
     # --- 2. The surcharge everywhere, then more and more on the footing ---------------------------------------------
     load = lambda pressure: bridge.Load(pressure={FOOTING: pressure, SURFACE: SURCHARGE})  # noqa: E731
     model.solve(load(SURCHARGE))
-    last = bridge.collapse_load(model, load, first_step=0.1 * surcharge_factor(friction) * SURCHARGE, start=SURCHARGE)
+    last = bridge.collapse_load(model, load, first_step=SURCHARGE, start=SURCHARGE)
     return last.value / SURCHARGE
 
 

@@ -47,7 +47,7 @@ def by_finite_elements(angle, friction, spiral, cell):
     model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2)
 
     # --- 2. Its unit weight, raised to the last equilibrium ---------------------------------------------------------
-    first = 0.3 * spiral.unit_weight
+    first = COHESION / HEIGHT  # from the strength alone, not from the answer
     load = lambda unit_weight: bridge.Load(unit_weight=unit_weight)  # noqa: E731
     return bridge.collapse_load(model, load, first_step=first, tolerance=5e-3).value * HEIGHT / COHESION
 

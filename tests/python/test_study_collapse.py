@@ -79,7 +79,7 @@ def test_bearing_capacity(tmp_path, friction_angle, tolerance):
         (
             "safety",
             ["--unit-weight", "200e3", "--start", "1", "--cell-size", "0.2", "--meshes", "1"],
-            ["start", "not carried"],
+            ["start", "only", "of the load is carried", "mechanism"],
         ),
         ("footing", ["--dilation-angle", "10"], ["--dilation-angle", "10", "--friction-angle"]),
     ],
@@ -88,3 +88,24 @@ def test_wrong_options_are_named(tmp_path, name, options, words):
     result = study(name, tmp_path, *options)
     assert result.returncode == 2 and "Traceback" not in result.stderr
     assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_a_lower_bound_is_never_called_collapse():
+    """Where no failure was shown: in the lines, in the summary and by the exit code."""
+    sys.path.insert(0, str(STUDIES))
+    from common.collapse_runs import UNDECIDED, CollapseRuns, Target
+
+    import fenics_bridge as bridge
+
+    def run(failed):
+        return bridge.Collapse(
+            1.3, 1.35, failed, "the solver's reason", 0.99, 1e-6, np.array([[1.0, 0.1], [1.3, 0.2]]), None, []
+        )
+
+    target = Target("factor", "failed_at_factor", "limit", 1.38, title="{:.3f}", line="{:.3f}", label="Factor [-]")
+    shown = CollapseRuns(target, 20.0, [1.0], {20.0: [run(True)]})
+    not_shown = CollapseRuns(target, 20.0, [1.0], {20.0: [run(True)], 0.0: [run(False)]})
+    assert shown.exit_code() == 0 and "AT LEAST" not in shown.lines() and shown.summary()["failure_shown"]
+    assert not_shown.exit_code() == UNDECIDED == 3 and not not_shown.summary()["failure_shown"]
+    assert "AT LEAST 1.300" in not_shown.lines() and "the solver's reason" in not_shown.lines()
+    assert not_shown.rows()[1]["carried_fraction_of_mechanism"] is None

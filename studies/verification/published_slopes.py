@@ -1,0 +1,104 @@
+"""Factors of safety of published slopes, without dilation, by strength reduction.
+
+The examples of Griffiths and Lane (1999), Géotechnique 49, 387–403, with a Poisson's ratio of 0.3 and no dilation: a slope
+1:2 of c'/γH = 0.05 and φ' = 20°, on rock and on half its height of the same soil, and an undrained slope of
+c_u/γH = 0.25 on a layer as thick as the slope is high, of another strength. Their own factors, by
+quadratic quadrilaterals and a loose tolerance, are 1.4 for the first two (1.380 by Bishop and Morgenstern, 1960). For the
+undrained slope 1.448 (one soil) and 2.032 (a foundation 1.5 and 4 times as strong) are the values that Code_Aster's
+validation V6.03.507 takes from limit equilibrium; it calls them the reference of the fourth example.
+Flow without dilation has no theorem by which the factor were one number: it falls by 1 to 2 % as the cells are halved,
+since shear bands become thinner, and it depends on the steps by some 0.5 %.
+"""
+
+import numpy as np
+from _case import Check, Result, run_alone
+from common.field_plots import gathered, save_mechanism
+from common.results import ROOT
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+HEIGHT, UNIT_WEIGHT = 10.0, 20e3  # m, N/m3
+ANGLE = float(np.degrees(np.arctan(0.5)))
+ELASTIC = {"young": 100e6, "poisson": 0.3}
+UNDRAINED = {1.0: 1.448, 1.5: 2.032, 4.0: 2.032}
+"""Factor of safety by the strength of the foundation, as a fraction of that of the slope"""
+
+
+def drained_on_rock(cell):
+    """The first example."""
+    background = bridge.slope_mesh(
+        MPI.COMM_WORLD, height=HEIGHT, angle=ANGLE, crest=1.2 * HEIGHT, cell_size=cell, kind="fitted", runout=cell
+    )
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    soil = mpm.MohrCoulomb(**ELASTIC, cohesion=0.05 * UNIT_WEIGHT * HEIGHT, friction_angle=20.0)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    return bridge.QuasiStatic(domain, soil, facet_tags, supports)
+
+
+def on_ground(cell, depth, beside, slope, foundation):
+    """A slope on ground of a depth, with two laws."""
+    shape = {"height": HEIGHT, "angle": ANGLE, "crest": beside, "runout": beside, "depth": depth,
+             "cell_size": cell, "far_size": 2 * cell}  # fmt: skip
+    mesh = ROOT / "meshes" / "layered_slope.geo"
+    domain, cell_tags, facet_tags = bridge.read_mesh(mesh, MPI.COMM_WORLD, parameters=shape)
+    supports = [bridge.roller("left", (1, 0)), bridge.roller("right", (1, 0)), bridge.fixed("base")]
+    laws = {"slope": slope, "foundation": foundation}
+    return bridge.QuasiStatic(domain, laws, facet_tags, supports, cell_tags=cell_tags)
+
+
+def drained_on_soil(cell):
+    """The second example: half of the slope's height of the same soil below it."""
+    soil = mpm.MohrCoulomb(**ELASTIC, cohesion=0.05 * UNIT_WEIGHT * HEIGHT, friction_angle=20.0)
+    return on_ground(cell, 0.5 * HEIGHT, 1.2 * HEIGHT, soil, soil)
+
+
+def undrained(cell, strength):
+    """The fourth example: a foundation as thick as the slope is high, of a strength as a fraction of that of the slope."""
+    slope, foundation = (
+        mpm.tresca(**ELASTIC, shear_strength=fraction * 0.25 * UNIT_WEIGHT * HEIGHT) for fraction in (1.0, strength)
+    )
+    return on_ground(cell, HEIGHT, 2 * HEIGHT, slope, foundation)
+
+
+def safety(model):
+    """The factor of safety under the weight, as a Collapse."""
+    return bridge.factor_of_safety(
+        model, bridge.Load(unit_weight=UNIT_WEIGHT), start=0.4, first_step=0.2, tolerance=3e-3
+    )
+
+
+def run(quick: bool, folder) -> Result:
+    checks, published = [], "Griffiths and Lane 1999; 1.38 by Bishop and Morgenstern 1960"
+
+    # --- 1. Drained soil without dilation, on several meshes --------------------------------------------------------
+    cases = [
+        (f"on rock, cells of {cell:g} m", drained_on_rock, cell) for cell in ((2.0,) if quick else (2.0, 1.0, 0.5))
+    ]
+    cases.append(("on half its height of soil", drained_on_soil, 2.0 if quick else 1.0))
+    for name, model_of, cell in cases:
+        model = model_of(cell)
+        found = safety(model)
+        # 2 % beside the range from 1.38 to 1.4
+        checks.append(Check(f"φ' 20°, ψ 0, {name}", 1.39, published, found.value, 0.0275))
+        checks.append(Check(f"failure shown, {name}", 1.0, "a mechanism", float(found.failed), 0.0))
+    field = gathered(found.mechanism)
+
+    # --- 2. Undrained soil on a weaker, an equal and a stronger foundation ------------------------------------------
+    for strength, expected in UNDRAINED.items():
+        result = safety(undrained(2.0 if quick else 0.5, strength))
+        name = f"undrained, foundation of {strength:g} times the strength"
+        checks.append(Check(name, expected, "Code_Aster V6.03.507", result.value, 0.1 if quick else 0.02))
+
+    # --- 3. Picture -------------------------------------------------------------------------------------------------
+    if field is not None:
+        title = f"Factor of safety {found.value:.3f}, $\\psi$ = 0"
+        save_mechanism(folder / "mechanism.png", field, title)
+    return Result(
+        checks, {"mechanism.png": "The mechanism of the slope on soil, as the body flows at the factor above"}
+    )
+
+
+if __name__ == "__main__":
+    run_alone(run)
