@@ -68,7 +68,9 @@ class Site:
     def finite_elements(self, degree: int, laws: dict[int, Any] | None = None, **options: Any) -> bridge.QuasiStatic:
         """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective."""
         body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
-        return bridge.QuasiStatic(body, laws or self.laws, facet_tags, self.supports, degree, cell_tags=cell_tags, **options)
+        return bridge.QuasiStatic(
+            body, laws or self.laws, facet_tags, self.supports, degree, cell_tags=cell_tags, **options
+        )
 
     def model(self, more: Sequence[Any] = ()) -> tuple[mpm.Model, dict[int, int]]:
         """A model without particles on the whole mesh, and the number of the law of each tag; `more` laws last. Collective."""
