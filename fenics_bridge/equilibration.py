@@ -99,6 +99,8 @@ def _relaxed(body, laws, external, before, displacement, solver, newton_report):
     comm = body.solution.function_space.mesh.comm
     reference = comm.allreduce(float(np.abs(start[0]).max(initial=0.0)), MPI.MAX)
     result = relax(body, laws, external, before, displacement, solver.relaxed_tolerance, solver.max_steps, reference)
+    if result.outcome == "equilibrium":
+        _refine(body, laws, external, displacement, solver, result)
     motion = body.solution.x.array - start[0] if result.outcome == "equilibrium" else result.motion
     reason = result.reason
     if result.outcome != "equilibrium":
@@ -110,3 +112,12 @@ def _relaxed(body, laws, external, before, displacement, solver, newton_report):
     residuals = [newton_report.residuals[0], *result.residual]
     iterations = newton_report.iterations + result.iterations
     return EquilibriumReport(result.outcome, residuals, reason, iterations, result, motion)
+
+
+def _refine(body, laws, external, displacement, solver, result):
+    """Newton's method from where a relaxation ended: this near to equilibrium it often converges."""
+    report = newton(EquilibriumStep(body, laws, external, external, displacement), solver.tolerance, EASY_ITERATIONS)
+    result.iterations += report.iterations
+    if report.converged:
+        body.accept()
+        result.residual.append(report.residuals[-1])

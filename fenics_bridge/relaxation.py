@@ -9,8 +9,8 @@ solves
 The tangent of non-associated flow may lose its positive definiteness, which makes Newton's method chatter. With n and m the
 normals of yield surface and potential, at the angle alpha in the metric of the elastic stiffness, the smallest eigenvalue
 of the symmetric part of the elasto-plastic tangent is (1 - 1/cos(alpha))/2 of the elastic one, so a larger theta leaves one
-solution to each step, and Newton's method finds it. (It is 0.08 for phi = 20, psi = 0; 0.5 suffices for friction angles up
-to some 40 degrees.) As the body comes to rest theta is lowered towards zero, and what remains is the equilibrium. A body
+solution to each step, and Newton's method finds it. (It is 0.08 for phi = 20, psi = 0; 0.5 for angles of some
+40 degrees; a step whose iteration fails is repeated with three times the theta.) As the body comes to rest theta is lowered towards zero, and what remains is the equilibrium. A body
 that does not come to rest flows in a mechanism.
 
 Sources: Zienkiewicz, Cormeau (1974), IJNME 8, 821-845 (viscoplastic strains as a way to plastic equilibrium); Kelley,
@@ -27,7 +27,7 @@ from mpm_core.newton import line_search
 
 from fenics_bridge.equilibrium import EquilibriumStep
 
-FIRST, LARGEST = 1.0, 100.0
+FIRST, LARGEST = 0.3, 100.0
 """theta at the start, and the one at which the relaxation is given up [-]"""
 
 ELASTIC = 4.0
@@ -39,7 +39,7 @@ RUN_AWAY = 5.0
 CORRECTIONS = 8
 """of Newton's method in a step, at most"""
 
-REDUCTION = 0.05, 0.3
+REDUCTION = 0.15, 0.3
 """of the residual that a step of relaxation aims at, and with which it is still accepted"""
 
 STEADY = 0.8
@@ -48,10 +48,11 @@ STEADY = 0.8
 
 @dataclass
 class Relaxation:
-    """How a relaxation went; arrays have one entry for each step that was accepted.
+    """How a relaxation went; lists have one entry for each step that was accepted.
 
     outcome: "equilibrium", "failure" (the displacement grows at a steady rate) or "undecided"; reason: in words
-    time: pseudo-time in units of the viscous time tau [-]; residual: out-of-balance force over the forces at work [-]
+    time: pseudo-time in units of the viscous time tau [-]; residual: out-of-balance force over the forces at work [-],
+        with one entry more where Newton's method could refine the end
     growth: largest displacement of a node since the start [m]
     carried: power of the stresses over that of the load on the step's motion [-]; in a mechanism, the factor by which the
         load would have to be multiplied to be carried
@@ -105,7 +106,7 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
                 f"force of {result.residual[-1]:.1e}; the stresses carry {result.carried[-1]:.2%} of the load"
             )
             return result
-        theta *= 0.4 if len(residuals) <= 4 else 1.5 if len(residuals) > 6 else 1.0
+        theta *= 0.3 if len(residuals) <= 4 else 1.5 if len(residuals) > 6 else 1.0
     result.reason = (
         f"residual {result.residual[-1] if result.residual else np.inf:.1e} after {max_steps} steps of relaxation"
     )

@@ -55,7 +55,13 @@ def parser() -> ArgumentParser:
     add_number(p, "--factor", 1.5, "-", "by what the strength of all soils is divided before the slide", at_least=1)
     add_number(p, "--damping", 0.05, "-", "local damping of the slide", at_least=0, below=1)
     add_number(
-        p, "--pic", 0.05, "-", "share of the grid's velocity in the particles' (0 is FLIP)", at_least=0, at_most=1
+        p,
+        "--pic",
+        0.1,
+        "-",
+        "fraction of the particles' own velocities that the grid's replaces in a critical time step (0 is FLIP)",
+        at_least=0,
+        at_most=1,
     )
     add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
     add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)

@@ -183,9 +183,12 @@ def solved_fem(case: SlopeCase, unit_weight: float) -> bridge.QuasiStatic:
 
 
 def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
-    """Finite elements, linear triangles, on the particles' soil cells, unloaded. Collective."""
+    """Finite elements, linear triangles, on the particles' soil cells, unloaded. Collective.
+
+    Particles that take their stresses over are as far out of balance, so the tolerance is a tight one.
+    """
     body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
-    return bridge.QuasiStatic(body, case.soil, facet_tags, SUPPORTS, degree=1)
+    return bridge.QuasiStatic(body, case.soil, facet_tags, SUPPORTS, degree=1, solver=bridge.Solver(tolerance=1e-10))
 
 
 def elastic_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:

@@ -30,7 +30,8 @@ class Case:
 
 
 def set_up(case):
-    case.model.seed(density=-1.0 if case.wrong else 1.0, per_cell=3, cell_tag=1)
+    model = mpm.Model(case.model.mesh, case.model.laws)
+    model.seed(density=-1.0 if case.wrong else 1.0, per_cell=3, cell_tag=1)
 
 
 def search(case):

@@ -60,7 +60,7 @@ def test_particles_differ_from_quadratic_elements_as_linear_ones_do(shared_path,
     options = ["--cell-size", "0.2", "--meshes", "1"]
     (row,) = summary_of(compare_fem, shared_path, *options)["comparisons"]
     a = compare_fem.parse(options)
-    bodies = []
+    bodies, a.equilibrium = [], "fine"
     for a.elements in ("P1", "P2"):
         bodies.append(slope_fem(a, MPI.COMM_SELF, 0.2))
         bodies[-1].solve(weight(10e3))

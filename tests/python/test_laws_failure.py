@@ -102,7 +102,9 @@ def test_finite_elements_halve_the_load_step_and_say_why():
     domain, facet_tags, supports, _ = column(2)
     found = {}
     for limit in (1e-1, 2e-4, 1e-9):
-        fem = bridge.QuasiStatic(domain, mpm.PythonLaw(Fragile(limit)), facet_tags, supports, degree=1)
+        fem = bridge.QuasiStatic(
+            domain, mpm.PythonLaw(Fragile(limit)), facet_tags, supports, 1, solver=bridge.Solver(relaxation=False)
+        )
         steps = fem.solve(bridge.Load(unit_weight=10e3), first_step=1.0)
         found[limit] = fem, steps
     (easy, easy_steps), (hard, hard_steps), (hopeless, hopeless_steps) = found.values()
@@ -113,6 +115,19 @@ def test_finite_elements_halve_the_load_step_and_say_why():
     pattern = r"the law PythonLaw of Fragile failed at \((.*), (.*)\) m for the strain increment \((.*)\)"
     match = re.fullmatch(pattern, hopeless_steps[-1].report.reason)
     assert match and np.abs(np.array(match[3].split(", "), dtype=float)).max() > 1e-9
+
+
+def test_relaxation_makes_smaller_increments_where_a_law_fails():
+    domain, facet_tags, supports, _ = column(2)
+    stress = {}
+    for limit in (1e-1, 2e-4, 1e-9):
+        fem = bridge.QuasiStatic(domain, mpm.PythonLaw(Fragile(limit)), facet_tags, supports, degree=1)
+        report = fem.equilibrate(bridge.Load(unit_weight=10e3))
+        stress[limit] = fem.points.stress
+        assert report.converged == (limit > 1e-9)
+        assert (report.relaxation is None) == (limit == 1e-1)
+    assert np.abs(stress[2e-4] - stress[1e-1]).max() < 1e-6 * np.abs(stress[1e-1]).max()
+    assert report.outcome == "undecided" and "the law PythonLaw of Fragile failed at" in report.reason
 
 
 WRAPPED = {

@@ -99,7 +99,7 @@ def test_a_failure_does_not_stop_the_others_and_shows_in_the_exit_code(tmp_path,
         monkeypatch.setitem(sys.modules, name, SimpleNamespace(run=run, __doc__=f"The {name} case."))
 
     def exit_code(*names):
-        return study.main(["--output", str(tmp_path), "--cases", ",".join(names)])
+        return study.main(["--output", str(tmp_path), "--overwrite", "--cases", ",".join(names)])
 
     assert exit_code(*outcomes) == 1
     table = json.loads((tmp_path / "verification.json").read_text())
