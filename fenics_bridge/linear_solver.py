@@ -8,6 +8,7 @@ from mpm_core.petsc import (
     defaults,
     direct_options,
     multigrid_options,
+    new_solver,
     rigid_body_motions,
     solved,
 )
@@ -54,8 +55,7 @@ class LinearSolver:
         if displacements:
             points = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
             self._rigid = rigid_body_motions(points, self._comm)
-        self._ksp = PETSc.KSP().create(self._comm)
-        self._ksp.setOptionsPrefix(options_prefix)
+        self._ksp = new_solver(self._comm, options_prefix)
         self.iterations = []
 
     def solve(self, matrix, residual, increment):
@@ -87,6 +87,8 @@ class LinearSolver:
             self._ksp.setFromOptions()
             failure = solved(self._ksp, right, solution)
         self.iterations[-1] += self._ksp.getIterationNumber()
+        if failure:
+            self._ksp = new_solver(self._comm, self._options_prefix)
         return failure
 
     def _solved_stiffer(self, matrix, right, solution, options):

@@ -130,12 +130,21 @@ def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle, op
     assert np.allclose(here_reaction, alone_reaction, rtol=1e-6)
 
 
-def test_factor_of_safety_does_not_depend_on_the_number_of_ranks():
-    factors = [
-        bridge.factor_of_safety(slope_model(comm=comm), bridge.Load(unit_weight=20e3)).value
-        for comm in (COMM, MPI.COMM_SELF)
-    ]
-    assert factors[0] == pytest.approx(factors[1], rel=1e-2)  # rounding decides which of the last steps fails
+@pytest.mark.parametrize("dilation_angle", [25.0, 0.0])
+def test_factor_of_safety_does_not_depend_on_the_number_of_ranks(dilation_angle):
+    models = (slope_model(0.2, "fitted", dilation_angle, comm) for comm in (COMM, MPI.COMM_SELF))
+    here, alone = (bridge.factor_of_safety(model, bridge.Load(unit_weight=20e3)) for model in models)
+    assert here.failed and alone.failed
+    assert here.value == pytest.approx(alone.value, rel=1e-2)  # rounding decides which of the last steps fails
+
+
+def test_relaxation_does_not_depend_on_the_number_of_ranks():
+    models = [slope_model(0.2, "fitted", 0.0, comm) for comm in (COMM, MPI.COMM_SELF)]
+    here, alone = (model.equilibrate(bridge.Load(unit_weight=18e3), max_iterations=1) for model in models)
+    assert here.relaxation is not None and here.iterations == alone.iterations
+    assert np.allclose(here.relaxation.growth, alone.relaxation.growth, rtol=1e-8)
+    assert np.allclose(here.relaxation.carried, alone.relaxation.carried, rtol=1e-8)
+    assert models[0].reaction(bridge.BASE) == pytest.approx(models[1].reaction(bridge.BASE), rel=1e-8, abs=1e-8)
 
 
 def test_a_slope_on_a_mesh_of_gmsh_slides_alike_on_any_number_of_ranks():

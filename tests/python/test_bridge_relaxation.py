@@ -81,6 +81,25 @@ def test_bearing_capacity_without_dilation():
     assert davis.cohesion * prandtl < result.value < 1.02 * 30.14e3
 
 
+def test_a_vertical_cut_that_softens_fails_between_its_residual_and_its_peak_strength():
+    def cut(law):
+        domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, angle=90))
+        supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+        result = bridge.collapse_load(bridge.QuasiStatic(domain, law, facet_tags, supports), weight, first_step=1e3)
+        assert result.failed
+        return result.value
+
+    strengths = ((1e3, 30.0), (0.3e3, 25.0))
+    peak, residual = (
+        mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=cohesion, friction_angle=angle)
+        for cohesion, angle in strengths
+    )
+    softening = mpm.SofteningMohrCoulomb(
+        peak, residual_cohesion=0.3e3, residual_friction_angle=25.0, softening_strain=0.1, reference_length=0.1
+    )
+    assert 1.2 * cut(residual) < cut(softening) < 0.99 * cut(peak)
+
+
 def test_without_relaxation_nothing_is_called_failure():
     model = slope_model(0.2, "fitted", dilation_angle=0.0, solver=bridge.Solver(relaxation=False, max_iterations=4))
     result = bridge.collapse_load(model, weight, first_step=5e3)

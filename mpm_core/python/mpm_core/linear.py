@@ -16,6 +16,7 @@ from .petsc import (
     defaults,
     direct_options,
     multigrid_options,
+    new_solver,
     rigid_body_motions,
     set_values,
     solved,
@@ -57,8 +58,8 @@ class Tangent:
         direct = step.total_nodes <= DIRECT_LIMIT[dim]
         alone = step.total_nodes <= ALONE_LIMIT[dim]
         self._options = direct_options(comm.size, alone) if direct else multigrid_options(dim, RTOL)
-        self._ksp = PETSc.KSP().create(comm)
-        self._ksp.setOptionsPrefix(prefix)
+        self._comm = comm
+        self._ksp = new_solver(comm, prefix)
         self._near_null_space = rigid_body_motions(step.points, comm)
         self.iterations = 0
         """Krylov iterations of the last solution."""
@@ -95,4 +96,7 @@ class Tangent:
         b.array[:] = right
         self.failure = solved(self._ksp, b, x)
         self.iterations = self._ksp.getIterationNumber()
-        return None if self.failure else x.array.copy()
+        if self.failure:
+            self._ksp = new_solver(self._comm, self._prefix)
+            return None
+        return x.array.copy()

@@ -98,10 +98,19 @@ def defaults(prefix: str, values: dict[str, Any]) -> Iterator[None]:
             options.delValue(name)
 
 
+def new_solver(comm: MPI.Comm, prefix: str) -> PETSc.KSP:
+    """A solver of linear systems that takes options of a prefix. One that has failed must not be used again: MUMPS cannot,
+    and a system gathered on one rank keeps its failure. Collective.
+    """
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix(prefix)
+    return ksp
+
+
 def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
     """Solve; why that failed, empty if it did not, on all ranks alike: one that factorises for all may be alone in knowing.
 
-    Collective.
+    After a failure the solver must not be used again, see `new_solver`. Collective.
     """
     reason, iterations = 0, 0
     try:
@@ -116,9 +125,7 @@ def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
         reason = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
     if reason > 0:
         return ""
-    words = _failure(ksp, reason, iterations)
-    ksp.reset()  # MUMPS cannot be used again
-    return words
+    return _failure(ksp, reason, iterations)
 
 
 def _remaining(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> float:
