@@ -31,7 +31,8 @@ class LinearSolver:
     """Solution of linear systems on a space by PETSc.
 
     The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
-    `ALONE_LIMIT`, and GMRES with algebraic multigrid above; PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    `ALONE_LIMIT`, and GMRES with algebraic multigrid above; PETSc options with `options_prefix` change it, for instance
+    -elastic_ksp_type cg -elastic_pc_type gamg.
     iterations: Krylov iterations of the solutions so far, a list
     """
 

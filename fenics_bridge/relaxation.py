@@ -10,8 +10,8 @@ The tangent of non-associated flow may lose its positive definiteness, which mak
 normals of yield surface and potential, at the angle alpha in the metric of the elastic stiffness, the smallest eigenvalue
 of the symmetric part of the elasto-plastic tangent is (1 - 1/cos(alpha))/2 of the elastic one, so a larger theta leaves one
 solution to each step, and Newton's method finds it. (It is 0.08 for phi = 20, psi = 0; 0.5 for angles of some
-40 degrees; a step whose iteration fails is repeated with three times the theta.) As the body comes to rest theta is lowered towards zero, and what remains is the equilibrium. A body
-that does not come to rest flows in a mechanism.
+40 degrees; a step whose iteration fails is repeated with three times the theta.) As the body comes to rest theta is lowered
+towards zero, and what remains is the equilibrium. A body that does not come to rest flows in a mechanism.
 
 Sources: Zienkiewicz, Cormeau (1974), IJNME 8, 821-845 (viscoplastic strains as a way to plastic equilibrium); Kelley,
 Keyes (1998), SIAM J. Numer. Anal. 35, 508-523 (pseudo-transient continuation: the step grows as the residual falls).
