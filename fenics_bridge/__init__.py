@@ -3,32 +3,32 @@
 What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
 """
 
-from fenics_bridge.background import background_arrays, background_mesh, original_cells
-from fenics_bridge.box_mesh import BODY, box_mesh
-from fenics_bridge.collapse import Collapse, collapse_load, factor_of_safety
-from fenics_bridge.comparison import Difference, compare
-from fenics_bridge.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
-from fenics_bridge.equilibration import PRACTICE, EquilibriumReport, Solver
 from fenics_bridge.errors import InputError
-from fenics_bridge.evaluate import PointSearch, evaluate_at
-from fenics_bridge.fem_site import FemSite
-from fenics_bridge.fields import nodal_average
-from fenics_bridge.graded import graded_tags
-from fenics_bridge.handover import Handover, initialise
-from fenics_bridge.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
-from fenics_bridge.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
-from fenics_bridge.load_steps import LoadStep, print_step
-from fenics_bridge.loads import Load
-from fenics_bridge.meshes import read_mesh
-from fenics_bridge.mixed import MixedQuasiStatic
-from fenics_bridge.names import name_tags, names_of
-from fenics_bridge.particle_site import ParticleSite
-from fenics_bridge.quasi_static import QuasiStatic
-from fenics_bridge.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
-from fenics_bridge.soil import soil_mesh
-from fenics_bridge.stages import Stage, StageError, StageReport, carry_out, hydrostatic
-from fenics_bridge.strength import davis_reduced_strength, davis_strength, reduced_strength
-from fenics_bridge.supports import Support, fixed, flat_normal, prescribed, roller
+from fenics_bridge.fem.collapse import Collapse, collapse_load, factor_of_safety
+from fenics_bridge.fem.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
+from fenics_bridge.fem.equilibration import PRACTICE, EquilibriumReport, Solver
+from fenics_bridge.fem.evaluate import PointSearch, evaluate_at
+from fenics_bridge.fem.fem_site import FemSite
+from fenics_bridge.fem.fields import nodal_average
+from fenics_bridge.fem.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
+from fenics_bridge.fem.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
+from fenics_bridge.fem.load_steps import LoadStep, print_step
+from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.mixed import MixedQuasiStatic
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
+from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, reduced_strength
+from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller
+from fenics_bridge.mesh.background import background_arrays, background_mesh, original_cells
+from fenics_bridge.mesh.box_mesh import BODY, box_mesh
+from fenics_bridge.mesh.graded import graded_tags
+from fenics_bridge.mesh.meshes import read_mesh
+from fenics_bridge.mesh.names import name_tags, names_of
+from fenics_bridge.mesh.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
+from fenics_bridge.mesh.soil import soil_mesh
+from fenics_bridge.transfer.comparison import Difference, compare
+from fenics_bridge.transfer.handover import Handover, initialise
+from fenics_bridge.transfer.particle_site import ParticleSite
 
 # fmt: off
 __all__ = [

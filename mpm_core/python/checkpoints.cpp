@@ -1,8 +1,8 @@
 #include "python/bindings.h"
 
 #include "io/checkpoint.h"
+#include "model/state.h"
 #include "python/arrays.h"
-#include "steps/state.h"
 
 namespace mpm::python
 {

@@ -1,8 +1,8 @@
+#include "explicit/run.h"
+#include "implicit/relaxation.h"
+#include "implicit/system.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
-#include "steps/implicit_relaxation.h"
-#include "steps/implicit_system.h"
-#include "steps/run.h"
 
 namespace mpm::python
 {

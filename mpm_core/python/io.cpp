@@ -1,11 +1,11 @@
 #include "python/bindings.h"
 
+#include "explicit/run.h"
 #include "io/particle_fields.h"
 #include "parallel/agreement.h"
 #include "parallel/row_carrier.h"
 #include "python/arrays.h"
 #include "python/nodal_field.h"
-#include "steps/run.h"
 
 #include <algorithm>
 #include <memory>

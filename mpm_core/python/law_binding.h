@@ -2,7 +2,7 @@
 /// @file
 /// Laws on NumPy arrays: one row per point.
 
-#include "materials/law.h"
+#include "materials/laws/law.h"
 #include "python/arrays.h"
 
 #include <pybind11/stl.h>

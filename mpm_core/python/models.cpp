@@ -1,15 +1,15 @@
 #include "python/bindings.h"
 
+#include "explicit/run.h"
 #include "mesh/search.h"
+#include "model/mapping.h"
+#include "model/placement.h"
+#include "model/rebalance.h"
 #include "parallel/partition.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
 #include "python/nodal_field.h"
 #include "python/particle_columns.h"
-#include "steps/mapping.h"
-#include "steps/placement.h"
-#include "steps/rebalance.h"
-#include "steps/run.h"
 
 namespace mpm::python
 {

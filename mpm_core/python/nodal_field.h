@@ -3,7 +3,7 @@
 /// Nodal fields of a model by name.
 
 #include "io/series.h"
-#include "steps/model.h"
+#include "model/model.h"
 
 namespace mpm::python
 {

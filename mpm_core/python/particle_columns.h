@@ -3,8 +3,8 @@
 /// Fields of particles by name, as NumPy arrays.
 
 #include "io/particle_fields.h"
+#include "model/model.h"
 #include "python/arrays.h"
-#include "steps/model.h"
 
 #include <pybind11/stl.h>
 

@@ -3,9 +3,9 @@
 
 #include "../cpp/boxes.h"
 
+#include "explicit/explicit_step.h"
+#include "implicit/system.h"
 #include "particles/seed.h"
-#include "steps/explicit.h"
-#include "steps/implicit_system.h"
 
 using namespace mpm;
 

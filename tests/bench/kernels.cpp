@@ -2,7 +2,7 @@
 
 #include "../cpp/boxes.h"
 
-#include "materials/law.h"
+#include "materials/laws/law.h"
 #include "particles/seed.h"
 #include "transfer/kinematics.h"
 #include "transfer/nodes.h"

@@ -2,8 +2,8 @@
 /// @file
 /// Points for the tests of the laws: columns with their storage, and materials that between them use every feature.
 
-#include "materials/law.h"
-#include "materials/spectral.h"
+#include "materials/laws/law.h"
+#include "materials/tools/spectral.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,6 +1,6 @@
 /// The bracketed root that laws find their plastic strain by.
 
-#include "materials/root.h"
+#include "materials/tools/root.h"
 
 #include <gtest/gtest.h>
 

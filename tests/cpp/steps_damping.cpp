@@ -1,8 +1,8 @@
 /// @file
 /// Local damping over a step: the same law in the explicit and in the implicit scheme, and no sign left to round-off.
 
-#include "steps/implicit_inertia.h"
-#include "steps/mapping.h"
+#include "implicit/inertia.h"
+#include "model/mapping.h"
 
 #include <gtest/gtest.h>
 #include <random>

@@ -11,7 +11,7 @@ from partitions import all_by_id, assert_same
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from fenics_bridge.tagged import owned_cells
+from fenics_bridge.mesh.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 from bridge_cases import (

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from solver_cases import slope_in_space
 
 import fenics_bridge as bridge
-from fenics_bridge import linear_solver
+from fenics_bridge.fem import linear_solver
 
 LOAD = bridge.Load(unit_weight=20e3)
 

@@ -20,8 +20,8 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import compat
-from fenics_bridge.moved import fitted_volumes, held_volumes, simplex_samples
-from fenics_bridge.tagged import cell_volumes
+from fenics_bridge.mesh.tagged import cell_volumes
+from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, simplex_samples
 
 UNIT_WEIGHT = 18e3
 

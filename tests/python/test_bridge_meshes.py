@@ -7,8 +7,8 @@ from bridge_cases import MESHES
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-from fenics_bridge.gmsh_reader import gmsh_session
-from fenics_bridge.tagged import owned_cells, tag_values
+from fenics_bridge.mesh.gmsh_reader import gmsh_session
+from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
 COMM = MPI.COMM_WORLD
 

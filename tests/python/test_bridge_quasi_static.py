@@ -19,7 +19,7 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.compat import cell_nodes
-from fenics_bridge.tagged import owned_cells
+from fenics_bridge.mesh.tagged import owned_cells
 
 
 def elastic_column(dim, degree=2):

@@ -7,8 +7,8 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from fenics_bridge.equilibration import EquilibriumReport
-from fenics_bridge.load_steps import advance
+from fenics_bridge.fem.equilibration import EquilibriumReport
+from fenics_bridge.fem.load_steps import advance
 
 
 def weight(unit_weight):

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.fingerprint import fingerprint
 
 import mpm_core as mpm
-from mpm_core.fingerprint import fingerprint
 
 LAW = """
 import numpy as np

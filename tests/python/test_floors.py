@@ -7,7 +7,8 @@ import pytest
 
 CORE = Path(__file__).parents[2] / "mpm_core"
 
-# What each floor may include besides itself; an include points down, never up.
+# The folders of the core from the lowest floor up, and what each may include besides itself; an include points down, never up.
+BELOW_STEPS = {"base", "mesh", "materials", "particles", "parallel", "transfer"}
 MAY_SEE = {
     "base": set(),
     "mesh": {"base"},
@@ -15,9 +16,11 @@ MAY_SEE = {
     "particles": {"base", "mesh"},
     "parallel": {"base", "mesh", "particles"},
     "transfer": {"base", "mesh", "materials", "particles", "parallel"},
-    "steps": {"base", "mesh", "materials", "particles", "parallel", "transfer"},
-    "io": {"base", "mesh", "materials", "particles", "parallel", "transfer"},
-    "python": {"base", "mesh", "materials", "particles", "parallel", "transfer", "steps", "io"},
+    "model": BELOW_STEPS,
+    "explicit": BELOW_STEPS | {"model"},
+    "implicit": BELOW_STEPS | {"model", "explicit"},
+    "io": BELOW_STEPS,
+    "python": BELOW_STEPS | {"model", "explicit", "implicit", "io"},
 }
 
 

@@ -10,7 +10,7 @@ from solver_cases import slope_in_space
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from fenics_bridge import linear_solver
+from fenics_bridge.fem import linear_solver
 
 LOAD = bridge.Load(unit_weight=20e3)
 

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-from fenics_bridge.mesh_checks import check_conforming
+from fenics_bridge.mesh.checks import check_conforming
 
 #   3---4---5      the left square has one side where the right one has two
 #   |  /|  /|

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from fenics_bridge.mesh_checks import check_cells_fit
+from fenics_bridge.mesh.checks import check_cells_fit
 
 
 @pytest.fixture(scope="module")

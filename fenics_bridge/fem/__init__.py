@@ -1,0 +1,1 @@
+"""Finite elements: forms, loads, supports, equilibrium, stages, collapse and strength reduction."""

@@ -1,0 +1,146 @@
+"""Cells that are switched off and on, so that soil is taken away and placed in a body of finite elements.
+
+A cell that is off carries no stress, stiffness or weight; nodes that only such cells have are held. When a configuration
+changes, the forces of the stress that is there balance loads and supports no longer. What is out of balance is kept as a
+force that holds the body, and let go in steps: `Load.held` from 1 to 0. So excavation, fill, other supports, other laws and
+other pore pressures are one and the same to Newton's method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.fields import assembled
+from fenics_bridge.fem.loads import LoadVectors
+from fenics_bridge.fem.supports import Constraints
+from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.mesh.tagged import owned_cells, tag_values
+
+
+def switch_off(model):
+    """Switch all cells off, before the first soil is placed."""
+    model.points.assign(np.full(owned_cells(model.domain), -1, dtype=np.int32), len(model.laws))
+
+
+def reconfigure(model, off, supports, pore_pressure, stress, law):
+    """Do what `QuasiStatic.reconfigure` says."""
+    domain, points, before = model.domain, model.points, model.laws
+    off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
+    there = _cells_there(model, off)
+    water = _nodal_pressure(domain, pore_pressure)
+    law = law if law is not None else model.law
+    laws = model._materials.laws(law)
+    was_off = np.zeros(points.n, dtype=bool)
+    was_off[points.off] = True
+    new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
+    given = _given_stress(model, stress, new)
+    points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
+    _take_over(model, new, laws, before, given)
+    model.law, model.off = law, off
+    _support(model, model.supports if supports is None else tuple(supports), there)
+    space = model.displacement.function_space
+    model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=there if off else None)
+    if water is not None:
+        model._loads.constant = _seepage_forces(space, water, there)
+    old = replace(model._loads.resolved(model.load), displacement=0.0, held=0.0)
+    model._loads.held = model._kinematics.internal_forces(points.stress).array - model._loads.forces(old)
+    model.load = replace(old, held=1.0)
+
+
+def _cells_there(model, off):
+    """Function that is 1 in the cells that are there, ghosts too; its dofs are numbered as the cells."""
+    there = fem.Function(compat.function_space(model.domain, "DG", 0), name="active")
+    values = tag_values(model.domain, model.cell_tags, model.domain.topology.dim)
+    there.x.array[compat.cell_dofs(there.function_space)[:, 0]] = ~np.isin(values, off)
+    return there
+
+
+def _given_stress(model, stress, new):
+    """Stress with which the new points come: (k, S) [Pa]; None for none."""
+    if stress is None:
+        return None
+    given = np.asarray(stress(model.points.coordinates()[new]), dtype=float)
+    expected = int(new.sum()), model.points.size
+    good = given.shape == expected and np.all(np.isfinite(given))
+    agree(model.domain.comm, None if good else f"stress: got shape {given.shape}, expected finite {expected}")
+    return given
+
+
+def _take_over(model, new, laws, before, given):
+    """Stress and state of the points under the new laws. What leaves has none; what comes in starts anew."""
+    points = model.points
+    points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
+    if given is not None:
+        points.stress[new] = given
+    of_point = np.repeat(points.material, points.per_cell)
+    changed = np.array([one is not other for one, other in zip(laws, before)])
+    other = (of_point >= 0) & (new | changed[np.maximum(of_point, 0)])
+    points.reset_state(laws, np.flatnonzero(other))
+    if model.domain.comm.allreduce(int(other.sum())):
+        failure = points.update(laws, np.zeros_like(points.stress))  # brings stresses inside the new strength
+        agree(model.domain.comm, f"stress: {failure}" if failure else None)
+        points.stress[other], points.state[other] = points.trial_stress[other], points.trial_state[other]
+
+
+def _support(model, supports, there):
+    """Hold the nodes of the supports, and those that no cell that is there has, where they are now."""
+    space = model.displacement.function_space
+    constraints = Constraints(space, model.facet_tags, supports, _lonely_nodes(space, there))
+    constraints.origin[:] = model.displacement.x.array[constraints.dofs]
+    model.supports = supports
+    model._assemble(constraints)
+
+
+def _lonely_nodes(space, there):
+    """Blocked dofs, ghosts too, that belong to no cell that is there: (k,) int32. Collective."""
+    count = la.vector(space.dofmap.index_map, 1)
+    count.array[:] = 0.0
+    n = owned_cells(space.mesh)
+    on = there.x.array[compat.cell_dofs(there.function_space)[:n, 0]] > 0
+    count.array[compat.cell_dofs(space)[:n][on].ravel()] = 1.0
+    compat.add_shared(count)
+    return np.flatnonzero(count.array == 0).astype(np.int32)
+
+
+def _nodal_pressure(domain, pore_pressure):
+    """Pore pressure [Pa] as a function that is linear in each cell; None for none."""
+    if pore_pressure is None:
+        return None
+    dim = domain.geometry.dim
+    p = fem.Function(compat.function_space(domain, "Lagrange", 1), name="pore_pressure")
+    p.interpolate(lambda x: np.broadcast_to(np.asarray(pore_pressure(x[:dim].T), dtype=float), x.shape[1]))
+    agree(domain.comm, None if np.all(np.isfinite(p.x.array)) else "pore_pressure: it gives values that are not finite")
+    return p
+
+
+def _seepage_forces(space, p, there):
+    """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
+
+    By Gauss' theorem: the integral of p div v over what is there, less that of p n v over its surface.
+    """
+    form = -there * ufl.inner(ufl.grad(p), ufl.TestFunction(space)) * ufl.dx
+    return assembled(fem.form(form), space).array.copy()
+
+
+def free_motions(model):
+    """Motions of the whole as a rigid body that its supports leave free, in words; empty when they hold it. Collective."""
+    domain, dim = model.domain, model.domain.geometry.dim
+    space, dofs = model.displacement.function_space, model._body.constraints.dofs
+    owned = dofs[dofs < dim * space.dofmap.index_map.size_local]
+    x = space.tabulate_dof_coordinates()[:, :dim]
+    node, component = owned // dim, owned % dim
+    real = np.isin(node, compat.cell_dofs(space)[model.points.cells[model.points.material >= 0]])
+    node, component, x = node[real], component[real], x - x.mean(axis=0)
+    modes = [("along " + "xyz"[k], (component == k).astype(float)) for k in range(dim)]
+    for a, b in [(0, 1)] if dim == 2 else [(0, 1), (1, 2), (2, 0)]:
+        turning = np.where(component == a, -x[node, b], np.where(component == b, x[node, a], 0.0))
+        modes.append(("by turning" if dim == 2 else f"by turning about {'xyz'[3 - a - b]}", turning))
+    rows = np.array([mode for _, mode in modes])
+    gram = domain.comm.allreduce(rows @ rows.T)
+    return [name for k, (name, _) in enumerate(modes) if gram[k, k] <= 1e-12 * max(gram.max(), 1e-300)]

@@ -1,0 +1,123 @@
+"""The way to one equilibrium: Newton's method, and where that gives up, relaxation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.newton import EASY_ITERATIONS, newton
+
+from fenics_bridge.errors import InputError
+from fenics_bridge.fem.equilibrium import EquilibriumStep
+from fenics_bridge.fem.relaxation import Relaxation, relax
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How equilibrium is looked for, and when it counts as found. Out-of-balance forces are over the forces at work [-].
+
+    tolerance: at which Newton's method ends; max_iterations: its corrections in a step
+    relaxation: whether `relaxation.relax` takes over where Newton's method gives up
+    relaxed_tolerance: out-of-balance at which a relaxation ends; max_steps: of it
+    Raises InputError for values out of range. `PRACTICE` is the level that is customary in practice, 1 % out of balance.
+    """
+
+    tolerance: float = 1e-8
+    max_iterations: int = 25
+    relaxation: bool = True
+    relaxed_tolerance: float = 1e-5
+    max_steps: int = 80
+
+    def __post_init__(self):
+        for name in ("tolerance", "relaxed_tolerance"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a number between 0 and 1")
+        for name in ("max_iterations", "max_steps"):
+            if not (isinstance(getattr(self, name), int) and getattr(self, name) > 0):
+                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a whole number above 0")
+
+
+PRACTICE = Solver(tolerance=1e-2, relaxed_tolerance=1e-2)
+"""Accepts 1 % out of balance, as is customary in practice. Factors of safety come out some per cent higher."""
+
+
+@dataclass(frozen=True)
+class EquilibriumReport:
+    """How one step to equilibrium went.
+
+    outcome: "equilibrium"; "failure": the body flows in a mechanism; "undecided": neither could be shown
+    residuals: out-of-balance over the forces at work [-], before each iteration of Newton's method (or step of
+        relaxation) and at the end; reason: why there is no equilibrium, empty otherwise
+    iterations: linear systems solved; relaxation: its Relaxation, or None where Newton's method sufficed
+    motion: displacement of the step, or of the mechanism where it fails, per degree of freedom [m]
+    """
+
+    outcome: str
+    residuals: list[float]
+    reason: str
+    iterations: int
+    relaxation: Relaxation | None = None
+    motion: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def converged(self):
+        return self.outcome == "equilibrium"
+
+    @property
+    def carried(self):
+        """Fraction of the load that the stresses carry in the mechanism of a failure [-]; NaN otherwise."""
+        return self.relaxation.carried[-1] if self.outcome == "failure" and self.relaxation else np.nan
+
+    @property
+    def easy(self):
+        """Whether Newton's method converged in a few iterations."""
+        return self.converged and self.relaxation is None and self.iterations <= EASY_ITERATIONS
+
+
+def find_equilibrium(body, laws, external, before, displacement, solver):
+    """Bring a body to equilibrium under a load, from its last equilibrium on. Returns an EquilibriumReport.
+
+    laws: in the order of the body's points; external, before: nodal forces of the load and of the load before it
+    displacement: fraction of the displacements that the supports prescribe; solver: Solver
+    Without equilibrium the body is left as it was. `body.increment` is the displacement of the whole step. Collective.
+    """
+    step = EquilibriumStep(body, laws, external, before, displacement)
+    report = newton(step, solver.tolerance, solver.max_iterations)
+    if report.converged:
+        motion = body.increment.x.array.copy()
+        body.accept()
+        return EquilibriumReport("equilibrium", report.residuals, "", report.iterations, motion=motion)
+    if not solver.relaxation:
+        return EquilibriumReport("undecided", report.residuals, report.reason, report.iterations)
+    return _relaxed(body, laws, external, before, displacement, solver, report)
+
+
+def _relaxed(body, laws, external, before, displacement, solver, newton_report):
+    """The report of a relaxation after Newton's method gave up."""
+    start = body.snapshot()
+    comm = body.solution.function_space.mesh.comm
+    reference = comm.allreduce(float(np.abs(start[0]).max(initial=0.0)), MPI.MAX)
+    result = relax(body, laws, external, before, displacement, solver.relaxed_tolerance, solver.max_steps, reference)
+    if result.outcome == "equilibrium":
+        _refine(body, laws, external, displacement, solver, result)
+    motion = body.solution.x.array - start[0] if result.outcome == "equilibrium" else result.motion
+    reason = result.reason
+    if result.outcome != "equilibrium":
+        body.restore(start)
+    if result.outcome == "undecided":
+        reason = f"Newton's method: {newton_report.reason}; relaxation: {result.reason}"
+    if motion is not None:
+        body.increment.x.array[:] = motion
+    residuals = [newton_report.residuals[0], *result.residual]
+    iterations = newton_report.iterations + result.iterations
+    return EquilibriumReport(result.outcome, residuals, reason, iterations, result, motion)
+
+
+def _refine(body, laws, external, displacement, solver, result):
+    """Newton's method from where a relaxation ended: this near to equilibrium it often converges."""
+    report = newton(EquilibriumStep(body, laws, external, external, displacement), solver.tolerance, EASY_ITERATIONS)
+    result.iterations += report.iterations
+    if report.converged:
+        body.accept()
+        result.residual.append(report.residuals[-1])

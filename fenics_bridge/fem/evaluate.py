@@ -1,0 +1,131 @@
+"""Values of DOLFINx functions at points, on whatever rank the points and their cells are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.mesh.tagged import owned_cells
+
+_TOLERANCE = 1e-9
+"""How far outside a cell, in barycentric coordinates, a point may be and still count as inside."""
+
+
+class PointSearch:
+    """Points of each rank, found in the cells of a mesh wherever those are owned.
+
+    Building it is the search; `values` then evaluates any number of functions. Collective, both.
+    found: (n,) bool, whether each of this rank's points lies in the mesh
+    """
+
+    def __init__(self, domain, points):
+        self._domain = domain  # it owns the communicator
+        self._comm, dim = domain.comm, domain.geometry.dim
+        points = np.ascontiguousarray(points, dtype=float)
+        good = points.ndim == 2 and points.shape[1] == dim and np.all(np.isfinite(points))
+        agree(self._comm, None if good else f"points: got shape {points.shape}, expected finite (n, {dim})")
+        self.points = points
+        low, high = _owned_box(domain)
+        boxes = self._comm.allgather((low, high))
+        self._sent = [np.flatnonzero(np.all((points >= a) & (points <= b), axis=1)) for a, b in boxes]
+        asked = self._comm.alltoall([points[rows] for rows in self._sent])
+        cells = local_cells(domain, np.concatenate(asked))
+        self._asked = np.cumsum([len(p) for p in asked])[:-1]
+        self._inside = cells >= 0
+        self._cells = cells[self._inside]
+        self._at = np.zeros((len(self._cells), 3))
+        self._at[:, :dim] = np.concatenate(asked)[self._inside]
+        self.found = np.zeros(len(points), dtype=bool)
+        for rows, inside in self._answers(self._inside):
+            self.found[rows] |= inside
+
+    def require_all(self, argument="points"):
+        """Raise InputError, on all ranks, naming the first point that is outside the mesh."""
+        lost = np.flatnonzero(~self.found)
+        message = None
+        if len(lost):
+            where = ", ".join(f"{x:.9g}" for x in self.points[lost[0]])
+            message = (
+                f"{argument}: point {lost[0]} on rank {self._comm.rank} at ({where}) m is outside the mesh "
+                f"({len(lost)} of {len(self.points)} points there are)"
+            )
+        agree(self._comm, message)
+
+    def values(self, function):
+        """Values (n, components) of a function at the points; NaN at points outside the mesh."""
+        size = int(np.prod(function.ufl_shape)) if function.ufl_shape else 1
+        answer = np.full((len(self._inside), size), np.nan)
+        if len(self._cells):
+            answer[self._inside] = np.asarray(function.eval(self._at, self._cells)).reshape(-1, size)
+        result = np.full((len(self.points), size), np.nan)
+        for rows, values in self._answers(answer):
+            known = ~np.isnan(values[:, 0])
+            result[rows[known]] = values[known]
+        return result
+
+    def cell_sums(self, amounts):
+        """Sums over the points in each cell that this rank owns: (m,); a point outside the mesh counts nowhere.
+
+        (A conservative transfer: it keeps the total.) amounts: (n,), one for each of this rank's points. Collective.
+        """
+        answers, rank_of = self._answers(self._inside), np.full(len(self.points), -1)
+        for rank, (rows, inside) in zip(reversed(range(self._comm.size)), answers):
+            rank_of[rows[inside]] = rank  # on a border between ranks the lowest one counts
+        sent = [np.where(rank_of[rows] == rank, amounts[rows], 0.0) for rank, rows in enumerate(self._sent)]
+        received = np.concatenate(self._comm.alltoall(sent))
+        return np.bincount(self._cells, received[self._inside], owned_cells(self._domain))
+
+    def _answers(self, array):
+        """What each rank answered: (rows of this rank's points, values), the lowest rank last so that it holds."""
+        answers = self._comm.alltoall(np.split(array, self._asked))
+        return reversed(list(zip(self._sent, answers)))
+
+
+def evaluate_at(points, **functions):
+    """Values at points of several functions of one mesh: a dictionary of arrays (n, components).
+
+    points: (n, D) [m] on each rank. Raises InputError, on all ranks, naming a point outside the mesh. Collective.
+    """
+    domain = next(iter(functions.values())).function_space.mesh
+    search = PointSearch(domain, points)
+    search.require_all()
+    return {name: search.values(function) for name, function in functions.items()}
+
+
+def local_cells(domain, points):
+    """Owned cell that holds each point, -1 where there is none on this rank: (n,) int32.
+
+    A point on the border of several cells goes to the one in which it lies deepest.
+    """
+    dim, n_cells = domain.geometry.dim, owned_cells(domain)
+    found = np.full(len(points), -1, dtype=np.int32)
+    if n_cells == 0 or len(points) == 0:
+        return found
+    corners = domain.geometry.x[compat.cell_nodes(domain)[:n_cells], :dim]
+    padded = np.zeros((len(points), 3))
+    padded[:, :dim] = points
+    size = np.ptp(corners.reshape(-1, dim), axis=0).max()
+    offsets, cells = compat.candidate_cells(domain, np.arange(n_cells), padded, _TOLERANCE * size)
+    rows = np.repeat(np.arange(len(points)), np.diff(offsets))
+    depth = _depth(corners[cells], points[rows])
+    order = np.lexsort((depth, rows))
+    order = order[depth[order] >= -_TOLERANCE]
+    found[rows[order]] = cells[order]  # the deepest comes last and holds
+    return found
+
+
+def _depth(corners, points):
+    """Smallest barycentric coordinate of points in cells: negative outside."""
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    inner = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    return np.minimum(inner.min(axis=1), 1 - inner.sum(axis=1)) if len(points) else np.empty(0)
+
+
+def _owned_box(domain):
+    n_cells, dim = owned_cells(domain), domain.geometry.dim
+    if n_cells == 0:
+        return np.full(dim, np.inf), np.full(dim, -np.inf)
+    x = domain.geometry.x[np.unique(compat.cell_nodes(domain)[:n_cells]), :dim]
+    margin = _TOLERANCE * np.ptp(x, axis=0).max()
+    return x.min(axis=0) - margin, x.max(axis=0) + margin

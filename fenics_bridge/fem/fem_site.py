@@ -1,0 +1,121 @@
+"""Stages of construction by finite elements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.compat import cell_dofs
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.active_cells import free_motions, switch_off
+from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.stages import SiteState, StageError, StageReport
+from fenics_bridge.mesh.names import known_tags, label, tag_numbers
+
+
+class FemSite:
+    """A body of finite elements that is built and taken away in stages, see `Stage` and `carry_out`.
+
+    fem: the QuasiStatic, new and unloaded, of all soils that will ever be there, with a law for each; at first none is there.
+    state: SiteState, which soils are there, their weights, loads and supports; number: of the last stage
+    """
+
+    def __init__(self, fem, first_step=0.25, tolerance=1e-3, progress=None):
+        """first_step, tolerance, progress: of each stage, as for `QuasiStatic.solve`."""
+        comm = fem.domain.comm
+        agree(comm, None if fem.cell_tags is not None else "fem: it has no cell_tags, by which stages know soils")
+        fresh = fem.load == Load() and not fem.off
+        agree(comm, None if fresh else "fem: it is loaded already, expected a new one, whose soils the stages place")
+        self.fem, self.number = fem, 0
+        self._options = {"first_step": first_step, "tolerance": tolerance, "progress": progress}
+        self.state = SiteState(
+            comm,
+            lambda given, argument: tag_numbers(comm, fem.cell_tags, given, argument, "cell"),
+            lambda given, argument: tag_numbers(comm, fem.facet_tags, given, argument),
+            name_of=lambda tag: label(fem.cell_tags, tag),
+            supports=fem.supports,
+        )
+        switch_off(fem)
+        self._every = set(known_tags(comm, fem.cell_tags))
+
+    def carry_out(self, stage):
+        """Bring the body to equilibrium after a stage's changes. Returns a StageReport. Collective.
+
+        Raises InputError, on all ranks, for a stage that asks for what is not there, before anything is changed;
+        StageError where there is no equilibrium.
+        """
+        fem = self.fem
+        state, _, _ = self.state.after(stage)
+        if stage.reset_displacement:
+            fem.reset_displacement()
+        laws = self._laws(state)
+        off = tuple(sorted(self._every.difference(state.there)))
+        fem.reconfigure(off, state.supports, state.pore_pressure, stage.stress, laws)
+        self.state = state
+        moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
+        goal = Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))
+        steps = fem.solve(goal, **self._options)
+        self.number += 1
+        if not fem.converged:
+            raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
+        iterations = sum(step.report.iterations for step in steps)
+        return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
+
+    def largest_displacement(self):
+        """Largest displacement of a node of the soil that is there, since displacements count [m]. Collective."""
+        size = np.linalg.norm(self.fem.displacement.x.array.reshape(-1, self.fem.domain.geometry.dim), axis=1)
+        points, space = self.fem.points, self.fem.displacement.function_space
+        there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()
+        return max(self.fem.domain.comm.allgather(float(size[there].max(initial=0.0))))
+
+    def _laws(self, state):
+        """The laws in force, by tag; where a stage does not say otherwise those that the body has had."""
+        present = self.fem.law_by_tag()
+        return {tag: state.law.get(tag, law) for tag, law in present.items()}
+
+    def _failure(self, stage, steps):
+        fem = self.fem
+        reason = next((step.report.reason for step in reversed(steps) if not step.converged), "no step was tried")
+        where, soil, law = most_moved(fem)
+        place = ", ".join(f"{x:.3g}" for x in where)
+        return (
+            f"stage {self.number} ({stage.name!r}) has no equilibrium beyond {1 - fem.load.held:.3g} of its change: {reason}. "
+            f"Most moved the soil {label(fem.cell_tags, soil)} near ({place}) m, which follows the law {law.name}. {_advice(reason, free_motions(fem))}"
+        )
+
+
+def _advice(reason, free):
+    """What to try; free: motions that the supports do not hold."""
+    if free:
+        return f"Nothing holds the soil that is there against moving {' and '.join(free)}: give it supports."
+    if "linear solver" in reason:
+        return (
+            "Either the ground fails there: take a smaller change, more strength or more support; or a part of the soil is not "
+            "held, because it touches the others in points only."
+        )
+    if "law" in reason:
+        return (
+            "Does the soil come under tension there, or has it no strength? Give it some cohesion or a tension_cutoff."
+        )
+    return (
+        "Either the ground fails there: take a smaller change, more strength or more support; or Newton's method gave up: try "
+        "smaller steps, or more dilation."
+    )
+
+
+def most_moved(fem):
+    """Where the last increment, that of a step that failed too, is largest: place (D,) [m], soil's tag and law. Collective."""
+    comm, dim = fem.domain.comm, fem.domain.geometry.dim
+    space, points = fem.displacement.function_space, fem.points
+    size = np.linalg.norm(fem.increment.x.array.reshape(-1, dim), axis=1)
+    size = np.where(np.isfinite(size), size, np.inf)[: space.dofmap.index_map.size_local]
+    node = int(np.argmax(size)) if len(size) else None
+    found = (float(size[node]), space.tabulate_dof_coordinates()[node, :dim].tolist()) if len(size) else (-1.0, None)
+    where = max(comm.allgather(found), key=lambda one: one[0])[1]
+    distance = np.where(
+        np.repeat(points.material, points.per_cell) >= 0, np.linalg.norm(points.coordinates() - where, axis=1), np.inf
+    )
+    nearest = int(np.argmin(distance)) if points.n else None
+    material = -1 if nearest is None else int(points.material[nearest // points.per_cell])
+    candidate = (float(distance[nearest]) if nearest is not None else np.inf, material)
+    number = min(comm.allgather(candidate))[1]
+    return where, fem.soils[number], fem.laws[number]

@@ -1,0 +1,103 @@
+"""Following an equilibrium as a load, or a strength, changes: steps that shrink on failure and grow on success."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_bridge.fem.equilibration import EquilibriumReport
+
+_MOST_STEPS = 1000
+
+
+class LoadStep(NamedTuple):
+    """One attempted step. value: what was changed, at the end of the step; report: of the way to equilibrium."""
+
+    number: int
+    value: float
+    size: float
+    report: EquilibriumReport
+
+    @property
+    def converged(self):
+        return self.report.converged
+
+
+def advance(equilibrate, start, end, first_step, tolerance, progress=None):
+    """Move a value up from `start` towards `end`, keeping equilibrium, until it is there or no further step succeeds.
+
+    equilibrate: function of the value that returns an EquilibriumReport
+    first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without
+        equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
+    tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end
+    progress: called with each LoadStep, or None. Returns all steps; the last converged one is the last equilibrium.
+    """
+    steps: list[LoadStep] = []
+    value, size, easy, failed_at, undecided = start, min(first_step, end - start), 0, math.inf, False
+    while value < end and len(steps) < _MOST_STEPS:
+        smallest = tolerance * max(abs(value), first_step)
+        size = min(size, 0.5 * (failed_at - value))
+        if size < smallest:
+            break
+        target = end if size >= (end - value) * (1 - 1e-12) else value + size
+        steps.append(LoadStep(len(steps) + 1, target, target - value, equilibrate(target)))
+        if progress is not None:
+            progress(steps[-1])
+        if steps[-1].converged:
+            value = target
+            easy = easy + 1 if steps[-1].report.easy else 0
+            if easy == 2:
+                size, easy = 2 * size, 0
+            if failed_at < math.inf and not undecided:
+                size = 0.5 * (failed_at - value)
+        else:
+            size, easy = (target - value) / 2, 0
+            undecided = undecided or steps[-1].report.outcome == "undecided"
+            if steps[-1].report.outcome == "failure":
+                failed_at = target
+                size = max(_below_failure(value, target, steps[-1].report.carried), smallest)
+    return steps
+
+
+def _below_failure(value, failed_at, carried):
+    """Size of the step after a failure: half of the way, or less where the mechanism carries less than that.
+
+    carried: fraction of the load that the stresses carry in the mechanism [-]; times the load an estimate of the collapse
+    load, mostly from above
+    """
+    gap = failed_at - value
+    return float(np.clip(np.nan_to_num(carried, nan=1.0) * failed_at - value, 0.1 * gap, 0.5 * gap))
+
+
+def print_step(step):
+    """Progress line, from rank 0: number of the step, value, size, linear systems solved, last residual, outcome."""
+    if MPI.COMM_WORLD.rank != 0:
+        return
+    report = step.report
+    method = "Newton" if report.relaxation is None else "relaxed"
+    state = {"equilibrium": "ok", "failure": f"fails: {report.reason}"}.get(
+        report.outcome, f"undecided ({report.reason})"
+    )
+    print(
+        f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
+        f"{method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
+        file=sys.stderr,
+        flush=True,
+    )
+
+
+def raise_load(model, load, first_step, tolerance, progress):
+    """Raise the load of a model from its present one to the given one, by `advance` over the fraction of the way.
+
+    Sets `converged` of the model to whether the load was reached. Returns a list of LoadStep. Collective.
+    """
+    start = model.load
+    steps = advance(
+        lambda fraction: model.equilibrate(start.towards(load, fraction)), 0.0, 1.0, first_step, tolerance, progress
+    )
+    model.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
+    return steps

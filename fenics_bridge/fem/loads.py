@@ -1,0 +1,154 @@
+"""Loads of a quasi-static analysis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.fields import assembled
+from fenics_bridge.mesh.names import by_number, tag_numbers
+
+
+@dataclass(frozen=True)
+class Load:
+    """What acts on the body at the end of a stage.
+
+    unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
+    pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
+    displacement: share of the displacements that the supports prescribe [-], for `prescribed` supports
+    held: share of the forces that were out of balance when the present stage began and are still held [-], see `Stage`
+    """
+
+    unit_weight: float | dict = 0.0
+    pressure: dict = field(default_factory=dict)
+    displacement: float = 0.0
+    held: float = 0.0
+
+    def towards(self, other, share):
+        """The load a share of the way (0 to 1) from this one to another."""
+
+        def between(a, b):
+            return a + share * (b - a)
+
+        def between_tags(a, b):
+            return {tag: between(a.get(tag, a.get(None, 0.0)), b.get(tag, b.get(None, 0.0))) for tag in {*a, *b}}
+
+        weights = self.unit_weight, other.unit_weight
+        by_tag = any(isinstance(weight, dict) for weight in weights)
+        return Load(
+            between_tags(*map(_weight_by_tag, weights)) if by_tag else between(*weights),
+            between_tags(self.pressure, other.pressure),
+            between(self.displacement, other.displacement),
+            between(self.held, other.held),
+        )
+
+
+def require_finite(comm, load):
+    """Raises InputError on all ranks where a load has a value that is not finite on any. Collective."""
+    problem = None
+    for name in ("unit_weight", "pressure", "displacement", "held"):
+        value = getattr(load, name)
+        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v)]
+        if wrong:
+            problem = f"{name} is {wrong[0]}, expected finite numbers"
+    agree(comm, problem)
+
+
+def _weight_by_tag(unit_weight):
+    """Unit weights by cell tag; None stands for all cells whose tag is not there."""
+    return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
+
+
+class LoadVectors:
+    """Nodal forces of loads on a displacement space; each kind of load is assembled once.
+
+    constant, held: forces that always act, and those of which the load's share `held` acts; arrays like `forces`, or 0
+    """
+
+    def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None):
+        """test: test function of the displacement, where it is only a part of the space.
+
+        active: function, 1 in cells that are there and 0 in those that are not; the others neither weigh nor are pressed
+        """
+        self._active: Any = active
+        self.constant: Any = 0.0
+        self.held: Any = 0.0
+        self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
+        self._test = ufl.TestFunction(space) if test is None else test
+        self._weight = {None: self._unit_weight(ufl.dx)}
+        self._pressure = {}
+
+    def forces(self, load):
+        """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain).
+
+        Collective; raises InputError, on all ranks, for a tag that does not exist or a value that is not finite.
+        """
+        require_finite(self._space.mesh.comm, load)
+        load = self.resolved(load)
+        by_tag = _weight_by_tag(load.unit_weight)
+        elsewhere = by_tag.get(None, 0.0)
+        forces = elsewhere * self._weight[None]
+        for tag in sorted(tag for tag in by_tag if tag is not None):
+            forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
+        for tag, pressure in load.pressure.items():
+            forces = forces + pressure * self._unit_pressure(tag)
+        return forces + self.constant + load.held * self.held
+
+    def resolved(self, load):
+        """The load with numbers for the names of tags. Raises InputError, on all ranks, for unknown ones. Collective."""
+        comm, weight = self._space.mesh.comm, load.unit_weight
+        if isinstance(weight, dict):
+            weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
+        return replace(load, unit_weight=weight, pressure=by_number(comm, self._facet_tags, load.pressure, "pressure"))
+
+    def _unit_weight(self, dx):
+        domain, dim = self._space.mesh, self._space.mesh.geometry.dim
+        down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
+        there = 1.0 if self._active is None else self._active
+        return assembled(fem.form(there * ufl.inner(down, self._test) * dx), self._space).array.copy()
+
+    def _unit_weight_of(self, tag):
+        if tag not in self._weight:
+            dx = ufl.Measure("dx", domain=self._space.mesh, subdomain_data=self._cell_tags)
+            self._weight[tag] = self._unit_weight(dx(tag))
+        return self._weight[tag]
+
+    def _unit_pressure(self, tag):
+        if tag not in self._pressure:
+            domain = self._space.mesh
+            ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
+            normal, test, active = ufl.FacetNormal(domain), self._test, self._active
+            if active is None:
+                form = -ufl.inner(normal, test) * ds(tag)
+            else:  # also where what is there ends inside of the mesh; between two cells that are there it cancels
+                dS = ufl.Measure("dS", domain=domain, subdomain_data=self._facet_tags)
+                form = -active * ufl.inner(normal, test) * ds(tag)
+                form -= ufl.inner(active("+") * normal("+") + active("-") * normal("-"), test("+")) * dS(tag)
+            self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
+        return self._pressure[tag]
+
+
+def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=None):
+    """Work of weight, tractions and a body force on a test displacement, as a UFL form.
+
+    unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag; body_force: as for `solve_elastic`
+    Collective; raises InputError, on all ranks, for a facet tag that does not exist.
+    """
+    down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
+    work = ufl.inner(fem.Constant(domain, np.array(down)), test) * ufl.dx
+    if body_force is not None:
+        # Cubic: its error is far below that of linear and quadratic displacements
+        force = fem.Function(compat.function_space(domain, "Lagrange", 3, domain.geometry.dim))
+        force.interpolate(lambda x: body_force(x[: domain.geometry.dim]))
+        work += ufl.inner(force, test) * ufl.dx
+    for tag, value in traction.items():
+        ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
+        numbers = tag_numbers(domain.comm, facet_tags, tag, "traction")
+        work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(numbers)
+    return work

@@ -1,0 +1,49 @@
+"""Which law holds in which cell of a body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+from fenics_bridge.mesh.names import by_number, described, label
+from fenics_bridge.mesh.tagged import owned_cells, tag_values
+
+
+class Materials:
+    """One law for the whole body, or one for each cell tag.
+
+    tags: of the laws, in their order; (None,) for a law of the whole body
+    number: (m,) int32, position in `tags` of the law of each owned cell
+    """
+
+    def __init__(self, domain, law, cell_tags):
+        """law: of `mpm_core`, or {cell tag or name: law}. Raises InputError, on all ranks, for other tags. Collective."""
+        self._comm, self._cell_tags, n_cells = domain.comm, cell_tags, owned_cells(domain)
+        self.tags: tuple = (None,)
+        if not isinstance(law, dict):
+            self.number = np.zeros(n_cells, dtype=np.int32)
+            return
+        agree(
+            self._comm,
+            "cell_tags: got None, expected the tags that the laws are given for" if cell_tags is None else None,
+        )
+        values = tag_values(domain, cell_tags, domain.topology.dim)[:n_cells]
+        law = by_number(self._comm, cell_tags, law, "law", "cell")
+        known = sorted(set().union(*self._comm.allgather(set(values.tolist()))))
+        without = [tag for tag in known if tag not in law]
+        problem = f"law: no law for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None
+        agree(self._comm, problem)
+        self.tags = tuple(law)
+        self.number = np.zeros(n_cells, dtype=np.int32)
+        for number, tag in enumerate(self.tags):
+            self.number[values == tag] = number
+
+    def laws(self, law):
+        """The laws in their order; law: as above. Raises InputError, on all ranks, for other tags. Collective."""
+        named = isinstance(law, dict) and self.tags != (None,)
+        given = by_number(self._comm, self._cell_tags, law, "law", "cell") if named else {None: law}
+        tags = described(self._cell_tags, self.tags)
+        expected = f"laws for the cell tags {tags}" if self.tags != (None,) else "one law"
+        mistake = set(given) != set(self.tags) or isinstance(given.get(None), dict)
+        agree(self._comm, f"law: got {law!r}, expected {expected}" if mistake else None)
+        return [given[tag] for tag in self.tags]

@@ -1,0 +1,177 @@
+"""Quasi-static Taylor-Hood elements for soil that keeps, or nearly keeps, its volume: they do not lock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+
+import mpm_core as mpm
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.equilibration import Solver, find_equilibrium
+from fenics_bridge.fem.equilibrium import Body
+from fenics_bridge.fem.evaluate import evaluate_at
+from fenics_bridge.fem.fields import assembled, strain
+from fenics_bridge.fem.linear_solver import LinearSolver
+from fenics_bridge.fem.load_steps import raise_load
+from fenics_bridge.fem.loads import Load, LoadVectors
+from fenics_bridge.fem.materials import Materials
+from fenics_bridge.fem.quadrature import QuadraturePoints
+from fenics_bridge.fem.stiffness import Stiffness
+from fenics_bridge.fem.supports import Constraints, tagged_facets
+
+
+class MixedQuasiStatic:
+    """Small-strain equilibrium of undrained soil: quadratic displacement, linear pressure (Taylor-Hood).
+
+    The law gives the deviatoric stress of the deviatoric strain; the pressure p = -K div u is an unknown of its own. That
+    is exact for laws whose deviatoric stress does not depend on the mean stress: elastic, or of friction angle zero.
+    load: the Load in equilibrium; points: QuadraturePoints, whose stress is the deviatoric one
+    converged: whether the last call reached its goal
+    Has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
+    """
+
+    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_", solver=None):
+        """
+        law: of `mpm_core`, LinearElastic, or MohrCoulomb with a friction angle of 0 and no tension cut-off
+        facet_tags, supports: as for `solve_elastic`; options_prefix: of the PETSc options of the linear solver
+        solver: as for `QuasiStatic`
+        Raises InputError, on all ranks, for bad arguments. Collective.
+        """
+        agree(domain.comm, _first_mistake(law))
+        space = compat.taylor_hood_space(domain)
+        self.domain, self.law = domain, law
+        constraints = Constraints(space.sub(0), facet_tags, supports)
+        self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0])
+        self.points = QuadraturePoints(domain, [law], Materials(domain, law, None).number, 2)
+        self.load, self.converged = Load(), False
+        unknowns = fem.Function(space), fem.Function(space)
+        self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law)
+        linear = LinearSolver(space, options_prefix, newton=True)
+        self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
+        self.solver = solver or Solver()
+        self._facet_tags = facet_tags
+        self._displacements, self._parts = space.sub(0).collapse()
+
+    @property
+    def displacement(self):
+        """Total displacement as a function of its own [m]."""
+        return self._displacement(self._body.solution, "displacement")
+
+    @property
+    def increment(self):
+        """Displacement of the last step [m]."""
+        return self._displacement(self._body.increment, "increment")
+
+    def equilibrate(self, load, law=None, **options):
+        """Go to the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
+        law = law or self.law
+        agree(self.domain.comm, _first_mistake(law))
+        forces = self._loads.forces(load), self._loads.forces(self.load)
+        report = find_equilibrium(self._body, [law], *forces, load.displacement, replace(self.solver, **options))
+        self.converged = report.converged
+        if report.converged:
+            self.load, self.law = load, law
+        return report
+
+    def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
+        """Raise the load from the present one to the given one; as `QuasiStatic.solve`. Collective."""
+        return raise_load(self, load, first_step, tolerance, progress)
+
+    def reaction(self, facet_tag):
+        """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in 2D). Collective."""
+        space, dim = self._body.solution.function_space, self.domain.geometry.dim
+        self._body.increment.x.array[:] = 0.0
+        forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
+        facets = tagged_facets(space.mesh.comm, self._facet_tags, facet_tag, "facet_tag")
+        owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
+        sums = []
+        for component in range(dim):
+            dofs = fem.locate_dofs_topological(space.sub(0).sub(component), dim - 1, facets)
+            sums.append(forces[dofs[dofs < owned]].sum())
+        return self.domain.comm.allreduce(np.array(sums))
+
+    def pressure_at(self, points):
+        """Pressure at points (n, D) on any rank, compression positive: (n,) [Pa]. Collective."""
+        pressure = self._body.solution.sub(1).collapse()
+        return self._kinematics.scale * evaluate_at(points, pressure=pressure)["pressure"][:, 0]
+
+    def evaluate_at(self, points):
+        """Dictionary of `displacement` (n, D) [m] at points on any rank.
+
+        Raises InputError, on all ranks, naming a point outside the body. Collective.
+        """
+        return evaluate_at(points, displacement=self.displacement)
+
+    def _displacement(self, both, name):
+        function = fem.Function(self._displacements, name=name)
+        function.x.array[:] = both.x.array[self._parts]
+        return function
+
+
+class _MixedKinematics:
+    """Deviatoric strain, forces and stiffness of displacement and pressure, as `Kinematics` has them for displacement.
+
+    The unknown pressure is in units of the shear modulus, which keeps the two sorts of equations alike in size.
+    """
+
+    def __init__(self, solution, increment, points, constraints, law):
+        space = solution.function_space
+        self._space, self._points = space, points
+        domain, size = space.mesh, points.size
+        young, poisson = law.young, law.poisson
+        self.scale = young / (2 * (1 + poisson))
+        flexibility = self.scale * 3 * (1 - 2 * poisson) / young  # G / K
+        self._deviator = np.eye(size) - np.outer(np.arange(size) < 3, np.arange(size) < 3) / 3
+        u, p = (a + b for a, b in zip(ufl.split(solution), ufl.split(increment)))
+        (v, q), (du, dp) = ufl.TestFunctions(space), ufl.TrialFunctions(space)
+        self._strain = fem.Expression(strain(ufl.split(increment)[0]), points.reference)
+        self._stress, self._stress_rows = self._quadrature_function(size)
+        self._tangent, self._tangent_rows = self._quadrature_function(size**2)
+        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
+        matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
+
+        def volume(u, p):
+            return self.scale * (-p * ufl.div(v) - q * ufl.div(u) - flexibility * p * q) * dx
+
+        self._internal = fem.form(ufl.inner(self._stress, strain(v)) * dx + volume(u, p))
+        stiffness = ufl.inner(ufl.dot(matrix, strain(du)), strain(v)) * dx + volume(du, dp)
+        self._stiffness = Stiffness(stiffness, space, constraints)
+        self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+
+    def strain_increment(self):
+        """Deviatoric strain of the increment at the points: (n, S)."""
+        values = compat.expression_values(self._strain, self._space.mesh, self._points.cells)
+        return values.reshape(self._points.n, self._points.size) @ self._deviator
+
+    def internal_forces(self, stress):
+        """Nodal forces of a stress (n, S), of which the deviatoric part counts, and of the pressure. Collective."""
+        self._stress.x.array.reshape(-1, self._points.size)[self._stress_rows] = stress @ self._deviator
+        return assembled(self._internal, self._space, self._forces)
+
+    def stiffness(self):
+        """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
+        size = self._points.size
+        tangent = self._deviator @ self._points.tangent @ self._deviator
+        self._tangent.x.array.reshape(-1, size**2)[self._tangent_rows] = tangent.reshape(-1, size**2)
+        return self._stiffness.assembled()
+
+    def _quadrature_function(self, size):
+        space = compat.quadrature_space(self._space.mesh, self._points.degree, size)
+        return fem.Function(space), compat.cell_dofs(space)[self._points.cells].ravel()
+
+
+def _first_mistake(law):
+    if isinstance(law, mpm.LinearElastic):
+        return None
+    if not isinstance(law, mpm.MohrCoulomb):
+        return f"law: got {type(law).__name__}, expected LinearElastic or MohrCoulomb"
+    if law.friction_angle != 0 or np.isfinite(law.tension_cutoff):
+        return (
+            f"law: got a friction angle of {law.friction_angle:g} degrees and a tension cut-off of "
+            f"{law.tension_cutoff:g} Pa, expected 0 and none"
+        )
+    return None

@@ -1,0 +1,144 @@
+"""Viscous relaxation: equilibrium where Newton's method finds none, or the evidence that there is none.
+
+The body is given a viscosity in proportion to its elastic stiffness (Kelvin-Voigt) and follows the load in pseudo-time,
+its stresses updated step by step: f_ext = f_int(sigma) + tau K_el du/dt. With a time increment of tau / theta each step
+solves
+
+    f_ext - f_int(sigma_n + d_sigma(du)) - theta K_el du = 0.
+
+The tangent of non-associated flow may lose its positive definiteness, which makes Newton's method chatter. With n and m the
+normals of yield surface and potential, at the angle alpha in the metric of the elastic stiffness, the smallest eigenvalue
+of the symmetric part of the elasto-plastic tangent is (1 - 1/cos(alpha))/2 of the elastic one, so a larger theta leaves one
+solution to each step, and Newton's method finds it. (It is 0.08 for phi = 20, psi = 0; 0.5 for angles of some
+40 degrees; a step whose iteration fails is repeated with three times the theta.) As the body comes to rest theta is lowered
+towards zero, and what remains is the equilibrium. A body that does not come to rest flows in a mechanism.
+
+Sources: Zienkiewicz, Cormeau (1974), IJNME 8, 821-845 (viscoplastic strains as a way to plastic equilibrium); Kelley,
+Keyes (1998), SIAM J. Numer. Anal. 35, 508-523 (pseudo-transient continuation: the step grows as the residual falls).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.newton import line_search
+
+from fenics_bridge.fem.equilibrium import EquilibriumStep
+
+FIRST, LARGEST = 0.3, 100.0
+"""theta at the start, and the one at which the relaxation is given up [-]"""
+
+ELASTIC = 4.0
+"""Elastic displacements under a change of load that the growth must exceed before it counts as failure"""
+
+RUN_AWAY = 5.0
+"""Growth over the reference, at which the motion counts as failure even if its rate still changes"""
+
+CORRECTIONS = 8
+"""of Newton's method in a step, at most"""
+
+REDUCTION = 0.15, 0.3
+"""of the residual that a step of relaxation aims at, and with which it is still accepted"""
+
+STEADY = 0.8
+"""Fraction of the residual of half the time before, above which the motion counts as steady"""
+
+
+@dataclass
+class Relaxation:
+    """How a relaxation went; lists have one entry for each step that was accepted.
+
+    outcome: "equilibrium", "failure" (the displacement grows at a steady rate) or "undecided"; reason: in words
+    time: pseudo-time in units of the viscous time tau [-]; residual: out-of-balance force over the forces at work [-],
+        with one entry more where Newton's method could refine the end
+    growth: largest displacement of a node since the start [m]
+    carried: power of the stresses over that of the load on the step's motion [-]; in a mechanism, the factor by which the
+        load would have to be multiplied to be carried
+    iterations: linear systems solved; motion: displacement increments of the last step, per degree of freedom [m]
+    """
+
+    outcome: str = "undecided"
+    reason: str = ""
+    time: list[float] = field(default_factory=list)
+    residual: list[float] = field(default_factory=list)
+    growth: list[float] = field(default_factory=list)
+    carried: list[float] = field(default_factory=list)
+    iterations: int = 0
+    motion: np.ndarray | None = None
+
+
+def relax(body, laws, external, before, displacement, tolerance, max_steps, reference):
+    """Let a body relax under a load, from its present state on.
+
+    external, before: nodal forces of the load and of the load before it; displacement: fraction of the prescribed displacements
+    tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-]
+    max_steps: of pseudo-time; reference: displacement at the start [m]; the growth must exceed it, and some times the
+        elastic displacement of the change of load besides, before it counts as failure
+    Returns a Relaxation. The body is left where the relaxation ended, whatever the outcome. Collective.
+    """
+    result, theta, scale = Relaxation(), FIRST, None
+    start = body.solution.x.array.copy()
+    for _ in range(max_steps):
+        step = EquilibriumStep(body, laws, external, before, displacement, theta, scale)
+        residuals = _solve_step(step, tolerance)
+        result.iterations += len(residuals) - 1
+        scale = step.scale
+        if not residuals[-1] <= REDUCTION[1] * residuals[0] and not residuals[-1] <= 0.3 * tolerance:
+            theta *= 3
+            if theta > LARGEST:
+                result.reason = (
+                    step.reason or f"no step of the relaxation converged at a residual of {residuals[0]:.1e}"
+                )
+                return result
+            continue
+        _record(result, body, step, theta, start)
+        if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
+            reference += ELASTIC * (1 + theta) * result.growth[0]
+        if result.residual[-1] <= tolerance:
+            result.outcome = "equilibrium"
+            return result
+        if _flows(result, reference):
+            result.outcome = "failure"
+            result.reason = (
+                f"a mechanism: the displacement grew by {result.growth[-1]:.3g} m at a steady rate under an out-of-balance "
+                f"force of {result.residual[-1]:.1e}; the stresses carry {result.carried[-1]:.2%} of the load"
+            )
+            return result
+        theta *= 0.3 if len(residuals) <= 4 else 1.5 if len(residuals) > 6 else 1.0
+    result.reason = (
+        f"residual {result.residual[-1] if result.residual else np.inf:.1e} after {max_steps} steps of relaxation"
+    )
+    return result
+
+
+def _solve_step(step, tolerance):
+    """Newton's method for one viscous step, to a fraction of the residual at its start; returns the residuals."""
+    residuals = [step.start()]
+    aim = max(REDUCTION[0] * residuals[0], 0.3 * tolerance)
+    while residuals[-1] > aim and len(residuals) <= CORRECTIONS or len(residuals) == 1:
+        if not step.correction():
+            return [*residuals, np.inf]
+        residuals.append(line_search(step, max_halvings=3))
+        step.keep()
+    return residuals
+
+
+def _record(result, body, step, theta, start):
+    """Accepts a step and adds it to the result."""
+    result.residual.append(step.out_of_balance())
+    result.carried.append(step.carried_fraction())
+    result.motion = body.increment.x.array.copy()
+    body.accept()
+    moved = np.abs(body.solution.x.array - start).max(initial=0.0)
+    result.growth.append(body.solution.function_space.mesh.comm.allreduce(float(moved), MPI.MAX))
+    result.time.append((result.time[-1] if result.time else 0.0) + 1 / theta)
+
+
+def _flows(result, reference):
+    """Whether the displacement has grown beyond the reference, at a rate that falls no more."""
+    if result.growth[-1] <= reference:
+        return False
+    earlier = float(np.interp(0.5 * result.time[-1], result.time, result.residual))
+    return result.residual[-1] > STEADY * earlier or result.growth[-1] > RUN_AWAY * reference

@@ -1,0 +1,111 @@
+"""Supports of a body by facet tag: fixed, rollers, prescribed displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from fenics_bridge.compat import facet_nodes
+from fenics_bridge.errors import InputError, agree
+from fenics_bridge.mesh.names import tag_numbers
+
+
+@dataclass(frozen=True)
+class Support:
+    """Displacement components prescribed on the facets of one tag; None leaves a component free.
+
+    facet_tag: number, or name, of the tag
+    displacement: (D,) [m] or None for "all zero"
+    """
+
+    facet_tag: int | str
+    displacement: tuple | None = None
+
+
+def fixed(facet_tag):
+    """No displacement at all."""
+    return Support(facet_tag)
+
+
+def roller(facet_tag, normal):
+    """No displacement along `normal`, which must be an axis, e.g. (1, 0); free to slide across it.
+
+    (The finite elements hold components of displacements; a roller at an angle to the axes would tie several of them
+    together. Particles can have one: `mpm_core.Model.roller`.)
+    """
+    normal = np.asarray(normal, dtype=float)
+    along = np.flatnonzero(normal)
+    if len(along) != 1:
+        raise InputError(
+            f"normal: got {tuple(normal.tolist())}, expected an axis such as (1, 0): the finite elements hold "
+            "components of the displacement, so their rollers cannot be inclined"
+        )
+    return Support(facet_tag, tuple(0.0 if i == along[0] else None for i in range(len(normal))))
+
+
+def prescribed(facet_tag, displacement):
+    """Displacement components [m] on a part of the boundary; None leaves a component free."""
+    return Support(facet_tag, tuple(displacement))
+
+
+class Constraints:
+    """The supports of a body on the degrees of freedom of a displacement space.
+
+    `dofs` (k,) int32 local, `values` (k,) [m], both unrolled over components and with ghosts; `bcs` for assembling
+    matrices. Where supports meet, the later one holds. `origin` (k,) [m]: displacement from which the values count.
+    """
+
+    def __init__(self, space, facet_tags, supports, held=()):
+        """space: of the displacement, or that part of a mixed space; held: further dofs (local, blocked) that stay."""
+        domain, dim = space.mesh, space.mesh.geometry.dim
+        agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
+        domain.topology.create_connectivity(dim - 1, dim)
+        value_of, self.bcs = {}, []
+        for support in supports:
+            displacement = support.displacement or (0.0,) * dim
+            facets = tagged_facets(domain.comm, facet_tags, support.facet_tag, "supports")
+            for component, value in enumerate(displacement):
+                if value is None:
+                    continue
+                part = space.sub(component)
+                dofs = fem.locate_dofs_topological(part, dim - 1, facets)
+                self.bcs.append(fem.dirichletbc(np.float64(0.0), dofs, part))
+                value_of.update(dict.fromkeys(dofs.tolist(), float(value)))
+        if len(held):
+            self.bcs.append(fem.dirichletbc(np.zeros(dim), np.asarray(held, dtype=np.int32), space))
+            value_of.update(dict.fromkeys((dim * np.asarray(held)[:, None] + np.arange(dim)).ravel().tolist(), 0.0))
+        self.dofs = np.fromiter(value_of.keys(), np.int32, len(value_of))
+        self.values = np.fromiter(value_of.values(), float, len(value_of))
+        self.origin = np.zeros(len(value_of))
+
+    def at(self, share):
+        """Displacements (k,) [m] of the dofs at a share of the values."""
+        return self.origin + share * self.values
+
+
+def flat_normal(domain, facet_tags, tag):
+    """The axis, such as (1, 0), to which all facets of a tag are at right angles; None where there is none. Collective."""
+    facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
+    corners = domain.geometry.x[facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
+    size = np.ptp(domain.geometry.x, axis=0).max() if len(domain.geometry.x) else 0.0
+    flat = np.ptp(corners, axis=1) <= 1e-9 * size
+    along = np.flatnonzero(np.all(domain.comm.allgather(flat.all(axis=0)), axis=0))
+    return tuple(float(k == along[0]) for k in range(domain.geometry.dim)) if len(along) == 1 else None
+
+
+def tagged_facets(comm, facet_tags, tag, argument):
+    """Facets of this rank with a tag, given as a number or name. Raises InputError, on all ranks, for none. Collective."""
+    return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
+
+
+def _first_mistake(domain, facet_tags, supports, dim):
+    for support in supports:
+        tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports")
+        displacement = support.displacement
+        if displacement is not None and len(displacement) != dim:
+            return f"supports: {support} has {len(displacement)} components, expected {dim}"
+        if displacement is not None and not all(v is None or np.isfinite(v) for v in displacement):
+            return f"supports: {support} has a value that is not finite"
+    return None

@@ -1,0 +1,1 @@
+"""Background meshes and soil bodies: reading, building, naming and distributing them."""

@@ -1,0 +1,71 @@
+"""The background mesh of a box: the plainest ground there is, in two and three dimensions."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+
+from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+
+BODY = 1
+"""Cell tag of the body in a box mesh."""
+
+
+def box_mesh(comm, lengths, counts, diagonals="alternating", body=None):
+    """Background mesh of a box with its low corner at the origin: squares or cubes, each cut in D! simplices (Kuhn 1960).
+
+    lengths: (D,) [m]; counts: (D,) squares or cubes along each axis
+    diagonals: "alternating" from square to square, or "one-way"
+    body: (low, high) corners of a box [m]; cells with their centre in there have the tag BODY, all by default
+    Returns (domain, cell_tags, facet_tags): facets have the tag 2 axis + 1 on the low side along an axis (counted from 0),
+    and 2 axis + 2 on the high side. Raises InputError, on all ranks, for bad dimensions. Collective.
+    """
+    dim = len(np.atleast_1d(lengths))
+    result = on_root(comm, lambda: _arrays(lengths, counts, diagonals, body))
+    return distributed_mesh(comm, result if result is not None else empty_arrays(dim), dim)
+
+
+def _arrays(lengths, counts, diagonals, body):
+    lengths, counts = np.asarray(lengths, dtype=float), np.asarray(counts)
+    dim = len(lengths)
+    if dim not in (2, 3) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
+        raise InputError(f"lengths: got {lengths.tolist()} m, expected two or three positive lengths")
+    if counts.shape != lengths.shape or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
+        raise InputError(f"counts: got {counts.tolist()}, expected {dim} whole numbers from 1 on")
+    if diagonals not in ("alternating", "one-way"):
+        raise InputError(f"diagonals: got {diagonals!r}, expected 'alternating' or 'one-way'")
+    grid = np.indices(counts + 1).reshape(dim, -1).T
+    points, cells = grid * (lengths / counts), _simplices(counts, diagonals == "alternating")
+    centres = points[cells].mean(axis=1)
+    low, high = np.asarray([[-np.inf] * dim, [np.inf] * dim] if body is None else body, dtype=float)
+    inside = ((centres > low) & (centres < high)).all(axis=1)
+    return MeshArrays(points, cells, np.where(inside, BODY, 0).astype(np.int32), *_sides(grid, cells, counts))
+
+
+def _simplices(counts, alternating):
+    """Each cube is cut along its diagonal from a corner to the opposite one; (m, D + 1) numbers of nodes."""
+    dim = len(counts)
+    cubes = np.indices(counts).reshape(dim, -1).T
+    turned = cubes % 2 if alternating else np.zeros_like(cubes)
+    cells = []
+    for order in permutations(range(dim)):
+        corner = cubes + turned
+        nodes = [corner.copy()]
+        for axis in order:
+            corner[:, axis] += 1 - 2 * turned[:, axis]
+            nodes.append(corner.copy())
+        cells.append(np.stack([np.ravel_multi_index(tuple(n.T), counts + 1) for n in nodes], axis=1))
+    return np.stack(cells, axis=1).reshape(-1, dim + 1).astype(np.int64)
+
+
+def _sides(grid, cells, counts):
+    """Facets on the sides of the box, (k, D) nodes, and their tags."""
+    facets, tags = [], []
+    for vertex, axis, end in product(range(cells.shape[1]), range(len(counts)), (0, 1)):
+        nodes = np.delete(cells, vertex, axis=1)
+        on_side = (grid[nodes][:, :, axis] == end * counts[axis]).all(axis=1)
+        facets.append(nodes[on_side])
+        tags.append(np.full(on_side.sum(), 2 * axis + 1 + end, np.int32))
+    return np.concatenate(facets), np.concatenate(tags)

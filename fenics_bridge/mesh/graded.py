@@ -1,0 +1,58 @@
+"""Soils whose parameters vary with position, such as a strength that grows with depth: cells sorted into classes."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import mesh
+from mpi4py import MPI
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.mesh.names import label, name_tags, names_of, tag_numbers
+from fenics_bridge.mesh.tagged import tag_values
+
+
+def graded_tags(domain, cell_tags, soil, value_of, classes=20):
+    """Sort the cells of a soil into classes by a function of position, each with a tag of its own.
+
+    Classes are equally wide between the least and the largest value at the cells' centroids, so a parameter that is
+    linear in the value is off by at most half a class. The soil's name then stands for all of its classes.
+    soil: name of the soil; value_of: function of positions (n, D) [m] that returns values (n,), e.g. their depths
+    classes: number of classes; those without cells get no tag
+    Returns (cell_tags, {tag: value in the middle of the class}). Collective.
+    Raises InputError, on all ranks, for a soil that is not there and for values that are not finite.
+
+    Example:
+        >>> tags, depths = bridge.graded_tags(domain, cell_tags, "clay", lambda x: 3.0 - x[:, 1])
+        >>> laws = {tag: mpm.tresca(young=5e6, poisson=0.49, shear_strength=12e3 + 1.5e3 * z) for tag, z in depths.items()}
+    """
+    comm, dim = domain.comm, domain.topology.dim
+    old = tag_numbers(comm, cell_tags, soil, "soil", "cell")
+    agree(comm, None if classes >= 1 else f"classes: got {classes!r}, expected a whole number from 1 on")
+    tags = tag_values(domain, cell_tags, dim)
+    corners = domain.geometry.x[compat.cell_nodes(domain), : domain.geometry.dim]
+    rows = np.flatnonzero(np.isin(tags, old))
+    values = np.broadcast_to(np.asarray(value_of(corners[rows].mean(axis=1)), dtype=float), len(rows))
+    agree(comm, None if np.all(np.isfinite(values)) else "value_of: it gives values that are not finite")
+    low, high = comm.allreduce(values.min(initial=np.inf), MPI.MIN), comm.allreduce(
+        values.max(initial=-np.inf), MPI.MAX
+    )
+    width = (high - low) / classes or 1.0
+    # A centroid on the border of two classes must not go to either by round-off.
+    number = np.clip(np.floor((values - low) / width + 1e-9).astype(np.int32), 0, classes - 1)
+    present = sorted(set().union(*comm.allgather(set(np.unique(number).tolist()))))
+    first = 1 + comm.allreduce(int(cell_tags.values.max(initial=0)), MPI.MAX)
+    tags[rows] = first + np.searchsorted(present, number)
+    tagged = np.flatnonzero(tags).astype(np.int32)
+    graded = mesh.meshtags(domain, dim, tagged, tags[tagged])
+    graded.name = cell_tags.name
+    new = tuple(range(first, first + len(present)))
+    name = soil if isinstance(soil, str) else label(cell_tags, soil).strip("'")
+    kept = {other: _without(numbers, old, new) for other, numbers in names_of(cell_tags).items()}
+    return name_tags(graded, {**kept, name: new}), dict(zip(new, low + width * (np.array(present) + 0.5)))
+
+
+def _without(numbers, old, new):
+    """Tags of a name, with those of the graded soil replaced by those of its classes."""
+    rest = tuple(number for number in numbers if number not in old)
+    return (*rest, *new) if len(rest) < len(numbers) else numbers

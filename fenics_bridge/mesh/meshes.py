@@ -1,0 +1,115 @@
+"""Meshes from gmsh: read from .msh, or made from .geo."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from fenics_bridge.errors import InputError, agree, on_root
+from fenics_bridge.mesh import gmsh_reader
+from fenics_bridge.mesh.checks import check_cells_fit, check_conforming
+from fenics_bridge.mesh.gmsh_process import Limits, read_apart
+from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+
+TIME_LIMIT = 600.0
+"""[s] that gmsh may take for a file, unless told otherwise"""
+
+
+def read_mesh(path, comm, dim=2, parameters=None, *, time_limit=TIME_LIMIT, memory_limit=None, allow_commands=False):
+    """Mesh and tags from a file of gmsh; rank 0 reads, DOLFINx partitions.
+
+    path: .msh (any version that gmsh reads) or .geo (meshed here)
+    comm: MPI communicator; dim: 2 for triangles in the plane z = 0, 3 for tetrahedra
+    parameters: for .geo, values for its `DefineConstant` names, e.g. {"cell_size": 0.1}
+    time_limit: [s] that gmsh may take; memory_limit: bytes that it may take, by default half of the machine's memory
+    allow_commands: let a .geo file run commands by `SystemCall`; it is a program, so trust it first
+    Returns (domain, cell_tags, facet_tags). Tags are gmsh's physical groups, whose names stand for them wherever a tag
+    is asked for. When the file has physical groups of dimension `dim`, only their cells belong to the mesh, as when
+    gmsh saves a mesh; otherwise all do, untagged. Nodes at one place are merged, so that soils hold together.
+    Raises InputError, on all ranks, for a file that is missing or cannot be read, another extension, a mesh without
+    cells, of another dimension, with quadrilaterals or hexahedra, or with curved (second-order) elements; one that runs
+    commands, or that takes more time or memory than it may.
+    Collective.
+    """
+    _check_arguments(comm, path, dim, parameters)
+    limits = Limits(time_limit, memory_limit, allow_commands)
+    arrays = on_root(comm, lambda: _arrays_from_file(Path(path), dim, parameters or {}, limits))
+    return distributed_mesh(comm, arrays if arrays is not None else empty_arrays(dim), dim)
+
+
+def arrays_from_model(dim, name):
+    """MeshArrays of gmsh's current model; `name` stands for the model in error messages."""
+    try:
+        arrays = gmsh_reader.model_arrays(dim)
+    except gmsh_reader.MeshError as error:
+        raise InputError(f"{name}: {error}") from error
+    return _mesh_arrays(arrays, name)
+
+
+def _check_arguments(comm, path, dim, parameters):
+    message = None
+    suffix = Path(path).suffix.lower()
+    if dim not in (2, 3):
+        message = f"dim: got {dim!r}, expected 2 or 3"
+    elif suffix not in (".msh", ".geo"):
+        message = f"path: got {str(path)!r}, expected a gmsh file ending in .msh or .geo"
+    elif parameters and suffix != ".geo":
+        message = f"parameters: only a .geo file takes them, got path {str(path)!r}"
+    agree(comm, message)
+
+
+def _arrays_from_file(path, dim, parameters, limits):
+    if not path.is_file():
+        raise InputError(f"path: there is no file {str(path)!r}")
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"path: {str(path)!r} cannot be read: {error.strerror}") from error
+    if path.suffix.lower() == ".msh" and not text.lstrip().startswith(b"$MeshFormat"):
+        raise InputError(f"path: {str(path)!r} is not a gmsh mesh (it does not begin with $MeshFormat)")
+    constants = _constants(parameters, text, path)
+    with tempfile.TemporaryDirectory() as folder:
+        given = _with_constants(path, constants, folder)
+        arrays = read_apart(given, dim, Path(folder) / "arrays.npz", str(path), limits)
+    return _mesh_arrays(arrays, str(path))
+
+
+def _mesh_arrays(arrays, name):
+    check_cells_fit(arrays["cells"], name)
+    if arrays["cells"].shape[1] == 3:
+        check_conforming(arrays["points"], arrays["cells"], name)
+    keys = "points", "cells", "cell_values", "facets", "facet_values"
+    return MeshArrays(*(arrays[key] for key in keys), *(_names(arrays, kind) for kind in ("cell", "facet")))
+
+
+def _names(arrays, kind):
+    """{name: tags} of the physical groups of cells or facets."""
+    names: dict[str, tuple[int, ...]] = {}
+    for name, number in zip(arrays[f"{kind}_names"].tolist(), arrays[f"{kind}_numbers"].tolist()):
+        names[name] = (*names.get(name, ()), number)
+    return names
+
+
+def _constants(parameters, text, path):
+    """Lines of a .geo file that set its constants: `DefineConstant` leaves alone what has a value."""
+    lines = []
+    for name, value in parameters.items():
+        if not (name.isidentifier() and re.search(rf"\b{name}\b".encode(), text)):
+            raise InputError(f"parameters: {str(path)!r} has no constant {name!r}")
+        if not np.isfinite(value):
+            raise InputError(f"parameters: {name}={value!r}, expected a finite number")
+        lines.append(f"{name} = {float(value)!r};\n")
+    return "".join(lines)
+
+
+def _with_constants(path, constants, folder):
+    """A file that sets the constants and includes `path`; gmsh would keep them from one session to the next
+    if they came by its command line."""
+    if not constants:
+        return path
+    wrapper = Path(folder) / "with_constants.geo"
+    wrapper.write_text(f'{constants}Include "{path.resolve()}";\n')
+    return wrapper

@@ -1,0 +1,64 @@
+"""The soil body as a mesh of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import la
+
+from fenics_bridge import compat
+from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
+from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, tag_values
+
+
+def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
+    """Mesh of the cells of one tag or several, with a partition of its own, so that all ranks share the work.
+
+    Soils of several tags are one body: they share the nodes of their borders. (DOLFINx's `create_submesh` keeps the
+    partition and is not to be trusted on several ranks before 0.8.)
+    tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"]
+    Returns (domain, cell_tags, facet_tags): the cells keep their tag, the facets of the body theirs, both their names.
+    Raises InputError, on all ranks, when no cell has a tag. Collective.
+    """
+    dim = domain.topology.dim
+    numbers = tag_numbers(domain.comm, cell_tags, tag, "tag", "cell")
+    values = tag_values(domain, cell_tags, dim)[: owned_cells(domain)]
+    cells = np.flatnonzero(np.isin(values, numbers))
+    nodes = compat.cell_nodes(domain)[cells]
+    number, points = _numbered_nodes(domain, nodes)
+    facets, facet_values = _owned_facets_of(domain, cells, facet_tags)
+    arrays = MeshArrays(points, number[nodes], values[cells], number[facets], facet_values)
+    body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
+    for there, here in ((cell_tags, body_cells), (facet_tags, body_facets)):
+        name_tags(here, names_of(there))
+    return body, body_cells, body_facets
+
+
+def _numbered_nodes(domain, nodes):
+    """Numbers without gaps, over all ranks, of the nodes in use, and this rank's share of their coordinates.
+
+    nodes: local nodes in use. Returns the number of each local node (-1: not in use) and points (n, D).
+    """
+    index_map = domain.geometry.index_map()
+    n_owned = index_map.size_local
+    used = la.vector(index_map, 1)
+    used.array[:] = 0.0
+    used.array[nodes.ravel()] = 1.0
+    compat.add_shared(used)
+    mine = np.flatnonzero(used.array[:n_owned] > 0)
+    first = domain.comm.scan(len(mine)) - len(mine)
+    used.array[:n_owned] = -1.0
+    used.array[mine] = first + np.arange(len(mine))
+    compat.forward(used)
+    points = domain.geometry.x[mine, : domain.topology.dim]
+    return np.rint(used.array).astype(np.int64), points
+
+
+def _owned_facets_of(domain, cells, facet_tags):
+    """Nodes and tags of the tagged facets of the given cells; a facet may be listed by two ranks."""
+    dim = domain.topology.dim
+    if facet_tags is None:
+        return np.empty((0, dim), np.int64), np.empty(0, np.int32)
+    domain.topology.create_connectivity(dim, dim - 1)
+    facets_of_cell = domain.topology.connectivity(dim, dim - 1).array.reshape(-1, dim + 1)
+    keep = np.isin(facet_tags.indices, facets_of_cell[cells])
+    return compat.facet_nodes(domain, facet_tags.indices[keep]), np.array(facet_tags.values[keep], dtype=np.int32)

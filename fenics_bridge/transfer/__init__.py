@@ -1,0 +1,1 @@
+"""Between finite elements and particles: hand-over, comparison, stages of particles."""

@@ -1,0 +1,60 @@
+"""Finite elements and particles side by side, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_bridge.fem.evaluate import PointSearch
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far the particles are from the finite elements in one quantity; relative to the finite elements.
+
+    l2: root of the volume-weighted sum of squares, over that of the finite elements [-]
+    maximum: largest difference over the largest value of the finite elements [-]
+    here: differences at this rank's particles, (n, k), particles minus finite elements
+    """
+
+    l2: float
+    maximum: float
+    here: np.ndarray
+
+
+def compare(fem, model, smooth=False, places=None):
+    """Differences in displacement and stress at the particles' material points.
+
+    A particle is compared with the finite elements at the place where it started, by which both know a material point;
+    they are evaluated there (a consistent transfer: values are kept, sums need not be).
+    fem: QuasiStatic or ElasticSolution; model: `mpm_core.Model`, whose particles' displacements count from the finite
+    elements' undeformed body; smooth: as for `stress_function`
+    places: other places (n, D) [m] to evaluate the finite elements at; for particles that were handed over and so
+        never stood in the undeformed body, `model.particles.position` after the hand-over
+    Returns a dictionary of Difference, `displacement` [m] and `stress` [Pa]. Raises InputError, on all ranks, naming a
+    particle whose place is outside the finite elements' mesh. Collective.
+    """
+    particles = model.particles
+    search = PointSearch(fem.displacement.function_space.mesh, particles.initial_position if places is None else places)
+    search.require_all("particles")
+    stress = search.values(fem.stress_function(smooth))
+    pairs = {
+        "displacement": (particles.displacement, search.values(fem.displacement)),
+        "stress": (particles.stress, stress),
+    }
+    return {name: _difference(model.comm, here, there, particles.volume) for name, (here, there) in pairs.items()}
+
+
+def _difference(comm, values, reference, volume):
+    difference = values - reference
+    sums = [comm.allreduce(float(np.sum(volume[:, None] * a**2))) for a in (difference, reference)]
+    largest = [
+        comm.allreduce(float(np.linalg.norm(a, axis=1).max(initial=0.0)), MPI.MAX) for a in (difference, reference)
+    ]
+    return Difference(_ratio(*sums) ** 0.5, _ratio(*largest), difference)
+
+
+def _ratio(above, below):
+    return above / below if below > 0 else (0.0 if above == 0 else np.inf)

@@ -1,0 +1,166 @@
+"""From finite elements to particles: stress, state and displacement of an equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
+
+_BALANCED, _MOST_STEPS = 5e-4, 60
+"""Out-of-balance ratio to reach, and the steps that it may take: near collapse each one leaves a share of it."""
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What a hand-over did; sums are over all ranks.
+
+    unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
+    settled_ratio: the same after the equilibration [-]; None when there was none
+    returned_share: share of the particles whose stress had to be brought back inside the strength [-]
+    yielded_share: share of the particles that yielded in the equilibration where the finite elements did not [-]
+    """
+
+    unbalanced_ratio: float
+    settled_ratio: float | None
+    returned_share: float
+    yielded_share: float
+
+
+def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True):
+    """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
+
+    Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
+    to the yield surface should it be outside, and loses its velocity. The model's gravity must be that of the
+    equilibrium.
+
+    model: `mpm_core.Model` with particles; fem: QuasiStatic, solved and converged, or ElasticSolution; the meshes and
+        their partitions may differ
+    move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
+        Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
+        of the moved body (`moved.fitted_volumes`). A body that has moved is only near equilibrium: that of small
+        strains is one of the undeformed body, and now its surface cuts cells.
+    count_displacement: displacements of particles include those of the finite elements; otherwise they start from zero
+    smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
+        equilibrium as it is; with other cells the smooth stress is far nearer to it.
+    equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads, to an
+        out-of-balance ratio of 5e-4
+    Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh or, moved,
+    outside the background mesh, for laws that do not match, and for finite elements that did not converge. Collective.
+    """
+    particles = model.particles
+    _require_usable(model, fem, move)
+    search = PointSearch(fem.displacement.function_space.mesh, particles.position)
+    search.require_all("particles")
+    if isinstance(fem, QuasiStatic):
+        number = search.values(fem.material_function())[:, 0].astype(int)
+        outside = int(np.sum(number < 0))
+        agree(
+            model.comm,
+            f"particles: {outside} of them lie where the soil of the finite elements is not there" if outside else None,
+        )
+        _require_same_laws(model, fem, number)
+    returned = _take_stress_and_state(model, fem, search, smooth)
+    _displace(model, fem.displacement, search, move, count_displacement)
+    before = model.out_of_balance()
+    had_yielded = int(np.sum(particles.plastic_strain > 0))
+    settled = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio if equilibrate else None
+    yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
+    count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
+    return Handover(before, settled, returned / count, yielded / count)
+
+
+def _take_stress_and_state(model, fem, search, smooth):
+    """Give the particles what the finite elements have where they are; returns how many stresses had to be returned."""
+    particles = model.particles
+    stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
+    if isinstance(fem, QuasiStatic):
+        values = search.values(fem.state_function())
+        own = state.copy()
+        state[:, : values.shape[1]] = values
+        _keep_cell_size(model.laws, particles.material, state, own)
+    returned = _returned(model.laws, particles.material, stress, state)
+    particles.set("stress", stress)
+    particles.set("state", state)
+    particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
+    particles.set("velocity", np.zeros_like(particles.velocity))
+    return returned
+
+
+def _keep_cell_size(laws, material, state, own):
+    """Softening soil goes on with the size of the particles' cells, and with the strength that the finite elements left it.
+
+    The strength depends on plastic strain times cell size, so the plastic strain is that of a band in the particles' cells.
+    """
+    for number, law in enumerate(laws):
+        if "cell_size" in law.state_names:
+            rows = np.flatnonzero(material == number)
+            size, strain = law.state_names.index("cell_size"), law.state_names.index("plastic_strain")
+            before, here = (np.where(s[rows, size] > 0, s[rows, size], law.reference_length) for s in (state, own))
+            state[rows, strain] *= before / here
+            state[rows, size] = own[rows, size]
+
+
+def _displace(model, displacement, search, move, count):
+    """Move the particles, count the displacement as theirs, both or neither; rows may have another order afterwards."""
+    particles, start = model.particles, model.particles.position
+    moved = search.values(displacement)
+    if count:
+        particles.set("initial_position", start if move else start - moved)
+    elif move:
+        particles.set("initial_position", start + moved)
+    if move:
+        held = held_volumes(model.mesh.domain, displacement)
+        particles.set("volume", particles.volume * search.values(volume_change(displacement))[:, 0])
+        model.place(start + moved)
+        particles.set("volume", fitted_volumes(particles.volume, particles.cell, held))
+
+
+def _returned(laws, material, stress, state):
+    """Bring stresses inside the strength, in place; the number of those that were outside."""
+    outside = 0
+    for number, law in enumerate(laws):
+        rows = np.flatnonzero(material == number)
+        inside, unused = stress[rows], np.ascontiguousarray(state[rows, : law.n_state])
+        law.update(np.zeros_like(inside), inside, unused, None)
+        moved = np.abs(inside - stress[rows]).max(axis=1, initial=0.0)
+        outside += int(np.sum(moved > 1e-9 * np.abs(stress).max(initial=0.0)))
+        stress[rows] = inside  # the state stays that of the finite elements
+    return outside
+
+
+def _require_usable(model, fem, move):
+    solved = not isinstance(fem, QuasiStatic) or fem.converged
+    agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
+    known = not move or hasattr(model.mesh, "domain")
+    agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
+
+
+def _require_same_laws(model, fem, number):
+    """number: (n,) of the law that the finite elements have at each particle."""
+    laws = fem.laws
+    pairs = np.unique(np.column_stack([model.particles.material, number]), axis=0)
+    mistakes = (_law_mistake(material, model.laws[material], laws[there]) for material, there in pairs)
+    agree(model.comm, next((mistake for mistake in mistakes if mistake), None))
+
+
+def _law_mistake(material, law, there):
+    """What differs between the law of a material and that of the finite elements; None for nothing."""
+    if type(law) is not type(there):
+        return f"fem: its law is {type(there).__name__}, that of material {material} is {type(law).__name__}"
+    for name in _parameters(law):
+        if getattr(law, name) != getattr(there, name):
+            return (
+                f"fem: its law has {name}={getattr(there, name)!r}, that of material {material} has "
+                f"{name}={getattr(law, name)!r}"
+            )
+    return None
+
+
+def _parameters(law):
+    """Names of a law's parameters: its numbers, and whatever else is no method."""
+    return [name for name in dir(law) if not name.startswith("_") and not callable(getattr(law, name))]

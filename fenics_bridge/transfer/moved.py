@@ -1,0 +1,80 @@
+"""Volumes of particles that have moved with a body: what each cell of their mesh then holds of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.fields import cell_function
+from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
+
+_SAMPLES = 400
+"""Of the body in one cell of the particles' mesh, about."""
+_FULL = 0.95
+"""Share of its volume from which a cell counts as full: the samples are right to about a hundredth."""
+
+
+def volume_change(displacement):
+    """det(1 + grad u) as a function that is linear in each cell: exact for linear displacements."""
+    domain = displacement.function_space.mesh
+    change = ufl.det(ufl.Identity(domain.geometry.dim) + ufl.grad(displacement))
+    return cell_function(domain, ufl.as_vector([change]), 1, "volume change")
+
+
+def held_volumes(domain, displacement):
+    """Volume [m^D] of the moved body in each cell of another mesh that this rank owns: (m,).
+
+    Sampled in the cells of the finite elements, each sample moved by the displacement. What of the body would be
+    outside of the other mesh is left out. domain: the other mesh; displacement: function [m]. Collective.
+    """
+    body, volumes = displacement.function_space.mesh, cell_volumes(domain)
+    own = cell_volumes(body)
+    per_cell = max(1, round(_SAMPLES * _mean(body.comm, own) / _mean(domain.comm, volumes)))
+    shares = simplex_samples(body.geometry.dim, per_cell)
+    at = np.zeros((len(own) * len(shares), 3))
+    at[:, : body.geometry.dim] = np.einsum("qk,ckd->cqd", shares, _ordered(cell_corners(body))).reshape(len(at), -1)
+    cells = np.repeat(np.arange(len(own), dtype=np.int32), len(shares))
+    moved, sampled = at[:, : body.geometry.dim], np.repeat(own / len(shares), len(shares))
+    if len(at):
+        moved = moved + np.asarray(displacement.eval(at, cells)).reshape(moved.shape)
+        sampled = sampled * np.asarray(volume_change(displacement).eval(at, cells)).ravel()
+    held = PointSearch(domain, moved).cell_sums(sampled)
+    return np.where(held > _FULL * volumes, volumes, held)
+
+
+def fitted_volumes(volume, cell, held):
+    """Volumes of particles, scaled in each cell so that they add up to what the cell holds of the body.
+
+    A particle that has crossed into a full cell would else make it fuller than full, and leave a gap where it was:
+    forces out of balance by a share of the stress on a cell's side, however small the displacements are.
+    volume (n,), cell (n,): of the particles; held (m,): by cell (0: the samples found nothing there, and the particles
+    keep their volume)
+    """
+    together = np.bincount(cell, volume, len(held))
+    factor = np.divide(held, together, out=np.ones(len(held)), where=(together > 0) & (held > 0))
+    return volume * factor[cell]
+
+
+def simplex_samples(dim, count):
+    """Points spread evenly over a simplex, for equal shares of its volume: barycentric coordinates (count, D + 1).
+
+    A sequence of low discrepancy in the unit cube, multiples of the powers of 1/g with g^(D + 1) = g + 1 (Roberts 2018,
+    The unreasonable effectiveness of quasirandom sequences); sorting coordinates maps the cube evenly to the simplex
+    1 > x > y > z > 0.
+    """
+    root = {2: 1.324717957244746, 3: 1.2207440846057596}[dim]
+    points = -np.sort(-(np.outer(np.arange(count) + 0.5, root ** -np.arange(1.0, dim + 1)) % 1.0), axis=1)
+    ends = np.pad(points, ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
+    return -np.diff(ends, axis=1)
+
+
+def _ordered(corners):
+    """The corners of each cell by their coordinates: their numbers, and so the samples, would depend on the partition."""
+    order = np.lexsort(np.moveaxis(corners, 2, 0), axis=-1)
+    return np.take_along_axis(corners, order[:, :, None], axis=1)
+
+
+def _mean(comm, values):
+    return comm.allreduce(float(values.sum())) / comm.allreduce(len(values), MPI.SUM)

@@ -1,0 +1,162 @@
+"""Stages of construction by quasi-static particles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import mpm_core as mpm
+from fenics_bridge.errors import InputError, agree
+from fenics_bridge.fem.stages import SiteState, StageError, StageReport
+from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
+
+
+class ParticleSite:
+    """Particles that are placed and taken away in stages, see `Stage` and `carry_out`; equilibrium is quasi-static.
+
+    model: `mpm_core.Model` without particles, with all laws that the stages will need; gravity acts on the last axis
+    Soils and boundaries are the tags of its mesh. A stage places particles in the cells of a soil and takes away those
+    that lie in them. state: SiteState; number: of the last stage
+    """
+
+    def __init__(self, model, materials, supports, *, gravity=9.81, per_cell=3, small_displacements=False, **options):
+        """
+        materials: {soil: number of its law in the model}; supports: as for `QuasiStatic`, without prescribed displacements
+        gravity: [m/s2], by which unit weights become densities; per_cell: particles per cell, as for `Model.seed`
+        small_displacements: particles keep their places, as the finite elements do; otherwise they move
+        options: of `Model.equilibrate` for each stage: solver, nmd, ghost, tolerance, max_steps
+        """
+        comm, mesh = model.comm, model.mesh
+        agree(comm, None if comm.allreduce(len(model.particles)) == 0 else "model: it has particles, expected none yet")
+        self.model, self.number, self._per_cell, self._g = model, 0, per_cell, gravity
+        self._options = {"small_displacements": small_displacements, **options}
+        names = {tags[0]: repr(name) for name, tags in mesh.names["cell"].items() if len(tags) == 1}
+        self.state = SiteState(
+            comm,
+            lambda given, argument: _tags(model, "cell", given, argument),
+            lambda given, argument: _tags(model, "facet", given, argument),
+            name_of=lambda tag: names.get(tag, str(tag)),
+            supports=supports,
+        )
+        self._material = {tag: n for soil, n in materials.items() for tag in _tags(model, "cell", soil, "materials")}
+        self._seeded: list[tuple[int, int, int]] = []  # first id, end of ids, soil
+        model.set_gravity([0.0] * (mesh.dim - 1) + [-gravity])
+        self._support(self.state.supports)
+
+    def carry_out(self, stage):
+        """Bring the particles to equilibrium after a stage's changes. Returns a StageReport. Collective.
+
+        Raises InputError, on all ranks, for a stage that asks for what is not there; StageError where there is no
+        equilibrium: the particles are then as at the last share of the stage that had one.
+        """
+        model = self.model
+        state, fill, excavate = self.state.after(stage)
+        material = {
+            **self._material,
+            **{tag: self._number_of(state.law[tag], stage) for tag in stage_laws(stage, state)},
+        }
+        if stage.reset_displacement:
+            model.particles.set("initial_position", model.particles.position)
+        model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))
+        self._change_laws(material)
+        for tag in fill:
+            self._fill(tag, state.unit_weight[tag], stage)
+        self._weigh(state)
+        self._support(state.supports)
+        self._load(state)
+        self.state, self.number = state, self.number + 1
+        try:
+            report = model.equilibrate(**self._options)
+        except mpm.RunError as error:
+            raise StageError(self._failure(stage, error), float(getattr(error, "applied", 0.0))) from error
+        p = model.particles
+        moved = np.linalg.norm(p.displacement, axis=1).max(initial=0.0)
+        return StageReport(
+            self.number, stage.name, report.cuts + 1, report.iterations, max(model.comm.allgather(float(moved)))
+        )
+
+    def rows_of(self, soil):
+        """Whether each particle of this rank is of a soil, by name or number of its tag: (n,) bool. Collective."""
+        tags, ids = _tags(self.model, "cell", soil, "soil"), self.model.particles.id
+        rows = np.zeros(len(ids), dtype=bool)
+        for first, end, tag in self._seeded:
+            rows |= (ids >= first) & (ids < end) & (tag in tags)
+        return rows
+
+    def _fill(self, tag, unit_weight, stage):
+        model, first = self.model, self.model._next_id
+        model.seed(density=unit_weight / self._g, per_cell=self._per_cell, cell_tag=tag, material=self._material[tag])
+        self._seeded.append((first, model._next_id, tag))
+        if stage.stress is not None:
+            stress, rows = model.particles.stress.copy(), self.rows_of(tag) & (model.particles.id >= first)
+            stress[rows] = stage.stress(model.particles.position[rows])
+            model.particles.set("stress", stress)
+
+    def _number_of(self, law, stage):
+        numbers = [number for number, known in enumerate(self.model.laws) if known is law]
+        message = f"stage {stage.name!r}: law: {law!r} is not among the laws that the model was made with"
+        agree(self.model.comm, None if numbers else message)
+        return numbers[0]
+
+    def _change_laws(self, material):
+        model = self.model
+        numbers, state, changed = model.particles.material.copy(), model.particles.state.copy(), False
+        for tag, number in material.items():
+            if number != self._material.get(tag):
+                rows = self.rows_of(tag)
+                numbers[rows], state[rows], changed = number, 0.0, True
+        self._material = material
+        if changed:
+            model.assign(numbers)
+            model.particles.set("state", state)
+            model._seeded(0, 0)  # gives laws that ask for it the size of the cells
+
+    def _weigh(self, state):
+        """Mass from the unit weights in force; a particle's volume before it was deformed is not kept, so by the ratio."""
+        mass = self.model.particles.mass.copy()
+        for tag in self.state.there:
+            if tag in state.there and state.unit_weight[tag] != self.state.unit_weight[tag]:
+                mass[self.rows_of(tag)] *= state.unit_weight[tag] / self.state.unit_weight[tag]
+        self.model.particles.set("mass", mass)
+
+    def _support(self, supports):
+        model, dim = self.model, self.model.mesh.dim
+        model._set_supports([])
+        for support in supports:
+            held = support.displacement or (0.0,) * dim
+            if any(held):
+                raise InputError(f"supports: {support} prescribes a displacement, expected only zeros for particles")
+            if None not in held:
+                model.fix(support.facet_tag)
+            else:
+                for axis in range(dim):
+                    if held[axis] is not None:
+                        model.roller(support.facet_tag, np.eye(dim)[axis])
+
+    def _load(self, state):
+        """Forces of pressures and pore water on the particles; they replace those of the stage before."""
+        model = self.model
+        force = np.zeros((len(model.particles), model.mesh.dim))
+        for tag, pressure in state.pressure.items():
+            force += boundary_forces(model, tag, pressure)
+        if state.pore_pressure is not None:
+            force += seepage_forces(model, state.pore_pressure)
+        model.particles.set("traction", force)
+
+    def _failure(self, stage, error):
+        return (
+            f"stage {self.number} ({stage.name!r}) has no equilibrium of the particles: {error}. Either the ground fails: take a "
+            "smaller change, more strength or more support, or follow the failure by the explicit or implicit scheme; or "
+            "Newton's method gave up: try more dilation, small_displacements, a larger tolerance, or solver=Relaxation()."
+        )
+
+
+def stage_laws(stage, state):
+    """Tags of the soils whose law a stage gives."""
+    return [tag for tag, law in state.law.items() if any(law is given for given in stage.law.values())]
+
+
+def _tags(model, kind, given, argument):
+    try:
+        return model.mesh.tags_of(kind, given)
+    except mpm.InputError as error:
+        raise InputError(f"{argument}: {error}") from None

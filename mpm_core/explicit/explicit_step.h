@@ -1,0 +1,49 @@
+#pragma once
+/// @file
+/// The explicit scheme, section 3 of the paper.
+
+#include "model/model.h"
+
+namespace mpm
+{
+/// When stresses are updated, and with which velocities.
+enum class StressUpdate
+{
+  modified_last, ///< MUSL: last, with velocities mapped back from the moved particles (19)
+  last, ///< USL: last, with v_i + dt a_i; needs a smaller step where nodes carry little mass, f_int / m_i being large
+  first ///< USF: before the momentum equation, with the velocities at the step's start
+};
+
+struct ExplicitOptions
+{
+  StressUpdate stress_update = StressUpdate::modified_last;
+  double damping = 0;   ///< local damping alpha of FLAC, in [0, 1)
+  double pic_share = 0; ///< of a step, in [0, 1]
+  bool mixed_discretisation = false;
+  Integration integration = Integration::particles;
+};
+
+/// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.
+/// @pre prepare(model) has been called
+/// @post work.trouble is set on every rank when it is on any; the step is then not whole
+/// @note Collective
+template <int D>
+void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
+
+/// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported
+/// directions do not count above. Without external force, as under prescribed velocities, reactions take its place; 0
+/// without either.
+/// @note Collective
+template <int D>
+double out_of_balance(const Model<D>& model, const Vector<D>& gravity);
+
+/// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
+/// @note Collective
+template <int D>
+double critical_time_step(const Model<D>& model);
+
+/// The PIC share of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the step:
+/// 1 - (1 - share)^(dt / dt_cr).
+/// @param share  of a critical time step, in [0, 1]
+double pic_share_of_step(double share, double dt, double critical);
+} // namespace mpm

@@ -1,0 +1,57 @@
+#pragma once
+/// @file
+/// Many explicit steps in a row, and what they amount to.
+
+#include "explicit/explicit_step.h"
+
+namespace mpm
+{
+struct RunOptions
+{
+  double until = 0;            ///< time at which to stop, met exactly [s]
+  std::optional<double> dt;    ///< step [s]; by default `courant` times the critical one
+  double courant = 0.5;        ///< alpha_c of (17)
+  double pic = 0;              ///< PIC share of a critical time step, in [0, 1]; takes the place of that of a step
+  bool allow_unstable = false; ///< take `dt` even above the critical step
+  std::int64_t max_steps = 0;  ///< return earlier, after this many steps
+};
+
+/// Steps between two looks at the critical time step.
+inline constexpr std::int64_t control_interval = 32;
+
+/// Steps until a time is reached or `max_steps` are done. Within a control interval the step is the same, and the last
+/// interval's step is shortened so that the time is met.
+/// @returns steps done
+/// @throws InputError `dt` above the critical step (both numbers are given)
+/// @throws RunError a particle left the mesh, a value is not finite, a law failed; with its place; on all ranks alike
+/// @note Collective
+template <int D>
+std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run);
+
+/// What stopped a step of the model, in words.
+template <int D>
+std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble);
+
+/// Where a run stands, summed over ranks. Units SI; energies in J, masses in kg (per metre in plane strain).
+struct Diagnostics
+{
+  double particles;
+  double mass;
+  double momentum[3];
+  double kinetic_energy;
+  double external_work;
+  double internal_work;
+  double damping_work;
+  double support_work;
+  double outflow_particles;
+  double outflow_mass;
+  double particle_steps;
+  double plastic_share;    ///< of the particles, in the last step
+  double unbalanced_ratio; ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
+};
+
+/// @throws RunError on all ranks: particles, mass or momentum were lost or counted twice
+/// @note Collective
+template <int D>
+Diagnostics diagnostics(const Model<D>& model);
+} // namespace mpm

@@ -1,0 +1,108 @@
+#pragma once
+/// @file
+/// The implicit scheme: a step of backward Euler under way, its residual, and its end.
+///
+///     r(v1) = f_ext - f_int(u) - D - M (v1 - v0) / dt,   u = dt v1
+///
+/// Stresses go from the step's start over the whole increment u; gradients and volumes are those of the start, so that
+/// the first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite
+/// elements. A trial leaves the particles as they are: only sums over cells are kept of it.
+
+#include "implicit/ghost.h"
+#include "implicit/inertia.h"
+#include "transfer/cell_strain.h"
+
+namespace mpm
+{
+struct ImplicitOptions
+{
+  double damping = 0; ///< local damping alpha, in [0, 1), see implicit_inertia.h; not used in quasi-static steps
+  double pic = 0;     ///< PIC share of a critical time step, in [0, 1]
+  bool mixed_discretisation = false;
+  bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
+  Integration integration = Integration::particles; ///< by particles or mixed
+  GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass
+  bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
+  bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
+  double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
+};
+
+/// Derivatives of sum V sigma over the particles of a cell, without zz in plane strain.
+template <int D>
+struct CellTangent
+{
+  /// by du_b/dx_m, entry b * D + m; with nodal mixed discretisation at constant volumetric strain
+  std::array<std::array<double, D * D>, n_symmetric<D>> by_gradient;
+  /// by the averaged volumetric strain; zero without nodal mixed discretisation
+  std::array<double, n_symmetric<D>> by_volumetric;
+  /// Where mean stresses are averaged: of the mean of the normal components in the plane, which the above are then
+  /// without
+  std::array<double, D * D> mean_by_gradient;
+  double mean_by_volumetric;
+};
+
+/// Norms of a residual over all ranks and unsupported directions [N], and what else a trial says.
+struct TrialReport
+{
+  double residual = 0;
+  double scale = 0;         ///< largest of |f_ext|, |f_int|, |M (v1 - v0) / dt|, reactions included
+  std::int64_t plastic = 0; ///< particles that yield
+  std::int64_t failed = 0;  ///< particles whose law failed, and cells that would lose their volume
+};
+
+/// What the cells of a trial give a node [N], summed over ranks.
+template <int D>
+struct TrialForces
+{
+  Vector<D> internal; ///< f_int (14)
+  Vector<D> ghost;    ///< of the ghost penalty
+};
+
+/// A step under way. The iterate v1 is `work.velocity` of the model, f_int is in `work.nodes` too.
+template <int D>
+struct ImplicitStep
+{
+  ImplicitOptions options;
+  double dt = 0;                                          ///< [s]
+  std::vector<Vector<D>> external;                        ///< f_ext at the step's end
+  std::vector<Vector<D>> residual;                        ///< zero along supported directions
+  std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
+  /// Sum V dsigma/dstrain of each owned cell, without zz in plane strain; engineering shear
+  std::vector<std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>> stiffness;
+  std::vector<CellStrain<D>> strains;   ///< of each owned cell that is filled, in the trial
+  std::vector<CellTangent<D>> tangents; ///< of each owned cell
+  std::vector<TrialForces<D>> forces;
+  std::vector<GhostFacet<D>> ghosts; ///< stabilised facets
+  Halos halos;                       ///< of the mesh, for those between ranks; made by the first step
+  bool halos_ready = false;
+  std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
+  std::optional<Trouble<D>> trouble; ///< of the last trial, where it failed
+  std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
+};
+
+/// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under
+/// the supports, as first iterate.
+/// @note Collective
+template <int D>
+void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt);
+
+/// Inertia force of one component of a node, damping in it, for the iterate; none in a quasi-static step.
+template <int D>
+Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component);
+
+/// Makes the iterate satisfy the supports.
+template <int D>
+void impose_supports(Model<D>& model, const ImplicitStep<D>& step);
+
+/// Residual of the iterate `work.velocity`, and the tangents of the cells when wanted.
+/// @note Collective
+template <int D>
+TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents);
+
+/// Ends the step with the iterate: moves and strains the particles, adds to the totals.
+/// @pre `find_residual` was called for the iterate, so that the work of its forces is known
+/// @returns whether it could; otherwise `work.trouble` says why, and the particles are as they were at the step's start
+/// @note Collective
+template <int D>
+bool finish_step(Model<D>& model, const ImplicitStep<D>& step);
+} // namespace mpm

@@ -1,0 +1,218 @@
+#include "implicit/relaxation.h"
+
+#include "materials/tools/elasticity.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm
+{
+namespace
+{
+constexpr double margin = 1.05;
+constexpr double local_damping_share = 0.8; ///< beta, the customary value in FLAC
+
+/// Largest sum over a row of vertex k of |elastic stiffness of a whole cell|, and of the part that turns its stress
+/// [N/m]
+template <int D>
+double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& moduli, double stress)
+{
+  double largest = 0;
+  for (int a = 0; a < D; ++a)
+  {
+    double sum = 0;
+    for (int l = 0; l <= D; ++l)
+    {
+      const double product = dot<D>(shape.gradient[k], shape.gradient[l]);
+      sum += 2 * stress * norm<D>(shape.gradient[k]) * norm<D>(shape.gradient[l]);
+      for (int b = 0; b < D; ++b)
+        sum += std::abs(moduli.lambda * shape.gradient[k][a] * shape.gradient[l][b] +
+                        moduli.shear * (shape.gradient[k][b] * shape.gradient[l][a] + (a == b ? product : 0)));
+    }
+    largest = std::max(largest, sum);
+  }
+  return shape.volume * largest;
+}
+
+/// Bound on the rows of |J| = |dr/dv| at each node [N s/m].
+template <int D>
+std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
+{
+  std::vector<double> rows(model.mesh.points.size(), 0.0),
+      cell(static_cast<std::size_t>(model.mesh.owned_cells) * (D + 1), 0.0);
+  for (const Run& run : model.work.runs)
+  {
+    double stress = 0, filled = 0;
+    for (Index p = run.first; p < run.last; ++p)
+    {
+      filled += model.particles.volume[p];
+      for (const Column& column : model.particles.stress)
+        stress = std::max(stress, std::abs(column[p]));
+    }
+    const double shear = shear_modulus(model.laws[run.material]);
+    const ElasticModuli moduli{p_wave_modulus(model.laws[run.material]) - 2 * shear, shear};
+    const CellShape<D>& shape = model.mesh.shapes[run.cell];
+    const double overfull = std::max(1.0, model.work.moments[run.cell].volume / shape.volume);
+    for (int k = 0; k <= D; ++k)
+    {
+      double& row = cell[static_cast<std::size_t>(run.cell) * (D + 1) + static_cast<std::size_t>(k)];
+      row = std::max(row, overfull * stiffness_row<D>(shape, k, moduli, stress));
+    }
+  }
+  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+    for (int k = 0; k <= D; ++k)
+      rows[model.mesh.cells[c][k]] +=
+          step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
+  const double inertia = step.options.quasi_static ? 0 : 1 / step.dt;
+  for (const GhostFacet<D>& facet : step.ghosts)
+  {
+    double sum = 0;
+    for (double jump : facet.jump)
+      sum += std::abs(jump);
+    for (int k = 0; k < D + 2; ++k)
+      rows[facet.nodes[k]] +=
+          facet.share[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
+  }
+  sum_shared(model.exchange, rows.data(), 1);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] += step.options.quasi_static
+                   ? 0
+                   : damped_inertia(model.work.nodes[i].mass, 0, 0, step.dt, step.options.damping, step.frequency[i])
+                         .derivative;
+  return rows;
+}
+
+/// Mass by the bound on J: a half at least for first order, a quarter for second order.
+constexpr double mass_share(RelaxationKind kind)
+{
+  switch (kind)
+  {
+  case RelaxationKind::richardson:
+    return 0.5;
+  case RelaxationKind::local:
+    return 0.25 * (1 + local_damping_share);
+  case RelaxationKind::kinetic: // so that half a pseudo-step from rest brings the fastest mode to its end, and not
+                                // beyond
+    return 0.5;
+  default:
+    return 0.25;
+  }
+}
+
+/// Sum over all nodes, each counted once.
+template <int D, class F>
+double nodal_sum(const Model<D>& model, F&& term)
+{
+  double sum = 0;
+  for (std::size_t i = 0; i < model.mesh.points.size(); ++i)
+    if (model.exchange.owned[i])
+      sum += term(i);
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  return sum;
+}
+
+/// c of Underwood (1983), critical for the mode that the iteration moves in: 2 sqrt(w J w / w M w), J w from the last
+/// change of r.
+template <int D>
+double critical_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
+{
+  const double stiffness = nodal_sum(model,
+                                     [&](std::size_t i)
+                                     {
+                                       double sum = 0;
+                                       for (int a = 0; a < D; ++a)
+                                         sum += relaxation.rate[i][a] * (relaxation.last[i][a] - step.residual[i][a]);
+                                       return sum;
+                                     });
+  const double mass = nodal_sum(model, [&](std::size_t i)
+                                { return relaxation.mass[i] * dot<D>(relaxation.rate[i], relaxation.rate[i]); });
+  return mass > 0 ? std::min(1.9, 2 * std::sqrt(std::max(0.0, stiffness / mass))) : 0;
+}
+
+/// Damping of the kind in the next iteration. Kinetic: 1 where the body has passed a peak of its kinetic energy, as the
+/// power of the residual says, else 0.
+template <int D>
+double next_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
+{
+  switch (relaxation.kind)
+  {
+  case RelaxationKind::viscous:
+    return critical_damping(model, step, relaxation);
+  case RelaxationKind::kinetic:
+    return nodal_sum(model, [&](std::size_t i) { return dot<D>(relaxation.rate[i], step.residual[i]); }) < 0 ? 1 : 0;
+  default:
+    return local_damping_share;
+  }
+}
+
+/// The next w of one node.
+template <int D>
+Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>& residual, double mass, double damping)
+{
+  Vector<D> next{};
+  for (int a = 0; a < D; ++a)
+    switch (kind)
+    {
+    case RelaxationKind::richardson:
+      next[a] = residual[a] / mass;
+      break;
+    case RelaxationKind::local:
+      next[a] =
+          rate[a] + (residual[a] - (rate[a] == 0 ? 0 : std::copysign(damping * std::abs(residual[a]), rate[a]))) / mass;
+      break;
+    case RelaxationKind::kinetic:
+      next[a] =
+          damping > 0 ? 0.5 * residual[a] / mass : rate[a] + residual[a] / mass; // from rest, at half a pseudo-step
+      break;
+    case RelaxationKind::viscous:
+      next[a] = ((2 - damping) * rate[a] + 2 * residual[a] / mass) / (2 + damping);
+      break;
+    }
+  return next;
+}
+
+} // namespace
+
+template <int D>
+Relaxation<D> start_relaxation(Model<D>& model, ImplicitStep<D>& step, RelaxationKind kind)
+{
+  Relaxation<D> relaxation{kind, tangent_rows(model, step), {}, {}, {}};
+  for (double& mass : relaxation.mass)
+    mass *= margin * mass_share(kind);
+  relaxation.rate.assign(model.mesh.points.size(), {});
+  relaxation.last.assign(model.mesh.points.size(), {});
+  relaxation.report = find_residual(model, step, false);
+  return relaxation;
+}
+
+template <int D>
+int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, double tolerance, int most)
+{
+  int done = 0;
+  while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale &&
+         relaxation.report.failed == 0)
+  {
+    const double damping = next_damping(model, step, relaxation);
+    for (std::size_t i = 0; i < relaxation.rate.size(); ++i)
+    {
+      if (!step.active[i])
+        continue;
+      relaxation.rate[i] =
+          next_rate<D>(relaxation.kind, relaxation.rate[i], step.residual[i], relaxation.mass[i], damping);
+      for (int a = 0; a < D; ++a)
+        model.work.velocity[i][a] += relaxation.rate[i][a];
+    }
+    impose_supports(model, step);
+    relaxation.last = step.residual;
+    relaxation.report = find_residual(model, step, false);
+    ++done;
+  }
+  return done;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template Relaxation<D> start_relaxation(Model<D>&, ImplicitStep<D>&, RelaxationKind);                                \
+  template int relax(Model<D>&, ImplicitStep<D>&, Relaxation<D>&, double, int);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

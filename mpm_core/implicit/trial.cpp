@@ -1,0 +1,227 @@
+#include "implicit/trial.h"
+
+#include "implicit/tangent.h"
+#include "model/batches.h"
+#include "model/integration.h"
+#include "transfer/affine_field.h"
+#include "transfer/kinematics.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+namespace
+{
+/// Part of a cell's volume below which an increment is refused.
+constexpr double least_growth = 0.1;
+
+/// Copies of a batch: what a law reads and writes.
+template <int D>
+struct TrialScratch
+{
+  alignas(64) double strain[n_stress<D>][batch_size];
+  alignas(64) double stress[n_stress<D>][batch_size]; ///< at the start, turned with the material; then at the end
+  alignas(64) double state[max_states][batch_size];
+  std::vector<double> tangent; ///< (batch_size, components, components)
+};
+
+template <int D>
+using Symmetric = std::array<double, n_symmetric<D>>;
+
+/// Volume of a cell after a displacement, relative to that before: det(1 + grad u).
+template <int D>
+double growth(const Matrix<D>& velocity_gradient, double dt)
+{
+  Matrix<D> f;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      f[i][j] = dt * velocity_gradient[i][j] + (i == j ? 1.0 : 0.0);
+  if constexpr (D == 2)
+    return f[0][0] * f[1][1] - f[0][1] * f[1][0];
+  else
+    return f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) - f[0][1] * (f[1][0] * f[2][2] - f[1][2] * f[2][0]) +
+           f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
+}
+
+/// Strain and rotation of a cell.
+template <int D>
+struct TrialStrain
+{
+  CellStrain<D> strain;
+  bool keeps_volume;
+};
+
+template <int D>
+TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell)
+{
+  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
+  const Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
+  CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
+  if (step.options.mixed_discretisation)
+    set_volumetric(strain, mean_volumetric_strain<D>(model.mesh.cells[cell], model.work.volumetric_strain));
+  if (step.options.hold_positions)
+  {
+    make_small<D>(strain);
+    return {strain, true};
+  }
+  return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
+}
+
+/// Copies a batch's stresses and states to the scratch.
+template <int D>
+void load_batch(const Model<D>& model, const Batch& batch, TrialScratch<D>& scratch)
+{
+  const Index size = batch.last - batch.first;
+  for (int k = 0; k < n_stress<D>; ++k)
+    std::copy_n(model.particles.stress[k].data() + batch.first, size, scratch.stress[k]);
+  for (std::size_t k = 0; k < model.particles.state.size(); ++k)
+    std::copy_n(model.particles.state[k].data() + batch.first, size, scratch.state[k]);
+}
+
+/// Strains one run and turns its stresses, at `at` in the scratch.
+template <int D>
+void strain_run(Index size, const CellStrain<D>& strain, Index at, TrialScratch<D>& scratch)
+{
+  for (int k = 0; k < n_stress<D>; ++k)
+    std::fill_n(scratch.strain[k] + at, size, strain.increment[k]);
+  SymmetricColumns<D> columns;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    columns[k] = scratch.stress[stress_component<D>[k]];
+  rotate<D>(columns, at, at + size, strain.rotation);
+}
+
+/// Counts a failure, and keeps the trouble of the first.
+template <int D>
+void note_failure(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& increment,
+                  TrialCount<D>& count)
+{
+  if (count.failed++ == 0)
+    count.trouble = trouble_with(model, kind, particle, increment);
+}
+
+template <int D>
+void note_failed_laws(const Model<D>& model, const Batch& batch, const std::vector<Index>& failed,
+                      const TrialScratch<D>& scratch, TrialCount<D>& count)
+{
+  for (Index i : failed)
+  {
+    SymTensor<D> increment;
+    for (int k = 0; k < n_stress<D>; ++k)
+      increment[k] = scratch.strain[k][i];
+    note_failure(model, Trouble<D>::Kind::law_failed, batch.first + i, increment, count);
+  }
+}
+
+template <int D>
+BatchReport update_scratch(const Law& law, Index size, bool tangents, TrialScratch<D>& scratch)
+{
+  PointBatch<D> points;
+  points.size = size;
+  for (int k = 0; k < n_stress<D>; ++k)
+  {
+    points.strain_increment[k] = scratch.strain[k];
+    points.stress[k] = scratch.stress[k];
+  }
+  std::array<double*, max_states> state;
+  for (int k = 0; k < max_states; ++k)
+    state[k] = scratch.state[k];
+  points.state = state.data();
+  points.tangent = tangents ? scratch.tangent.data() : nullptr;
+  return update<D>(law, points);
+}
+
+/// Adds the particles of one run, at `at` in the scratch, to the sums of its cell.
+template <int D>
+void sum_run(const Model<D>& model, ImplicitStep<D>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
+{
+  const double* const volume = model.particles.volume.data() + run.first;
+  auto sum = step.stress[run.cell];
+  for (Index p = 0; p < run.last - run.first; ++p)
+    for (int k = 0; k < n_symmetric<D>; ++k) // sums side by side, none waits for the other
+      sum[k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
+  step.stress[run.cell] = sum;
+}
+
+/// Adds V C of one run; rows and columns of zz are not needed in plane strain.
+template <int D>
+void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialScratch<D>& scratch,
+                   std::array<Symmetric<D>, n_symmetric<D>>& stiffness)
+{
+  constexpr int S = n_stress<D>;
+  auto sum = stiffness; // not through the reference, which might be to what is read
+  for (Index p = 0; p < run.last - run.first; ++p)
+  {
+    const double* const c = &scratch.tangent[static_cast<std::size_t>((at + p) * S * S)];
+    const double volume = model.particles.volume[run.first + p];
+    for (int k = 0; k < n_symmetric<D>; ++k)
+      for (int j = 0; j < n_symmetric<D>; ++j)
+        sum[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
+  }
+  stiffness = sum;
+}
+
+/// Full cells integrate the mean of their particles over their own volume.
+template <int D>
+void integrate_cells(const Model<D>& model, ImplicitStep<D>& step)
+{
+  for (std::size_t c = 0; c < step.stress.size(); ++c)
+  {
+    const double filled = model.work.moments[c].volume;
+    const double factor = filled > 0 ? integrated_volume(model, static_cast<Index>(c)) / filled : 0;
+    for (double& component : step.stress[c])
+      component *= factor;
+    if (!step.stiffness.empty())
+      for (auto& row : step.stiffness[c])
+        for (double& component : row)
+          component *= factor;
+  }
+}
+} // namespace
+
+template <int D>
+TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents)
+{
+  const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
+  step.stress.assign(cells, {});
+  step.stiffness.assign(tangents ? cells : 0, {});
+  step.strains.resize(cells);
+  TrialScratch<D> scratch;
+  scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
+  TrialCount<D> count;
+  const auto& runs = model.work.runs;
+  for (std::size_t r = 0; r < runs.size();)
+  {
+    const Batch batch = next_batch(runs, r);
+    load_batch(model, batch, scratch);
+    for (r = batch.first_run; r < batch.last_run; ++r)
+    {
+      const TrialStrain<D> trial = cell_strain(model, step, runs[r].cell);
+      step.strains[runs[r].cell] = trial.strain;
+      strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
+      if (!trial.keeps_volume)
+        note_failure(model, Trouble<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
+    }
+    const BatchReport report =
+        update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
+    count.plastic += report.plastic;
+    note_failed_laws(model, batch, report.failed, scratch, count);
+    for (r = batch.first_run; r < batch.last_run; ++r)
+    {
+      sum_run(model, step, runs[r], runs[r].first - batch.first, scratch);
+      if (tangents)
+        sum_stiffness(model, runs[r], runs[r].first - batch.first, scratch, step.stiffness[runs[r].cell]);
+    }
+  }
+  if (step.options.integration == Integration::mixed)
+    integrate_cells(model, step);
+  if (tangents)
+    step.tangents.resize(cells);
+  for (std::size_t c = 0; tangents && c < cells; ++c)
+    if (model.work.moments[c].volume > 0)
+      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
+  return count;
+}
+
+template TrialCount<2> try_stresses(const Model<2>&, ImplicitStep<2>&, bool);
+template TrialCount<3> try_stresses(const Model<3>&, ImplicitStep<3>&, bool);
+} // namespace mpm

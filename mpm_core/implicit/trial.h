@@ -1,0 +1,23 @@
+#pragma once
+/// @file
+/// Stresses of a trial increment, from the step's start, without touching the particles.
+
+#include "implicit/implicit_step.h"
+
+namespace mpm
+{
+/// What a trial found among this rank's particles.
+template <int D>
+struct TrialCount
+{
+  std::int64_t plastic = 0;
+  std::int64_t failed = 0;           ///< particles whose law failed, and runs in cells that would lose their volume
+  std::optional<Trouble<D>> trouble; ///< the first of them
+};
+
+/// Updates the stresses of all particles over dt with the iterate `work.velocity`, batch by batch on copies, and sums
+/// V sigma, and the tangents when wanted, over each owned cell.
+/// @pre with nodal mixed discretisation, `work.volumetric_strain` belongs to the iterate
+template <int D>
+TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents);
+} // namespace mpm

@@ -1,0 +1,255 @@
+#include "materials/laws/cam_clay.h"
+
+#include "materials/tools/deviator.h"
+#include "materials/tools/elasticity.h"
+#include "materials/tools/require.h"
+#include "materials/tools/root.h"
+
+#include <numbers>
+
+namespace mpm
+{
+namespace
+{
+/// (exp(y) - 1) / y
+double mean_growth(double y) { return std::abs(y) < 1e-8 ? 1 + y / 2 : std::expm1(y) / y; }
+
+/// Its derivative
+double mean_growth_slope(double y)
+{
+  return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y;
+}
+
+/// A point at the start of an increment: pressures and volumetric strains are positive in compression here
+template <int D>
+struct Start
+{
+  double elastic, plastic; ///< v / kappa and v / (lambda - kappa)
+  double shear_ratio;      ///< G / K
+  double slope_squared;    ///< M^2
+  double pressure;         ///< p
+  double preconsolidation; ///< p_c
+  double volumetric;       ///< volumetric strain increment
+  SymTensor<D> deviator;   ///< of the stress
+  SymTensor<D> strain;     ///< deviatoric strain increment, tensor components
+};
+
+/// What follows from the plastic part x of the volumetric strain and the plastic multiplier m
+template <int D>
+struct Result
+{
+  double x, multiplier;
+  double y; ///< ln of the growth of the pressure
+  double pressure, preconsolidation;
+  double shear;       ///< secant shear modulus
+  double ratio;       ///< of the deviator to that of the trial
+  SymTensor<D> trial; ///< trial deviator
+  double trial_q;     ///< its sqrt(3 J2)
+
+  double yield(double slope_squared) const
+  {
+    const double q = ratio * trial_q;
+    return q * q / slope_squared + pressure * (pressure - preconsolidation);
+  }
+};
+
+template <int D>
+Result<D> result_of(const Start<D>& a, double x, double multiplier)
+{
+  Result<D> r;
+  r.x = x;
+  r.multiplier = multiplier;
+  r.y = a.elastic * (a.volumetric - x);
+  r.pressure = a.pressure * std::exp(r.y);
+  r.preconsolidation = a.preconsolidation * std::exp(a.plastic * x);
+  r.shear = a.shear_ratio * a.elastic * a.pressure * mean_growth(r.y);
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    r.trial[k] = a.deviator[k] + 2 * r.shear * a.strain[k];
+  r.trial_q = std::numbers::sqrt3 * radius<D>(r.trial);
+  r.ratio = 1 / (1 + 6 * r.shear * multiplier / a.slope_squared);
+  return r;
+}
+
+/// The return, for a point that yields. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the
+/// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between
+/// them the yield function has its root. The unknown is the share of that x. In small increments the share is small,
+/// and the secant method takes a few evaluations; where it does not get there, by bracketing.
+template <int D>
+Result<D> returned(const Start<D>& a)
+{
+  const double sum = a.elastic + a.plastic;
+  const double critical = (std::log(2 * a.pressure / a.preconsolidation) + a.elastic * a.volumetric) / sum;
+  const auto at = [&](double share)
+  {
+    const double x = critical * share, left = 1 - share;
+    const double pc = a.preconsolidation * std::exp(a.plastic * x);
+    return result_of(a, x, share / (left * pc * sum * mean_growth(sum * critical * left)));
+  };
+  const double scale = a.preconsolidation * a.preconsolidation;
+  const auto excess = [&](const Result<D>& r) { return r.yield(a.slope_squared) / scale; };
+  const Sample start{0, excess(at(0))};
+  Sample before = start;
+  double share = 1e-3;
+  for (int evaluations = 0; evaluations < 8 && share > 0 && share < 1; ++evaluations)
+  {
+    const Result<D> result = at(share);
+    const Sample now{share, excess(result)};
+    if (std::abs(now.f) <= 1e-13)
+      return result;
+    share -= now.f * (now.x - before.x) / (now.f - before.f);
+    before = now;
+  }
+  return at(root_between([&](double s) { return excess(at(s)); }, start, {1, -1}));
+}
+
+/// Derivatives of a result by the volumetric strain (compression positive) and by q of the trial at a fixed modulus
+struct Slopes
+{
+  double pressure, shear, ratio;
+};
+
+/// @param volumetric, trial_q  change of the volumetric strain, and of q of the trial at a fixed shear modulus
+template <int D>
+Slopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volumetric, double trial_q)
+{
+  const double shear_by_y = a.shear_ratio * a.elastic * a.pressure * mean_growth_slope(r.y);
+  double dx = 0, dm = 0, ratio_by_y = 0, ratio_by_m = 0;
+  if (plastic)
+  {
+    const double m = r.multiplier, p = r.pressure, pc = r.preconsolidation, m2 = a.slope_squared;
+    double work = 0; // trial deviator : strain, a full contraction
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      work += (k < 3 ? 1 : 2) * r.trial[k] * a.strain[k];
+    const double q_by_y = r.trial_q > 0 ? 3 * work * shear_by_y / r.trial_q : 0.0;
+    ratio_by_y = -r.ratio * r.ratio * 6 * m * shear_by_y / m2;
+    ratio_by_m = -r.ratio * r.ratio * 6 * r.shear / m2;
+    const double per_q = 2 * r.ratio * r.trial_q / m2;
+    const double by_y = per_q * (r.ratio * q_by_y + r.trial_q * ratio_by_y) + (2 * p - pc) * p;
+    // The two equations, x = m (2 p - p_c) and yield = 0, linearised in x and m
+    const double a11 = 1 + m * (2 * p * a.elastic + pc * a.plastic), a12 = -(2 * p - pc);
+    const double a21 = -p * pc * a.plastic - by_y * a.elastic, a22 = per_q * r.trial_q * ratio_by_m;
+    const double b1 = 2 * m * p * a.elastic * volumetric;
+    const double b2 = -by_y * a.elastic * volumetric - per_q * r.ratio * trial_q;
+    const double determinant = a11 * a22 - a12 * a21;
+    dx = (b1 * a22 - a12 * b2) / determinant;
+    dm = (a11 * b2 - a21 * b1) / determinant;
+  }
+  const double dy = a.elastic * (volumetric - dx);
+  return {r.pressure * dy, shear_by_y * dy, ratio_by_y * dy + ratio_by_m * dm};
+}
+
+template <int D>
+void write_tangent(const Start<D>& a, const Result<D>& r, bool plastic, double* tangent)
+{
+  constexpr std::size_t n = n_stress<D>;
+  const Slopes by_volume = slopes(a, r, plastic, 1, 0), by_q = slopes(a, r, plastic, 0, 1);
+  const double q_by_strain = r.trial_q > 0 ? 3 * r.shear / r.trial_q : 0.0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+    {
+      const double volume = j < 3 ? -1.0 : 0.0, q = q_by_strain * r.trial[j];
+      const auto total = [&](double Slopes::*s) { return by_volume.*s * volume + by_q.*s * q; };
+      const double projected = (i == j ? (i < 3 ? 1.0 : 0.5) : 0.0) - (i < 3 && j < 3 ? 1.0 / 3 : 0.0);
+      tangent[i * n + j] = 2 * r.ratio * (r.shear * projected + a.strain[i] * total(&Slopes::shear)) +
+                           r.trial[i] * total(&Slopes::ratio) - (i < 3 ? total(&Slopes::pressure) : 0.0);
+    }
+}
+
+template <int D>
+Start<D> start_of(const CamClay& law, const PointBatch<D>& points, Index i)
+{
+  SymTensor<D> stress, strain;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+  {
+    stress[k] = points.stress[k][i];
+    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5);
+  }
+  const double volume = (1 + law.void_ratio) * std::exp(points.state[2][i]);
+  return {volume / law.swelling,
+          volume / (law.compression - law.swelling),
+          3 * (1 - 2 * law.poisson) / (2 * (1 + law.poisson)),
+          law.critical_slope * law.critical_slope,
+          law.attraction - mean<D>(stress),
+          (law.preconsolidation + law.attraction) * std::exp(points.state[1][i]),
+          -3 * mean<D>(strain),
+          deviator<D>(stress),
+          deviator<D>(strain)};
+}
+
+/// Whether an increment can be worked with: there is pressure, and it stays a number.
+template <int D>
+bool is_sound(const Start<D>& a, const Result<D>& trial)
+{
+  return a.pressure > 0 && is_usable<D>(trial.trial) && std::isfinite(trial.pressure * trial.pressure) &&
+         std::isfinite(a.preconsolidation * a.preconsolidation) && a.preconsolidation > 0 && std::abs(a.volumetric) < 1;
+}
+
+template <int D>
+void write_point(const CamClay& law, const Start<D>& a, const Result<D>& r, const PointBatch<D>& points, Index i)
+{
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    points.stress[k][i] = r.ratio * r.trial[k] + (k < 3 ? law.attraction - r.pressure : 0.0);
+  points.state[0][i] += 2 * r.multiplier * r.ratio * r.trial_q / a.slope_squared;
+  points.state[1][i] += a.plastic * r.x;
+  points.state[2][i] -= a.volumetric;
+}
+} // namespace
+
+void check(const CamClay& law)
+{
+  const auto positive = [](const char* name, double value, const char* range)
+  { require(value > 0 && std::isfinite(value), name, value, range); };
+  positive("swelling", law.swelling, "positive and finite");
+  require(law.compression > law.swelling && std::isfinite(law.compression), "compression", law.compression,
+          "above the swelling and finite");
+  positive("critical_slope", law.critical_slope, "positive and finite");
+  require(law.poisson > -1 && law.poisson < 0.5, "poisson", law.poisson, "in (-1, 0.5)");
+  positive("preconsolidation", law.preconsolidation, "positive and finite [Pa]");
+  positive("void_ratio", law.void_ratio, "positive and finite");
+  require(law.attraction >= 0 && std::isfinite(law.attraction), "attraction", law.attraction,
+          "at least 0 and finite [Pa]");
+}
+
+double p_wave_modulus(const CamClay& law)
+{
+  const double bulk = (1 + law.void_ratio) * (2 * law.preconsolidation + law.attraction) / law.swelling;
+  return 3 * bulk * (1 - law.poisson) / (1 + law.poisson);
+}
+
+double shear_modulus(const CamClay& law)
+{
+  const double bulk = (1 + law.void_ratio) * (law.preconsolidation + law.attraction) / law.swelling;
+  return 3 * bulk * (1 - 2 * law.poisson) / (2 * (1 + law.poisson));
+}
+
+template <int D>
+BatchReport update(const CamClay& law, const PointBatch<D>& points)
+{
+  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
+  BatchReport report;
+  for (Index i = 0; i < points.size; ++i)
+  {
+    double* const tangent = points.tangent ? points.tangent + static_cast<std::size_t>(i) * entries : nullptr;
+    const Start<D> a = start_of(law, points, i);
+    const Result<D> trial = result_of(a, 0, 0);
+    if (!is_sound(a, trial))
+    {
+      report.failed.push_back(i);
+      if (tangent)
+        std::fill_n(tangent, entries, 0.0);
+      continue;
+    }
+    const double round_off = 1e-12 * a.preconsolidation * a.preconsolidation; // a returned stress counts as elastic
+    const bool plastic = trial.yield(a.slope_squared) > round_off;
+    const Result<D> result = plastic ? returned(a) : trial;
+    report.plastic += plastic ? 1 : 0;
+    write_point(law, a, result, points, i);
+    if (tangent)
+      write_tangent(a, result, plastic, tangent);
+  }
+  return report;
+}
+
+template BatchReport update<2>(const CamClay&, const PointBatch<2>&);
+template BatchReport update<3>(const CamClay&, const PointBatch<3>&);
+} // namespace mpm

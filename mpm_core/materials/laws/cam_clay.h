@@ -1,0 +1,57 @@
+#pragma once
+
+#include "materials/laws/batch.h"
+
+namespace mpm
+{
+/// Modified Cam-Clay with pressure-dependent elasticity.
+///
+/// With the pressure p = attraction - mean stress (positive in compression), q = sqrt(3 J2) and the preconsolidation
+/// pressure p_c (attraction included) a stress is admissible when
+///     q^2 / M^2 + p (p - p_c) <= 0.
+/// The flow is associated; p_c hardens by dp_c / p_c = -v / (compression - swelling) de_v^p. Elasticity has the bulk
+/// modulus K = v p / swelling and a constant Poisson's ratio. The specific volume v is that at the start of each
+/// increment.
+/// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit
+/// return with secant moduli).
+struct CamClay
+{
+  /// Slope lambda of the virgin compression line in v and ln p [-], > swelling
+  double compression;
+  /// Slope kappa of the swelling lines [-], > 0
+  double swelling;
+  /// Slope M of the critical state line in p and q [-], > 0
+  double critical_slope;
+  /// Poisson's ratio [-], in (-1, 0.5)
+  double poisson;
+  /// Preconsolidation pressure at the start, less the attraction [Pa], > 0
+  double preconsolidation;
+  /// Void ratio at the start [-], > 0
+  double void_ratio;
+  /// Isotropic tension at which the soil loses stiffness and strength [Pa], >= 0. Without it a point must be in
+  /// compression: one at zero pressure has no stiffness, and its update fails.
+  double attraction = 0;
+
+  static constexpr std::string_view name = "CamClay";
+  /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with
+  /// another one; `log_volume` is ln of the specific volume over that of the start.
+  static constexpr std::array state_names{"plastic_strain", "log_preconsolidation", "log_volume"};
+
+  bool operator==(const CamClay&) const = default;
+};
+
+/// Throws InputError when a parameter is out of its range.
+void check(const CamClay& law);
+
+/// Modulus of the compression wave, K + 4G/3 [Pa], at twice the preconsolidation pressure of the start: the stiffness
+/// grows with the pressure, and a time step from it holds up to there
+double p_wave_modulus(const CamClay& law);
+
+/// Shear modulus at the preconsolidation pressure of the start [Pa]
+double shear_modulus(const CamClay& law);
+
+/// Updates stress and state of a batch of points (and fills its tangent where wanted, consistent with the return). A
+/// point without pressure or of which values are not finite fails, and its tangent is zero.
+template <int D>
+BatchReport update(const CamClay& law, const PointBatch<D>& points);
+} // namespace mpm

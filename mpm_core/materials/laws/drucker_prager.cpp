@@ -1,0 +1,153 @@
+#include "materials/laws/drucker_prager.h"
+
+#include "materials/tools/deviator.h"
+#include "materials/tools/elasticity.h"
+#include "materials/tools/require.h"
+
+#include <numbers>
+
+namespace mpm
+{
+namespace
+{
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// The law with the constants of its returns worked out
+struct Cone
+{
+  ElasticModuli moduli;
+  double bulk;
+  double strength, friction, dilation;
+  double tension; ///< largest mean stress: the cut-off, or the apex where that comes first
+  double corner;  ///< sqrt(J2) where cone and cut-off meet
+};
+
+Cone cone_of(const DruckerPrager& law)
+{
+  const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
+  const double apex = law.friction > 0 ? law.strength / law.friction : infinity;
+  const double tension = std::min(law.tension_cutoff, apex);
+  const double corner = tension < apex ? law.strength - (law.friction > 0 ? law.friction * tension : 0.0) : 0.0;
+  return {moduli, moduli.lambda + 2 * moduli.shear / 3, law.strength, law.friction, law.dilation, tension, corner};
+}
+
+enum class Part
+{
+  elastic,
+  cone,
+  cut_off,
+  corner
+};
+
+/// Mean stress and ratio of the deviator to that of the trial stress after the return
+struct Returned
+{
+  Part part;
+  double mean;
+  double ratio;
+};
+
+/// Return of a trial stress of mean p and sqrt(J2) j. In the plane of p and j both surfaces are lines.
+Returned return_to_cone(const Cone& c, double p, double j)
+{
+  const double excess = j + c.friction * p - c.strength;
+  const double tolerance = 1e-12 * (j + std::abs(p) + c.strength); // a stress that was returned counts as elastic
+  if (excess <= tolerance && p - c.tension <= tolerance)
+    return {Part::elastic, p, 1};
+  const double multiplier = excess / (c.moduli.shear + c.bulk * c.friction * c.dilation);
+  const double mean = p - c.bulk * c.dilation * multiplier;
+  if (excess > 0 && mean <= c.tension)
+    return {Part::cone, mean, (c.strength - c.friction * mean) / j};
+  if (j <= c.corner)
+    return {Part::cut_off, c.tension, 1};
+  return {Part::corner, c.tension, c.corner / j};
+}
+
+template <int D>
+void write_tangent(const Cone& c, const Returned& returned, const SymTensor<D>& s, double j, double* tangent)
+{
+  const double shear = c.moduli.shear, r = returned.ratio;
+  switch (returned.part)
+  {
+  case Part::elastic:
+    return;
+  case Part::cut_off:
+    return write_deviatoric_tangent<D>(s, 1, shear, {0, 0, 0, 0}, tangent);
+  case Part::corner:
+    return write_deviatoric_tangent<D>(s, r, shear, {0, 0, 0, -r / j}, tangent);
+  case Part::cone:
+    const double stiffness = shear + c.bulk * c.friction * c.dilation;
+    const double by_volume = c.bulk * c.bulk * c.dilation * c.friction / stiffness;
+    const double by_radius = c.bulk * c.dilation / stiffness;
+    const double mean_by_volume = c.bulk - by_volume;
+    return write_deviatoric_tangent<D>(
+        s, r, shear, {mean_by_volume, -by_radius, -c.friction * mean_by_volume / j, (c.friction * by_radius - r) / j},
+        tangent);
+  }
+}
+} // namespace
+
+double cone_slope(double angle, ConeMatch match)
+{
+  const double phi = angle * std::numbers::pi / 180, sine = std::sin(phi), tangent = std::tan(phi);
+  if (match == ConeMatch::plane_strain)
+    return 3 * tangent / std::sqrt(9 + 12 * tangent * tangent);
+  return 6 * sine / (std::numbers::sqrt3 * (match == ConeMatch::outer ? 3 - sine : 3 + sine));
+}
+
+double cone_strength(double cohesion, double friction_angle, ConeMatch match)
+{
+  const double phi = friction_angle * std::numbers::pi / 180, sine = std::sin(phi), tangent = std::tan(phi);
+  if (match == ConeMatch::plane_strain)
+    return 3 * cohesion / std::sqrt(9 + 12 * tangent * tangent);
+  return 6 * cohesion * std::cos(phi) / (std::numbers::sqrt3 * (match == ConeMatch::outer ? 3 - sine : 3 + sine));
+}
+
+void check(const DruckerPrager& law)
+{
+  check_elastic(law.young, law.poisson);
+  require(law.strength >= 0 && std::isfinite(law.strength), "strength", law.strength, "at least 0 and finite [Pa]");
+  require(law.friction >= 0 && std::isfinite(law.friction), "friction", law.friction, "at least 0 and finite");
+  require(law.dilation >= 0 && law.dilation <= law.friction, "dilation", law.dilation, "between 0 and the friction");
+  require(law.tension_cutoff >= 0, "tension_cutoff", law.tension_cutoff, "at least 0 [Pa] (or infinite)");
+}
+
+double p_wave_modulus(const DruckerPrager& law)
+{
+  const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
+  return moduli.lambda + 2 * moduli.shear;
+}
+
+template <int D>
+BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)
+{
+  const Cone cone = cone_of(law);
+  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
+  if (points.tangent)
+    fill_elastic_tangent<D>(cone.moduli, points.size, points.tangent);
+  BatchReport report;
+  for (Index i = 0; i < points.size; ++i)
+  {
+    const SymTensor<D> trial = elastic_trial<D>(cone.moduli, points, i);
+    if (!is_usable<D>(trial))
+    {
+      report.failed.push_back(i);
+      continue;
+    }
+    const SymTensor<D> s = deviator<D>(trial);
+    const double j = radius<D>(s);
+    const Returned returned = return_to_cone(cone, mean<D>(trial), j);
+    const bool plastic = returned.part != Part::elastic;
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      points.stress[k][i] = plastic ? (k < 3 ? returned.mean : 0.0) + returned.ratio * s[k] : trial[k];
+    points.state[0][i] += (1 - returned.ratio) * j / (std::numbers::sqrt3 * cone.moduli.shear);
+    report.plastic += plastic ? 1 : 0;
+    if (points.tangent)
+      write_tangent<D>(cone, returned, s, j, points.tangent + static_cast<std::size_t>(i) * entries);
+  }
+  return report;
+}
+
+template BatchReport update<2>(const DruckerPrager&, const PointBatch<2>&);
+template BatchReport update<3>(const DruckerPrager&, const PointBatch<3>&);
+} // namespace mpm

@@ -1,0 +1,62 @@
+#pragma once
+
+#include "materials/laws/batch.h"
+
+#include <limits>
+
+namespace mpm
+{
+/// Drucker-Prager, linear elastic and perfectly plastic, with non-associated flow and a cut-off of the mean stress.
+///
+/// With the mean stress p (tension positive) and the second invariant J2 of the deviator a stress is admissible when
+///     sqrt(J2) + friction p - strength <= 0   and   p <= tension_cutoff.
+/// The flow on the cone is that of the same cone with `dilation` in place of `friction`; the flow on the cut-off is
+/// associated. Where the cut-off lies beyond the apex, p = strength / friction, the apex takes its place: a trial
+/// stress that the flow does not lead to the cone is returned there. Without friction it is the criterion of von Mises.
+/// Source: de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, sections 6.4.3 and 8.3.
+struct DruckerPrager
+{
+  /// Young's modulus [Pa], > 0
+  double young;
+  /// Poisson's ratio [-], in (-1, 0.5)
+  double poisson;
+  /// sqrt(J2) on the surface at zero mean stress [Pa], >= 0
+  double strength;
+  /// Slope of the surface in p and sqrt(J2) [-], >= 0
+  double friction = 0;
+  /// The same of the plastic potential [-], in [0, friction]
+  double dilation = 0;
+  /// Largest mean stress allowed [Pa], >= 0
+  double tension_cutoff = std::numeric_limits<double>::infinity();
+
+  static constexpr std::string_view name = "DruckerPrager";
+  static constexpr std::array state_names{"plastic_strain"};
+
+  bool operator==(const DruckerPrager&) const = default;
+};
+
+/// Where a cone meets the pyramid of Mohr-Coulomb
+enum class ConeMatch
+{
+  outer,       ///< on the meridian of triaxial compression
+  inner,       ///< on the meridian of triaxial extension
+  plane_strain ///< same collapse load in plane strain, exact where the flow is associated
+};
+
+/// Slope of the cone that matches a friction (or dilation) angle [degrees]
+double cone_slope(double angle, ConeMatch match);
+
+/// sqrt(J2) at zero mean stress on the cone that matches a cohesion [Pa] and friction angle [degrees]
+double cone_strength(double cohesion, double friction_angle, ConeMatch match);
+
+/// Throws InputError when a parameter is out of its range.
+void check(const DruckerPrager& law);
+
+/// Modulus of the compression wave, K + 4G/3 [Pa], for the critical time step (16)
+double p_wave_modulus(const DruckerPrager& law);
+
+/// Updates stress and state of a batch of points (and fills its tangent where wanted, consistent with the return). A
+/// failed point is given the elastic tangent.
+template <int D>
+BatchReport update(const DruckerPrager& law, const PointBatch<D>& points);
+} // namespace mpm

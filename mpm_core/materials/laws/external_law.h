@@ -1,0 +1,44 @@
+#pragma once
+
+#include "materials/laws/batch.h"
+
+#include <functional>
+
+namespace mpm
+{
+/// A law that is not of this library: functions that update a batch, such as ones that call Python.
+struct ExternalLaw
+{
+  /// What it is called in messages
+  std::string name;
+  /// Names of the state variables; the first is `plastic_strain`
+  std::vector<std::string> names;
+  /// Modulus of the compression wave [Pa], for the critical time step
+  double wave_modulus;
+  std::function<BatchReport(const PointBatch<2>&)> plane_strain;
+  std::function<BatchReport(const PointBatch<3>&)> solid;
+  /// What the functions call: laws that call the same are equal
+  const void* identity;
+
+  bool operator==(const ExternalLaw& other) const { return identity == other.identity && names == other.names; }
+};
+
+inline std::string law_name(const ExternalLaw& law) { return law.name; }
+inline int n_state(const ExternalLaw& law) { return static_cast<int>(law.names.size()); }
+inline std::vector<std::string> state_names(const ExternalLaw& law) { return law.names; }
+inline double p_wave_modulus(const ExternalLaw& law) { return law.wave_modulus; }
+/// That of a Poisson's ratio of 1/4
+inline double shear_modulus(const ExternalLaw& law) { return law.wave_modulus / 3; }
+
+/// Throws InputError when there are too many or no state variables, or no positive modulus.
+void check(const ExternalLaw& law);
+
+template <int D>
+BatchReport update(const ExternalLaw& law, const PointBatch<D>& points)
+{
+  if constexpr (D == 2)
+    return law.plane_strain(points);
+  else
+    return law.solid(points);
+}
+} // namespace mpm

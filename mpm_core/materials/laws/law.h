@@ -1,0 +1,11 @@
+#pragma once
+/// @file
+/// Any constitutive law.
+
+#include "materials/laws/undrained.h"
+
+namespace mpm
+{
+/// Any constitutive law, as a plain value
+using Law = LawList<Hencky, Undrained>;
+} // namespace mpm

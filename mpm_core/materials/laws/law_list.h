@@ -1,0 +1,86 @@
+#pragma once
+/// @file
+/// The list of laws that stand for themselves, and what can be asked of any law. A new law is one file beside the
+/// others and one entry here.
+
+#include "materials/laws/cam_clay.h"
+#include "materials/laws/drucker_prager.h"
+#include "materials/laws/external_law.h"
+#include "materials/laws/linear_elastic.h"
+#include "materials/laws/mohr_coulomb.h"
+#include "materials/laws/softening_mohr_coulomb.h"
+#include "materials/laws/umat.h"
+
+#include <string>
+#include <variant>
+
+namespace mpm
+{
+/// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
+template <class... Wrapper>
+using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw,
+                             Umat, Wrapper...>;
+
+/// What a law is called in messages
+template <class L>
+requires requires { L::name; }
+std::string law_name(const L&) { return std::string(L::name); }
+
+/// Number of state variables of a law
+template <class L>
+requires requires { L::state_names; }
+int n_state(const L&) { return static_cast<int>(L::state_names.size()); }
+
+/// Names of a law's state variables, in their order; the first is `plastic_strain` in every law
+template <class L>
+requires requires { L::state_names; }
+std::vector<std::string> state_names(const L&) { return {L::state_names.begin(), L::state_names.end()}; }
+
+/// Shear modulus [Pa] of a law with Young's modulus and Poisson's ratio
+template <class L>
+requires requires(L law) { law.young + law.poisson; }
+double shear_modulus(const L& law) { return law.young / (2 * (1 + law.poisson)); }
+
+template <class... L>
+std::string law_name(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return law_name(l); }, law);
+}
+
+template <class... L>
+int n_state(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return n_state(l); }, law);
+}
+
+template <class... L>
+std::vector<std::string> state_names(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return state_names(l); }, law);
+}
+
+template <class... L>
+void check(const std::variant<L...>& law)
+{
+  std::visit([](const auto& l) { check(l); }, law);
+}
+
+template <class... L>
+double p_wave_modulus(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return p_wave_modulus(l); }, law);
+}
+
+/// Shear modulus [Pa], or an estimate of its size where it changes or is not known
+template <class... L>
+double shear_modulus(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return shear_modulus(l); }, law);
+}
+
+template <int D, class... L>
+BatchReport update(const std::variant<L...>& law, const PointBatch<D>& points)
+{
+  return std::visit([&](const auto& l) { return update<D>(l, points); }, law);
+}
+} // namespace mpm

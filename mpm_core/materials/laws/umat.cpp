@@ -1,0 +1,156 @@
+#include "materials/laws/umat.h"
+
+#include "materials/tools/elasticity.h"
+#include "materials/tools/require.h"
+
+#include <algorithm>
+#include <cmath>
+#include <dlfcn.h>
+
+namespace mpm
+{
+namespace
+{
+/// Place of each component in Abaqus's order
+constexpr std::array<std::size_t, 6> abaqus_place{0, 1, 2, 3, 5, 4};
+
+/// What a call reads and writes
+template <int D>
+struct Arguments
+{
+  static constexpr std::size_t n = n_stress<D>;
+  std::array<double, n> stress, strain, increment;
+  std::array<double, n * n> ddsdde{};
+  std::array<double, max_states> variables{};
+  double new_step = 1; ///< PNEWDT
+};
+
+template <int D>
+Arguments<D> loaded(const Umat& law, const PointBatch<D>& points, Index i)
+{
+  Arguments<D> a;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+  {
+    a.stress[abaqus_place[k]] = points.stress[k][i];
+    a.increment[abaqus_place[k]] = points.strain_increment[k][i];
+    a.strain[abaqus_place[k]] = points.state[1 + k][i];
+  }
+  for (int k = 0; k < law.n_variables; ++k)
+    a.variables[static_cast<std::size_t>(k)] = points.state[7 + k][i];
+  return a;
+}
+
+template <int D>
+void call(const Umat& law, Index i, Arguments<D>& a)
+{
+  constexpr int normals = 3, shears = n_stress<D> - 3, tensor = n_stress<D>, one = 1, none = 0;
+  const int variables = law.n_variables, properties = static_cast<int>(law.properties.size()), point = i + 1;
+  const std::array<int, 4> step{1, 0, 0, 0}; // JSTEP
+  double sse = 0, spd = 0, scd = 0, rpl = 0, drpldt = 0;
+  std::array<double, 6> ddsddt{}, drplde{};
+  const std::array<double, 2> time{};
+  const std::array<double, 3> coords{};
+  constexpr std::array<double, 9> identity{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double duration = 1, zero = 0, length = 1;
+  std::array<char, 80> name;
+  name.fill(' ');
+  law.function(a.stress.data(), a.variables.data(), a.ddsdde.data(), &sse, &spd, &scd, &rpl, ddsddt.data(),
+               drplde.data(), &drpldt, a.strain.data(), a.increment.data(), time.data(), &duration, &zero, &zero, &zero,
+               &zero, name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties,
+               coords.data(), identity.data(), &a.new_step, &length, identity.data(), identity.data(), &one, &point,
+               &none, &one, step.data(), &one, name.size());
+}
+
+/// Whether the call succeeded; the stress is looked at as a sum of squares
+template <int D>
+bool is_good(const Umat& law, const Arguments<D>& a)
+{
+  const bool variables = std::all_of(a.variables.begin(), a.variables.begin() + law.n_variables,
+                                     [](double v) { return std::isfinite(v); });
+  return a.new_step >= 1 && variables && is_usable<D>(a.stress);
+}
+
+template <int D>
+void store(const Umat& law, const Arguments<D>& a, const PointBatch<D>& points, Index i)
+{
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+  {
+    points.stress[k][i] = a.stress[abaqus_place[k]];
+    points.state[1 + k][i] += points.strain_increment[k][i];
+  }
+  for (int k = 0; k < law.n_variables; ++k)
+    points.state[7 + k][i] = a.variables[static_cast<std::size_t>(k)];
+  if (law.plastic_strain_variable > 0)
+    points.state[0][i] = a.variables[static_cast<std::size_t>(law.plastic_strain_variable - 1)];
+}
+} // namespace
+
+UmatFunction load_umat(const std::string& library, const std::string& symbol)
+{
+  void* const handle = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (!handle)
+    throw InputError("library is '" + library + "', which cannot be loaded: " + dlerror());
+  void* const address = dlsym(handle, symbol.c_str());
+  if (!address)
+    throw InputError("symbol is '" + symbol + "', which '" + library + "' does not have: " + dlerror());
+  return reinterpret_cast<UmatFunction>(address);
+}
+
+std::string library_file(UmatFunction function)
+{
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(function), &info) == 0 || !info.dli_fname)
+    return {};
+  return info.dli_fname;
+}
+
+std::vector<std::string> state_names(const Umat& law)
+{
+  std::vector<std::string> names{"plastic_strain", "strain_xx", "strain_yy", "strain_zz",
+                                 "strain_xy",      "strain_yz", "strain_xz"};
+  for (int k = 1; k <= law.n_variables; ++k)
+    names.push_back("statev_" + std::to_string(k));
+  return names;
+}
+
+void check(const Umat& law)
+{
+  require(law.n_variables >= 0 && law.n_variables <= max_states - 9, "n_variables", law.n_variables, "from 0 to 55");
+  require(law.plastic_strain_variable >= 0 && law.plastic_strain_variable <= law.n_variables, "plastic_strain_variable",
+          law.plastic_strain_variable, "0, or the number of a state variable");
+  for (double property : law.properties)
+    require(std::isfinite(property), "properties", property, "finite numbers");
+  require(law.wave_modulus > 0 && std::isfinite(law.wave_modulus), "p_wave_modulus", law.wave_modulus,
+          "positive and finite [Pa]");
+}
+
+template <int D>
+BatchReport update(const Umat& law, const PointBatch<D>& points)
+{
+  constexpr std::size_t n = n_stress<D>;
+  BatchReport report;
+  for (Index i = 0; i < points.size; ++i)
+  {
+    Arguments<D> a = loaded(law, points, i);
+    call(law, i, a);
+    if (!is_good(law, a))
+    {
+      report.failed.push_back(i);
+      a.ddsdde.fill(0);
+    }
+    else
+    {
+      const double before = points.state[0][i];
+      store(law, a, points, i);
+      report.plastic += points.state[0][i] > before ? 1 : 0;
+    }
+    for (std::size_t k = 0; points.tangent && k < n * n; ++k)
+      points.tangent[static_cast<std::size_t>(i) * n * n + k] =
+          a.ddsdde[abaqus_place[k / n] + abaqus_place[k % n] * n]; // column by column in Fortran
+  }
+  return report;
+}
+
+template BatchReport update<2>(const Umat&, const PointBatch<2>&);
+template BatchReport update<3>(const Umat&, const PointBatch<3>&);
+} // namespace mpm

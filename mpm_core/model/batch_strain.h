@@ -1,0 +1,42 @@
+#pragma once
+/// @file
+/// What the nodes do to the particles of a batch: motions of its cells, and strains of its particles.
+
+#include "model/batches.h"
+#include "model/particle_pass.h"
+#include "transfer/lanes.h"
+
+#include <bit>
+
+namespace mpm
+{
+/// Room for a batch, in the first-level cache.
+template <int D>
+struct BatchScratch
+{
+  std::array<CellMotion<D>, batch_size> motion;               ///< per run
+  std::array<CellStrain<D, Lanes>, batch_size / lanes> cells; ///< per run, `lanes` of them together
+  /// Per particle, one column per component; that out of plane stays zero
+  alignas(64) double strain[n_stress<D>][batch_size + lanes];
+
+  CellStrain<D> cell_strain(std::size_t run) const
+  {
+    constexpr std::size_t members = sizeof(CellStrain<D>) / sizeof(double);
+    const auto& together = reinterpret_cast<const std::array<double[lanes], members>&>(cells[run / lanes]);
+    std::array<double, members> numbers;
+    for (std::size_t k = 0; k < members; ++k)
+      numbers[k] = together[k][run % lanes];
+    return std::bit_cast<CellStrain<D>>(numbers);
+  }
+};
+
+/// What the nodes do to the particles of each run of a batch.
+template <int D>
+void find_motions(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
+
+/// Strains the particles of a batch: turns their stresses, grows their volumes, and leaves their strain increments in
+/// the scratch, for the law.
+/// @pre find_motions has been called for the batch
+template <int D>
+void strain_batch(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
+} // namespace mpm

@@ -1,0 +1,26 @@
+#pragma once
+/// @file
+/// How the particles are cut into what a law is given at once.
+
+#include "model/model.h"
+
+namespace mpm
+{
+/// Consecutive runs of one material, at most `batch_size` particles: what a law is given at once.
+struct Batch
+{
+  std::size_t first_run, last_run;
+  Index first, last;
+  Index material;
+};
+
+/// The batch that begins with a run.
+inline Batch next_batch(const std::vector<Run>& runs, std::size_t first_run)
+{
+  Batch batch{first_run, first_run + 1, runs[first_run].first, runs[first_run].last, runs[first_run].material};
+  while (batch.last_run < runs.size() && runs[batch.last_run].material == batch.material &&
+         runs[batch.last_run].last - batch.first <= batch_size)
+    batch.last = runs[batch.last_run++].last;
+  return batch;
+}
+} // namespace mpm

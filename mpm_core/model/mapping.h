@@ -1,0 +1,57 @@
+#pragma once
+/// @file
+/// What explicit and implicit steps take from the particles at their start, and the strains that nodes give the cells.
+
+#include "model/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm
+{
+/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
+/// @pre prepare(model) has been called
+/// @note Collective
+template <int D>
+void map_to_nodes(Model<D>& model);
+
+/// v_i at the start of the step, from the sums at nodes, with supports.
+template <int D>
+void find_start_velocity(Model<D>& model);
+
+/// What the nodes add to the velocities of particles over dt [s]: dt a_i, and with a PIC share that much of the grid's
+/// velocity, which takes the place of the particles' own.
+template <int D>
+void find_velocity_change(Model<D>& model, double pic_share, double dt);
+
+/// Volumetric strains of the nodes over dt [s] from the nodes' `velocity`, averages over the cells around them
+/// (nodal mixed discretisation).
+/// @note Collective
+template <int D>
+void average_strains(Model<D>& model, double dt);
+
+/// Averages the mean of the normal components in the plane of the cells' stress times volume, as strains are averaged.
+///
+/// The forces of these stresses do the work of the particles' stresses on averaged strains: with volume weights the
+/// average is its own transpose.
+/// @param stress  of each owned cell [N m]
+/// @note Collective
+template <int D>
+void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress);
+
+/// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
+///
+/// A node that R slows down, with its force (1 + alpha) |R|, may come to a stop within the step; for the rest of it R
+/// speeds it up, with (1 - alpha) |R|. Taking the velocity's sign at the step's start for the whole step would throw a
+/// slow node back past its start: its velocity would change sign step by step, and differences of round-off would grow.
+/// With the mean, the new velocity rises with the old one at a slope between (1 - alpha) / (1 + alpha) and 1, so that
+/// differences never grow by the damping. The implicit scheme has the same law, solved for R (implicit_inertia.h).
+/// @param momentum  m v at the step's start [N s]
+/// @param dt        [s]
+inline double local_damping(double alpha, double residual, double momentum, double dt)
+{
+  const double impulse = (1 + alpha) * residual * dt;
+  const double slowed = impulse == 0 ? 0 : std::clamp(-momentum / impulse, 0.0, 1.0); // part of the step until the stop
+  return alpha * residual * (1 - 2 * slowed);
+}
+} // namespace mpm

@@ -1,0 +1,16 @@
+#pragma once
+/// @file
+/// A model brought to another partition of its mesh.
+
+#include "model/model.h"
+
+namespace mpm
+{
+/// Replaces the model's mesh by the same one cut otherwise, and sends each particle to the rank that owns its cell now.
+/// Sums over cells are gathered anew.
+/// @param mesh  with the same cells, by their numbers over all ranks
+/// @post There are no supports; they must be set again, for the new nodes
+/// @note Collective
+template <int D>
+void set_partition(Model<D>& model, const Mesh<D>& mesh);
+} // namespace mpm
