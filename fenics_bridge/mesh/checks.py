@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from fenics_bridge.errors import InputError
 
 NEAR = 1e-6
-"""Of the length of a side: what is nearer to it lies on it"""
+"""Of the size of a side or face: what is nearer to it lies on it"""
 
 
 def check_cells_fit(cells, name):
@@ -19,41 +21,107 @@ def check_cells_fit(cells, name):
     flat = (np.diff(nodes, axis=1) == 0).any(axis=1)
     if flat.any():
         raise InputError(f"{name}: cell {np.argmax(flat)} has a node twice")
-    _, first, counts = np.unique(nodes, axis=0, return_index=True, return_counts=True)
+    first, counts = _distinct(nodes)
     if (counts > 1).any():
         raise InputError(f"{name}: cell {first[np.argmax(counts > 1)]} is there {counts.max()} times")
     facets = np.concatenate([np.delete(nodes, k, axis=1) for k in range(nodes.shape[1])])
-    _, first, counts = np.unique(facets, axis=0, return_index=True, return_counts=True)
+    first, counts = _distinct(facets)
     if (counts > 2).any():
         cell = first[np.argmax(counts > 2)] % len(cells)
         raise InputError(f"{name}: cell {cell} has a facet that {counts.max()} cells share, expected at most 2")
 
 
 def check_conforming(points, cells, name):
-    """Refuse plane cells that do not meet node to node: with a node within the side of another cell, the mesh is torn there.
+    """Refuse cells that do not meet node to node: the mesh is torn where a node lies within a side or face of another cell.
 
-    points: (n, 2); cells: (m, 3). Each side of one cell alone is a boundary; no node of the boundary may lie on it between
-    its ends, nearer than a millionth of its length. The message gives the first such place.
+    points: (n, D); cells: (m, D + 1). Each facet of one cell alone is a boundary. No node of the boundary may lie on such a
+    facet away from its corners, nearer than a millionth of its size, nor may two such facets overlap, as two halves of a
+    square that are cut along different diagonals do. The message gives the first such place.
     """
-    sides = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
-    alone, counts = np.unique(sides, axis=0, return_counts=True)
-    alone = alone[counts == 1]
-    nodes = np.unique(alone)
-    nodes = nodes[np.argsort(points[nodes, 0], kind="stable")]
-    places = points[nodes]
-    start, along = points[alone[:, 0]], points[alone[:, 1]] - points[alone[:, 0]]
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
-    low = np.minimum(start[:, 0], start[:, 0] + along[:, 0]) - NEAR * length
-    first = np.searchsorted(places[:, 0], low)
-    last = np.searchsorted(places[:, 0], low + np.abs(along[:, 0]) + 2 * NEAR * length, side="right")
-    for k in range(len(alone)):
-        offset = places[first[k] : last[k]] - start[k]
-        position = offset @ along[k] / length[k] ** 2
-        distance = np.abs(offset[:, 0] * along[k, 1] - offset[:, 1] * along[k, 0]) / length[k]
-        inside = (distance < NEAR * length[k]) & (position > NEAR) & (position < 1 - NEAR)
-        if inside.any():
-            x, y = places[first[k] + np.argmax(inside)]
-            raise InputError(
-                f"{name}: the node at ({x:g}, {y:g}) lies within a side of another cell; cells must meet node to node, or the mesh is "
-                "torn there"
-            )
+    facets = _boundary_facets(cells)
+    nodes = np.unique(facets)
+    on = _point_on_facet(points[nodes], nodes, points, facets)
+    kind = "a side" if cells.shape[1] == 3 else "a face"
+    if on is not None:
+        raise InputError(
+            f"{name}: the node at {_place(points[nodes[on]])} lies within {kind} of another cell; cells must meet node to node, or "
+            "the mesh is torn there"
+        )
+    centres = points[facets].mean(axis=1)
+    on = _point_on_facet(centres, None, points, facets)
+    if on is not None:
+        raise InputError(
+            f"{name}: {kind} of a cell overlaps that of another at {_place(centres[on])}; cells must meet node to node, or the mesh "
+            "is torn there"
+        )
+
+
+def _place(point):
+    return "(" + ", ".join(f"{x:g}" for x in point) + ")"
+
+
+def _boundary_facets(cells):
+    """Facets of one cell alone, as rows of nodes in ascending order: (k, D)."""
+    facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])]), axis=1)
+    first, counts = _distinct(facets)
+    return facets[first[counts == 1]]
+
+
+def _distinct(rows):
+    """Where each distinct row is first, in ascending order of the rows, and how often it is there."""
+    order = np.lexsort(rows.T[::-1])
+    starts = np.ones(len(rows), dtype=bool)
+    starts[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
+    starts = np.flatnonzero(starts)
+    return order[starts], np.diff(np.append(starts, len(rows)))
+
+
+def _point_on_facet(places, nodes, points, facets):
+    """Row of the first of some places (n, D) that lies on a facet; None if none does.
+
+    nodes: (n,) of the places, which may lie on the facets that they are corners of; None for centres of the facets, of which
+    each may lie on its own.
+    """
+    corners = points[facets]
+    centres = corners.mean(axis=1)
+    size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    first = len(places)
+    for facet, place in _near_pairs(centres, size, places):
+        near = np.linalg.norm(places[place] - centres[facet], axis=1) < size[facet]
+        facet, place = facet[near], place[near]
+        own = (facets[facet] == nodes[place, None]).any(axis=1) if nodes is not None else facet == place
+        facet, place = facet[~own], place[~own]
+        on = _lies_on(corners[facet], size[facet], places[place])
+        first = min(first, place[on].min(initial=first))
+    return first if first < len(places) else None
+
+
+def _lies_on(corners, size, places):
+    """Whether each place lies on the side or triangle beside it; corners: (k, D, D), size: (k,), places: (k, D)."""
+    edges, offset = corners[:, 1:] - corners[:, :1], places - corners[:, 0]
+    gram = edges @ edges.transpose(0, 2, 1)
+    flat = np.linalg.det(gram) <= NEAR**2 * size ** (2 * gram.shape[1])  # of no length or area
+    gram[flat] = np.eye(gram.shape[1])
+    weights = np.linalg.solve(gram, (edges @ offset[:, :, None]))[:, :, 0]
+    distance = np.linalg.norm(offset - (weights[:, :, None] * edges).sum(axis=1), axis=1)
+    inside = (weights > -NEAR).all(axis=1) & (weights.sum(axis=1) < 1 + NEAR)
+    return ~flat & inside & (distance < NEAR * size)
+
+
+def _near_pairs(centres, size, places):
+    """Pairs of numbers (facets, places) that hold all places within `size` of the centre of a facet, in portions."""
+    level = np.ceil(np.log2(np.maximum(size, 1e-300)))
+    for each in np.unique(level):
+        chosen = np.flatnonzero(level == each)
+        width, low = 2.0**each, np.minimum(places.min(axis=0), centres.min(axis=0))
+        boxes = np.floor((places - low) / width).astype(np.int64) + 1
+        strides = np.concatenate([[1], np.cumprod(boxes.max(axis=0)[:-1] + 2)])
+        keys = boxes @ strides
+        order = np.argsort(keys, kind="stable")
+        home = np.minimum(np.floor((centres[chosen] - low) / width).astype(np.int64) + 1, boxes.max(axis=0))
+        for shift in itertools.product((-1, 0, 1), repeat=places.shape[1]):
+            key = (home + shift) @ strides
+            begin, end = np.searchsorted(keys[order], key), np.searchsorted(keys[order], key, side="right")
+            count = end - begin
+            within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+            yield np.repeat(chosen, count), order[np.repeat(begin, count) + within]

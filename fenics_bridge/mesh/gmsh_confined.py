@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import re
 import resource
 import sys
 import threading
@@ -59,8 +60,27 @@ def children():
     return tuple(resource.getrusage(resource.RUSAGE_CHILDREN))
 
 
-def mentions_system_call(path):
-    return path.suffix.lower() == ".geo" and b"SystemCall" in path.read_bytes()
+COMMANDS = re.compile(rb"\b(?:NonBlocking)?System(?:Call)?\b|\bOnelabRun\b")
+NAMED = re.compile(rb"\b(?:Include|Merge|MergeWithBoundingBox|Open)\s+(?:\"([^\"\n]*)\"\s*;|[^;]*;)")
+
+
+def command_in(path, seen=()):
+    """Why a .geo file, or one that it names, may run commands; None when no word of theirs says so. Their comments count too.
+
+    seen: files that have been searched already.
+    """
+    text = path.read_bytes()
+    if COMMANDS.search(text):
+        return f"{path.name} mentions SystemCall or the like"
+    for found in NAMED.finditer(text):
+        if found.group(1) is None:
+            return f"{path.name} has {found.group().decode(errors='replace')!r}, a file that cannot be searched"
+        other = (path.parent / os.fsdecode(found.group(1))).resolve()
+        if other.is_file() and other not in seen:
+            why = command_in(other, (*seen, path.resolve(), other))
+            if why is not None:
+                return why
+    return None
 
 
 def main(path, dim, result, memory, allow_commands):
@@ -69,8 +89,12 @@ def main(path, dim, result, memory, allow_commands):
     confined = allow_commands == "no" and forbid_programs()
     before = children()
     refused = "it runs commands by SystemCall; allow_commands=True lets it, if you trust it"
-    if allow_commands == "no" and not confined and mentions_system_call(path):
-        raise gmsh_reader.MeshError(refused)
+    if allow_commands == "no" and not confined and path.suffix.lower() == ".geo":
+        why = command_in(path)
+        if why is not None:
+            raise gmsh_reader.MeshError(
+                f"{refused} ({why}, and without libseccomp nothing would keep gmsh from running it)"
+            )
     try:
         arrays = gmsh_reader.read_file(path, int(dim))
     except MemoryError:

@@ -6,6 +6,7 @@ Nothing of this package is imported here, so that such a process starts quickly 
 from __future__ import annotations
 
 import contextlib
+import re
 import signal
 
 import numpy as np
@@ -28,6 +29,10 @@ _SIMPLEX = {2: "triangles", 3: "tetrahedra"}
 _GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh
 REFUSED, TOO_LARGE = 3, 4
 """Exit codes of the process when the mesh cannot be used, the reason is on its standard error, and when it needs more memory."""
+
+
+LAST_TAG = 2**31 - 1
+"""gmsh and DOLFINx keep tags in 32 bits; of larger numbers gmsh keeps the low bits, which may be another group's tag"""
 
 
 class MeshError(Exception):
@@ -53,6 +58,8 @@ def gmsh_message(error):
 
 def read_file(path, dim):
     """Arrays of a file, see `model_arrays`; a .geo file is meshed."""
+    if path.suffix.lower() == ".msh":
+        _check_written_tags(path)
     with gmsh_session():
         try:
             gmsh.open(str(path))
@@ -61,6 +68,21 @@ def read_file(path, dim):
         except Exception as error:  # gmsh's Python interface raises nothing more special
             raise MeshError(f"gmsh cannot read it: {gmsh_message(error)}") from error
         return model_arrays(dim)
+
+
+def _check_written_tags(path):
+    """Refuse a file in text form whose tags do not fit into 32 bits, by the line. Raises MeshError."""
+    text = path.read_bytes()
+    if re.match(rb"\s*\$MeshFormat\s+\S+\s+0\s", text) is None:
+        return  # binary files have tags of 32 bits
+    for name in (b"PhysicalNames", b"Entities", b"Elements"):
+        begin = text.find(b"$" + name)
+        end = text.find(b"$End" + name, begin) if begin >= 0 else begin
+        for found in re.compile(rb"(?<!\S)-?\d{10,}(?!\S)").finditer(text, max(begin, 0), max(end, 0)):
+            if abs(int(found.group())) > LAST_TAG:
+                line = text.count(b"\n", 0, found.start()) + 1
+                raise MeshError(f"line {line} has the number {found.group().decode()} in ${name.decode()}, expected tags from 1 to "
+                                f"{LAST_TAG}")  # fmt: skip
 
 
 def model_arrays(dim):
@@ -108,6 +130,12 @@ def _entities(dim, only_groups=False):
         raise MeshError(f"an entity of dimension {dim} is in two physical groups; a tag must be single")
     if not groups and not only_groups:
         blocks = [(entity, 0) for _, entity in gmsh.model.getEntities(dim)]
+    wrong = [tag for _, tag in groups if not 1 <= tag <= LAST_TAG]
+    if wrong:
+        raise MeshError(
+            f"a physical group of dimension {dim} has the tag {wrong[0]}, or one that gmsh turned into it; expected tags from 1 to "
+            f"{LAST_TAG}"
+        )
     nodes, values = [np.empty((0, dim + 1), np.int64)], [np.empty(0, np.int32)]
     for entity, tag in blocks:
         for kind, _, element_nodes in zip(*gmsh.model.mesh.getElements(dim, entity)):

@@ -30,8 +30,9 @@ def read_mesh(path, comm, dim=2, parameters=None, *, time_limit=TIME_LIMIT, memo
     is asked for. When the file has physical groups of dimension `dim`, only their cells belong to the mesh, as when
     gmsh saves a mesh; otherwise all do, untagged. Nodes at one place are merged, so that soils hold together.
     Raises InputError, on all ranks, for a file that is missing or cannot be read, another extension, a mesh without
-    cells, of another dimension, with quadrilaterals or hexahedra, or with curved (second-order) elements; one that runs
-    commands, or that takes more time or memory than it may.
+    cells, of another dimension, with quadrilaterals or hexahedra, with curved (second-order) elements, with cells that do
+    not meet node to node, or with tags that do not fit into 32 bits; one that runs commands, or that takes more time or
+    memory than it may.
     Collective.
     """
     _check_arguments(comm, path, dim, parameters)
@@ -79,8 +80,7 @@ def _arrays_from_file(path, dim, parameters, limits):
 
 def _mesh_arrays(arrays, name):
     check_cells_fit(arrays["cells"], name)
-    if arrays["cells"].shape[1] == 3:
-        check_conforming(arrays["points"], arrays["cells"], name)
+    check_conforming(arrays["points"], arrays["cells"], name)
     keys = "points", "cells", "cell_values", "facets", "facet_values"
     return MeshArrays(*(arrays[key] for key in keys), *(_names(arrays, kind) for kind in ("cell", "facet")))
 

@@ -13,6 +13,7 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 
 COMM = MPI.COMM_SELF
+CONFINED = Path(bridge.__file__).parent / "mesh" / "gmsh_confined.py"
 SQUARE = """
 SetFactory("OpenCASCADE");
 Rectangle(1) = {0, 0, 0, 1, 1};
@@ -41,6 +42,44 @@ def test_commands_are_run_only_when_allowed(tmp_path, where):
     assert not sign.exists()
     domain, _, _ = bridge.read_mesh(path, COMM, allow_commands=True)
     assert sign.exists() and domain.topology.index_map(2).size_local > 0
+
+
+@pytest.mark.parametrize(
+    ("files", "why"),
+    [
+        (
+            {"mesh.geo": 'Include "a.geo";', "a.geo": 'Merge  "b.pos";', "b.pos": 'SystemCall "x";'},
+            "b.pos mentions SystemCall",
+        ),
+        ({"mesh.geo": 'Include "a.geo";', "a.geo": 'Include "mesh.geo";\nSystem "x";'}, "a.geo mentions"),
+        ({"mesh.geo": 'n = Str("a.geo");\nMerge n;'}, "mesh.geo has 'Merge n;', a file that cannot be searched"),
+        ({"mesh.geo": 'Include StrCat("a", ".geo");'}, "a file that cannot be searched"),
+        ({"mesh.geo": 'Include "a.geo";\nInclude "none.geo";', "a.geo": "SystemTime = 1;"}, None),
+    ],
+    ids=["merged", "in a circle", "by variable", "by function", "harmless"],
+)
+def test_files_that_a_geometry_names_are_searched_where_nothing_else_helps(tmp_path, files, why):
+    for name, text in files.items():
+        geo(tmp_path, text, name)
+    code = (
+        f"import sys; sys.path.insert(0, {str(CONFINED.parent)!r}); from pathlib import Path; import gmsh_confined\n"
+        f"print(gmsh_confined.command_in(Path({str(tmp_path / 'mesh.geo')!r})))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True).stdout
+    assert found.strip() == "None" if why is None else why in found
+
+
+def test_without_libseccomp_an_included_command_is_refused(tmp_path):
+    geo(tmp_path, f'SystemCall "touch {tmp_path}/sign";\n', "other.geo")
+    path = geo(tmp_path, SQUARE + 'Include "other.geo";\n')
+    code = (
+        f"import sys; sys.path.insert(0, {str(CONFINED.parent)!r}); from pathlib import Path; import gmsh_confined as g\n"
+        "g.forbid_programs, g.end_with_parent = lambda: False, lambda: None\n"
+        f"g.main(Path({str(path)!r}), '2', {str(tmp_path / 'arrays.npz')!r}, '4000000000', 'no')"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "it runs commands by SystemCall" in ran.stderr and "other.geo mentions SystemCall" in ran.stderr
+    assert ran.returncode != 0 and not (tmp_path / "sign").exists()
 
 
 def test_time_is_bounded(tmp_path):
