@@ -10,35 +10,34 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from dataclasses import dataclass, field
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.animation import Frame, save_animation
+from common import site_slides
 from common.files import OutputError
-from common.history import History
 from common.interrupt import Interrupt
-from common.movie import Movie, particle_frame
-from common.options import add_choice, add_count, add_number, add_switch, study_parser
+from common.movie import Movie
+from common.options import add_count, add_number, add_switch, study_parser
 from common.page import Page
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_history, save_particles
-from common.progress import Progress
 from common.ranks import run_study
-from common.results import ROOT, open_results
+from common.results import open_results
 from common.scenes import scene_of
 from common.site_file import Site, read_site
+from common.site_slides import add_strength_factor
 from common.stage_plots import draw_stages
-from common.stage_runs import carry_out
+from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
-from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
-COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_share"]
+CAPTIONS = {
+    "stages_displacement": "The soil after each stage, by its displacement",
+    "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
+    "movements": "Largest movements after each stage", **site_slides.CAPTIONS,
+}  # fmt: skip
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -47,12 +46,9 @@ COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plasti
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "embankment.toml", metavar="FILE",
-                   help="TOML file of mesh, soils, supports and stages (default: meshes/embankment.toml)")  # fmt: skip
-    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
-    add_choice(p, "--elements", "P1", ("P1", "P2"), "linear triangles, as the particles have them, or quadratic ones")
+    add_stage_options(p, "embankment", "P1")
     add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
-    add_number(p, "--factor", 1.5, "-", "by what the strength of all soils is divided before the slide", at_least=1)
+    add_strength_factor(p)
     add_number(p, "--damping", 0.05, "-", "local damping of the slide", at_least=0, below=1)
     add_number(
         p,
@@ -105,86 +101,13 @@ def stress_difference(particles: bridge.ParticleSite, staged: bridge.FemSite) ->
 # --- 3. Failure and slide --------------------------------------------------------------------------------------------
 
 
-@dataclass
-class Slide:
-    """What came of the slide."""
-
-    model: mpm.Model
-    history: History
-    files: ModelOutput
-    frames: list[dict] = field(default_factory=list)
-
-    def look(self, report: mpm.Report) -> None:
-        """Note how far the particles have moved, and keep a frame. Collective."""
-        moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
-        self.history.add(
-            time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
-            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share,
-        )  # fmt: skip
-        self.files.write()
-        frame = particle_frame(self.model, report.time)
-        if frame is not None:
-            self.frames.append(frame)
-
-
 def weaken(site: Site, model: mpm.Model, factor: float) -> None:
     """Give all particles the laws whose strength is divided by the factor."""
     if factor > 1:
         model.assign(model.particles.material + len(site.laws) + len(site.further_laws))
 
 
-def slide(a: Namespace, site: Site, model: mpm.Model, folder: Path, interrupt: Interrupt) -> tuple[Slide, str | None]:
-    """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective."""
-    with (
-        History(folder / "history.csv", COLUMNS, comm) as history,
-        ModelOutput(model, folder / "particles", folder / "mesh") as files,
-        Progress("slide", a.time, comm) as progress,
-    ):
-        result = Slide(model, history, files)
-        result.look(model.report())
-        try:
-            for report in model.explicit(
-                model.time + a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd
-            ):
-                result.look(report)
-                progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")
-                if interrupt.requested():
-                    return result, f"interrupted at {report.time:g} s"
-        except mpm.RunError as error:
-            return result, str(error)
-    return result, None
-
-
-# --- 4. Pictures -----------------------------------------------------------------------------------------------------
-
-
-def draw(result: Slide, scene: Scene | None, folder: Path) -> None:
-    """Displacement and strain in the end, the largest displacement over time, and a film; on the first rank."""
-    if scene is None:
-        return
-    last, history = result.frames[-1], result.history
-    for name, key, quantity in (
-        ("slide_displacement", "displacement", DISPLACEMENT),
-        ("slide_strain", "shear_strain", SHEAR_STRAIN),
-    ):
-        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
-                       title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
-    save_history(folder / "largest_displacement.png", history["time_s"], {"largest": history["largest_displacement_m"]},
-                 "Largest displacement [m]", limits=(0, max(0.1, 1.05 * history["largest_displacement_m"].max())))  # fmt: skip
-    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
-    save_animation(folder / "slide", scene, film, SHEAR_STRAIN)
-
-
-CAPTIONS = {
-    "stages_displacement": "The soil after each stage, by its displacement",
-    "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
-    "movements": "Largest movements after each stage", "slide_displacement": "Displacement at the end of the slide",
-    "slide_strain": "Accumulated plastic shear strain at the end of the slide",
-    "largest_displacement": "Largest displacement of a particle during the slide",
-}  # fmt: skip
-
-
-# --- 5. All together -------------------------------------------------------------------------------------------------
+# --- 4. All together -------------------------------------------------------------------------------------------------
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -203,7 +126,7 @@ def main(arguments: list[str] | None = None) -> int:
         weaken(site, model, a.factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:
-        result, stopped = slide(a, site, model, folder, interrupt)
+        result, stopped = site_slides.slide(a, model, folder, interrupt)
     moved = result.history["largest_displacement_m"][-1]
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped, "stage_without_equilibrium_fem": failed,
@@ -214,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
         "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
         "wall_seconds": {"stages_fem": built - start, "all": perf_counter() - start},
     }  # fmt: skip
-    draw(result, scene, folder)
+    site_slides.draw_slide(result, scene, folder)
     movie = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
     write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS))
     if comm.rank == 0:

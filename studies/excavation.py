@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from common.files import OutputError
-from common.options import add_choice, add_number, add_switch, study_parser
+from common.options import add_switch, study_parser
 from common.page import Page
 from common.ranks import run_study
-from common.results import ROOT, open_results
+from common.results import open_results
 from common.site_file import Site, read_site
 from common.stage_plots import draw_stages
-from common.stage_runs import carry_out
+from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -37,10 +36,7 @@ comm = MPI.COMM_WORLD
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "excavation.toml", metavar="FILE",
-                   help="TOML file of mesh, soils, supports and stages (default: meshes/excavation.toml)")  # fmt: skip
-    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
-    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles")
+    add_stage_options(p, "excavation", "P2")
     add_switch(p, "--compare", True, "elastic soil as well, and the same ground built at once, to compare with")
     return p
 

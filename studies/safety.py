@@ -14,10 +14,12 @@ from time import perf_counter
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.files import OutputError
-from common.options import add_number, study_parser
+from common.options import add_flag, add_number, study_parser
 from common.ranks import run_study
 from common.results import open_results
+from common.site_file import Site
 from common.site_runs import add_site_option, site_study
+from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
     add_fem_slope_options,
     check_fem_slope_options,
@@ -46,6 +48,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
     add_flow_options(p)
     add_site_option(p)
+    add_flag(p, "--particles", "a second opinion by particles on the same cells, which rest or flow")
     return p
 
 
@@ -74,6 +77,41 @@ def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Coll
     return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=step_line(title))
 
 
+def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
+    """The slope's factor by particles on the finest mesh, so stiff that they settle by a hundredth of a cell. Collective."""
+    mesh = bridge.slope_mesh(comm, height=a.height, angle=a.angle, crest=a.crest, cell_size=a.cell_size, kind=a.mesh,
+                             runout=a.height)  # fmt: skip
+    background = bridge.background_mesh(*mesh)
+    stiff = Namespace(**{**vars(a), "young": max(a.young, 100 * a.unit_weight * a.height**2 / a.cell_size)})
+
+    def weakened(factor: float) -> mpm.Model:
+        model = mpm.Model(background, bridge.reduced_strength(soil_of(stiff), factor))
+        model.seed(density=a.unit_weight / GRAVITY, per_cell=3, cell_tag=bridge.SOIL)
+        bridge.apply_supports(model, SUPPORTS)
+        model.set_gravity((0.0, -GRAVITY))
+        return model
+
+    return bridge.particle_safety(weakened, start=a.start, progress=step_line("particles"))
+
+
+def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
+    """The factor of a site by particles. Collective."""
+    return bridge.particle_safety(
+        lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor)),
+        start=a.start,
+        progress=step_line("particles"),
+    )
+
+
+def particle_summary(found: bridge.ParticleSafety) -> dict[str, object]:
+    """What particles found, printed on the first rank as well."""
+    if comm.rank == 0:
+        end = f"flow at {found.failed_at:.3f}" if found.failed else f"at least: {found.reason}"
+        print(f"particles on the finest mesh: {found.value:.3f}, {end}")
+    return {"factor_of_safety_by_particles": found.value, "failed_at_factor_by_particles": found.failed_at,
+            "failure_shown_by_particles": found.failed}  # fmt: skip
+
+
 def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
     """Slip line of limit analysis with the strength divided by the factor of safety; None where the surface slides."""
     reduced = float(np.degrees(np.arctan(np.tan(np.radians(a.friction_angle)) / factor)))
@@ -100,7 +138,8 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
         return site_study(a, lambda site, model, progress: bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress),
-                          "factor_of_safety", "Factor of safety [-]")  # fmt: skip
+                          "factor_of_safety", "Factor of safety [-]",
+                          lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {})  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
     limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight)
@@ -112,6 +151,7 @@ def main(arguments: list[str] | None = None) -> int:
     curve = found.finest_curve()
     summary = {
         **found.summary(),
+        **(particle_summary(slope_by_particles(a)) if a.particles else {}),
         "curve_factor": curve[:, 0],
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,

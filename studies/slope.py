@@ -3,6 +3,7 @@
 The elasto-plastic equilibrium of the soil body under its initial unit weight is found in DOLFINx; its stresses go to the
 particles; the unit weight is raised at once, and the slope slides until its geometry has changed enough to carry it. The
 defaults are those of the paper's section 6; --paper repeats it exactly, with zero initial stress and a time step of 1e-4 s.
+With --site soils of a mesh of one's own take the place of the slope, and slide when their strength is divided by --factor.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ from common.progress import Progress, counted
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_scheme_options, check_scheme_options, run_scheme
+from common.site_runs import add_site_option
+from common.site_slides import add_strength_factor, site_slide
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import write_summary
 from common.watch import Watch
@@ -94,6 +97,8 @@ def parser() -> ArgumentParser:
     add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
                above=1)  # fmt: skip
     add_checkpoint_options(p)
+    add_site_option(p)
+    add_strength_factor(p)
     add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
     return p
 
@@ -277,6 +282,8 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
+    if a.site is not None:
+        return site_slide(a)
     clock = {"start": perf_counter()}
     folder = open_results(a, comm)
     case = build_slope(a, comm)

@@ -40,7 +40,7 @@ class ParticleSite:
         self._material = {tag: n for soil, n in materials.items() for tag in _tags(model, "cell", soil, "materials")}
         self._seeded: list[tuple[int, int, int]] = []  # first id, end of ids, soil
         model.set_gravity([0.0] * (mesh.dim - 1) + [-gravity])
-        self._support(self.state.supports)
+        apply_supports(model, self.state.supports)
 
     def carry_out(self, stage):
         """Bring the particles to equilibrium after a stage's changes. Returns a StageReport. Collective.
@@ -61,7 +61,7 @@ class ParticleSite:
         for tag in fill:
             self._fill(tag, state.unit_weight[tag], stage)
         self._weigh(state)
-        self._support(state.supports)
+        apply_supports(model, state.supports)
         self._load(state)
         self.state, self.number = state, self.number + 1
         try:
@@ -118,20 +118,6 @@ class ParticleSite:
                 mass[self.rows_of(tag)] *= state.unit_weight[tag] / self.state.unit_weight[tag]
         self.model.particles.set("mass", mass)
 
-    def _support(self, supports):
-        model, dim = self.model, self.model.mesh.dim
-        model._set_supports([])
-        for support in supports:
-            held = support.displacement or (0.0,) * dim
-            if any(held):
-                raise InputError(f"supports: {support} prescribes a displacement, expected only zeros for particles")
-            if None not in held:
-                model.fix(support.facet_tag)
-            else:
-                for axis in range(dim):
-                    if held[axis] is not None:
-                        model.roller(support.facet_tag, np.eye(dim)[axis])
-
     def _load(self, state):
         """Forces of pressures and pore water on the particles; they replace those of the stage before."""
         model = self.model
@@ -148,6 +134,26 @@ class ParticleSite:
             "smaller change, more strength or more support, or follow the failure by the explicit or implicit scheme; or "
             "Newton's method gave up: try more dilation, small_displacements, a larger tolerance, or solver=Relaxation()."
         )
+
+
+def apply_supports(model, supports):
+    """Hold the particles' nodes as supports of the finite elements do, in place of what held them before.
+
+    supports: as for `QuasiStatic`. Raises InputError for a prescribed displacement and for unknown boundaries. Collective.
+    """
+    for support in supports:
+        if any(support.displacement or ()):
+            raise InputError(f"supports: {support} prescribes a displacement, expected only zeros for particles")
+    dim = model.mesh.dim
+    model._set_supports([])
+    for support in supports:
+        held = support.displacement or (0.0,) * dim
+        if None not in held:
+            model.fix(support.facet_tag)
+        else:
+            for axis in range(dim):
+                if held[axis] is not None:
+                    model.roller(support.facet_tag, np.eye(dim)[axis])
 
 
 def stage_laws(stage, state):

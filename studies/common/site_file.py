@@ -36,7 +36,7 @@ import mpm_core as mpm
 
 from .options import add_number, study_parser
 from .parameters import ParameterError, checked_values
-from .slope_case import add_soil_options
+from .slope_case import GRAVITY, add_soil_options
 from .soils import add_law_options, law_of
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "laws", "supports", "stages", "classes")
@@ -77,6 +77,23 @@ class Site:
         mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
         laws = [*self.laws.values(), *self.further_laws, *more]
         return mpm.Model(mesh, laws), {tag: k for k, tag in enumerate(self.laws)}
+
+    def particles(self, per_cell: int, laws: dict[int, Any] | None = None, more: Sequence[Any] = ()) -> mpm.Model:
+        """A model with particles of all soils, unstressed, with weight and supports. Collective.
+
+        Args:
+            per_cell: particles in each cell.
+            laws: by cell tag, instead of the site's; more: laws beside them, last.
+        """
+        mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
+        laws = laws or self.laws
+        model, number = mpm.Model(mesh, [*laws.values(), *more]), {tag: k for k, tag in enumerate(laws)}
+        for soil, weight in self.unit_weight.items():
+            for tag in mesh.tags_of("cell", soil):
+                model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=number[tag])
+        bridge.apply_supports(model, self.supports)
+        model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])
+        return model
 
     def load(self, factor: float = 1.0) -> bridge.Load:
         """The weights of all soils times a factor."""

@@ -28,7 +28,11 @@ def add_site_option(parser: argparse.ArgumentParser) -> None:
 
 
 def site_study(
-    a: Namespace, find: Callable[[Site, bridge.QuasiStatic, Callable], bridge.Collapse], name: str, label: str
+    a: Namespace,
+    find: Callable[[Site, bridge.QuasiStatic, Callable], bridge.Collapse],
+    name: str,
+    label: str,
+    more: Callable[[Site], dict] = lambda site: {},
 ) -> int:
     """A study on a site instead of the slope; returns its exit code. Collective.
 
@@ -36,6 +40,7 @@ def site_study(
         a: options, with site, meshes and elements; each mesh is twice as fine as the one before, the last as the site says.
         find: function of the site, its elements (unloaded) and a progress that gives the last equilibrium.
         name: of the value in the summary; label: of its axis, with unit.
+        more: function of the site on the finest mesh that returns further entries of the summary.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
     folder = open_results(a, comm)
@@ -50,7 +55,7 @@ def site_study(
              "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
     _draw(folder, sizes, runs, label)
-    summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at,
+    summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
     write_summary(folder, a, summary, comm)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,20 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 
+from .options import add_choice, add_number
+from .results import ROOT
 from .site_file import Site
 from .stage_plots import StageFiles, stage_picture
+
+
+def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
+    """Options of a site that is built in stages: its file, by default one of `meshes/`, its cells and elements."""
+    parser.add_argument("--site", type=Path, default=ROOT / "meshes" / f"{site}.toml", metavar="FILE",
+                        help=f"TOML file of mesh, soils, supports and stages (default: meshes/{site}.toml)")  # fmt: skip
+    add_number(parser, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_choice(
+        parser, "--elements", elements, ("P1", "P2"), "linear triangles, as the particles have them, or quadratic ones"
+    )
 
 
 def carry_out(

@@ -25,6 +25,11 @@ Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, 1 + e, e, e}};
 Physical Curve("left") = {Curve In BoundingBox{-e, -e, -e, e, 2 + e, e}};
 Mesh.MeshSizeMax = cell_size;
 """
+WITH_AIR = """
+Rectangle(3) = {1, 0, 0, 2, 2};
+Coherence;
+Physical Surface("air") = {3};
+"""
 SITE = """
 mesh = "block.geo"
 cell_size = 0.5
@@ -100,3 +105,50 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
     (low, high), (lower, higher) = factors.values()
     assert low >= 1 and max(low, lower) <= min(high, higher) + 4e-3 * low
     assert high - low <= 4e-3 * low
+
+
+def test_particles_give_a_second_opinion(tmp_path):
+    """Linear finite elements and particles on the same cells, of a site with room to move and of a slope."""
+    path = site_in(tmp_path, SITE)
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    for options in (
+        ["--site", path],
+        ["--cell-size", 0.2, "--crest", 1, "--unit-weight", 20e3, "--no-without-dilation"],
+    ):
+        folder = tmp_path / f"{len(options)}"
+        arguments = [*options, "--elements", "P1", "--meshes", 1, "--start", 0.7, "--particles", "--output", folder]
+        assert importlib.import_module("safety").main([str(word) for word in arguments]) == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["failure_shown_by_particles"]
+        assert summary["factor_of_safety_by_particles"] == pytest.approx(summary["factor_of_safety"], rel=0.02)
+
+
+def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
+    """The upper metre, which stands free with 2 c / (gamma H) = 1, so with c = 9 kPa, has 36 kPa.
+
+    Divided by 1.2 nothing yields, and all stays where the elements had it; divided by 8 it falls, by the order of g t^2 / 2.
+    """
+    slope, path = importlib.import_module("slope"), site_in(tmp_path, SITE.replace("9e3", "36e3"))
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    moved = {}
+    for factor in (1.2, 8.0):
+        folder = tmp_path / f"{factor}"
+        options = f"--site {path} --factor {factor} --time 0.4 --frames 4 --particles-per-cell 3 --no-pictures --output {folder}"
+        assert slope.main(options.split()) == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["newly_yielded_share"] == 0
+        moved[factor] = summary["largest_displacement_m"]
+        assert (folder / "report.html").exists() and not list(folder.glob("*.png"))
+    assert moved[1.2] < 1e-6 and 0.05 < moved[8.0] < 9.81 / 2 * 0.4**2
+
+
+def test_a_site_that_does_not_carry_its_weight_does_not_slide(tmp_path):
+    path = site_in(tmp_path, SITE.replace("9e3", "1e3"))
+    with pytest.raises(
+        mpm.InputError, match=r"site.toml: its soils carry [2-6]\d.\d% of their weight only: .*mechanism"
+    ):
+        importlib.import_module("slope").main(["--site", str(path), "--output", str(tmp_path / "results")])

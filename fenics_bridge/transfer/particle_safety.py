@@ -1,0 +1,157 @@
+"""Factor of safety by particles: a second opinion on that of the finite elements.
+
+For each factor the soil, with its strength divided by it, is loaded by its weight at once and followed by the explicit scheme
+with local damping until it rests or flows, as Griffiths and Lane (1999, Geotechnique 49, 387-403) do with their viscoplastic
+iteration. No system of equations is solved, so nothing can fail to converge: what is out of balance moves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+import mpm_core as mpm
+from fenics_bridge.errors import InputError, agree
+from fenics_bridge.fem.equilibration import EquilibriumReport
+from fenics_bridge.fem.load_steps import advance
+
+FIRST_LOOK, LAST_LOOK = 6, 120
+"""Times that a shear wave takes through the body, after which it is first asked whether it flows, and when a trial ends"""
+
+GROWTH = 3.0
+"""Displacement over the elastic settlement under the weight that a body must exceed before it counts as flowing"""
+
+
+@dataclass(frozen=True)
+class ParticleSafety:
+    """The last factor at which the particles came to rest, and what is above it.
+
+    value: factor of safety; failed_at: smallest factor above it at which they did not rest
+    failed: whether they were shown to flow there, in motion that does not slow down; if not, `value` is a lower bound only
+    reason: in words; residual: largest out-of-balance over external force that counted as rest [-]
+    curve: (k, 2), factor and largest displacement of a particle [m] of every trial that came to rest
+    model: `mpm_core.Model` of the trial at `failed_at`, as it flows; steps: every LoadStep that was tried
+    """
+
+    value: float
+    failed_at: float
+    failed: bool
+    reason: str
+    residual: float
+    curve: np.ndarray
+    model: mpm.Model
+    steps: list
+
+
+def particle_safety(
+    model_of, start=0.5, first_step=0.2, tolerance=5e-3, *, damping=0.7, rest=1e-3, nmd=False, progress=None
+):
+    """Factor by which the strength of the particles can be divided before they no longer come to rest under their weight.
+
+    model_of: function of the factor that returns a new `mpm_core.Model` with its particles, supports and gravity, whose laws
+        have their strength divided by the factor, e.g. by `reduced_strength`; with initial stresses or without
+    start: factor to begin with, at which the soil must rest; first_step: of the factor; tolerance: width of the last step as a
+        fraction of the factor [-]
+    damping: local damping, in (0, 1); rest: out-of-balance over external force at which the soil counts as at rest [-]
+    nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells
+    progress: called with each LoadStep, or None
+    The particles move as far as they settle: for the factor of the undeformed body Young's moduli must be large enough for
+    settlements to be small against the cells. Strength, not stiffness, decides on the factor.
+    Returns a ParticleSafety. Raises InputError, on all ranks, for bad arguments and where the soil does not rest at `start`.
+    Collective.
+    """
+    _check(start=start, first_step=first_step, tolerance=tolerance, damping=damping, rest=rest)
+    models, curve = {}, []
+
+    def attempt(factor):
+        models[factor] = model = model_of(factor)
+        agree(model.comm, None if np.any(model.gravity) else "model_of: its model has no gravity to fail under")
+        report, moved = _follow(model, damping, rest, nmd)
+        if report.converged:
+            curve.append((factor, moved))
+            del models[factor]
+        return report
+
+    first = attempt(start)
+    if not first.converged:
+        raise InputError(
+            f"start: with the strength divided by {start!r} the particles do not rest: {first.reason}; take a smaller one"
+        )
+    steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
+    above = [step for step in steps if step.value > curve[-1][0]]
+    failures = [step for step in above if step.report.outcome == "failure"]
+    end = min(failures or above, key=lambda step: step.value)
+    return ParticleSafety(
+        value=curve[-1][0],
+        failed_at=end.value,
+        failed=end.report.outcome == "failure",
+        reason=end.report.reason,
+        residual=max([first.residuals[-1], *(step.report.residuals[-1] for step in steps if step.converged)]),
+        curve=np.array(curve),
+        model=models[end.value],
+        steps=steps,
+    )
+
+
+def _check(**values):
+    """Raises InputError for a value that is not positive, or not below 1 where that is meant."""
+    for name, value in values.items():
+        below = {"tolerance": 1.0, "damping": 1.0, "rest": 1.0}.get(name, math.inf)
+        if not 0 < value < below:
+            expected = "a positive number" if below == math.inf else "a number between 0 and 1"
+            raise InputError(f"{name}: got {value!r}, expected {expected}")
+
+
+def _follow(model, damping, rest, nmd):
+    """Runs a model until it rests or flows; returns EquilibriumReport and the largest displacement of a particle [m]."""
+    period, settlement = _scales(model)
+    residuals, moved = [1.0], [0.0]
+    steps_before = model.steps
+    for look in range(1, LAST_LOOK + 1):
+        try:
+            report = model.explicit(model.time + period, damping=damping, nmd=nmd).last()
+        except mpm.RunError as error:
+            return EquilibriumReport("undecided", residuals, str(error), model.steps - steps_before), moved[-1]
+        residuals.append(report.unbalanced_ratio)
+        moved.append(_largest_displacement(model))
+        iterations = model.steps - steps_before
+        if report.is_quasi_static(rest):
+            return EquilibriumReport("equilibrium", residuals, "", iterations), moved[-1]
+        if look >= FIRST_LOOK and moved[-1] > GROWTH * settlement and _flows(moved):
+            reason = (
+                f"the particles flow: after {model.time:.3g} s one has moved by {moved[-1]:.3g} m, ever faster, under an "
+                f"out-of-balance force of {residuals[-1]:.1e}"
+            )
+            return EquilibriumReport("failure", residuals, reason, iterations), moved[-1]
+    reason = f"the particles neither rest nor flow after {model.time:.3g} s: out of balance by {residuals[-1]:.1e}"
+    return EquilibriumReport("undecided", residuals, reason, iterations), moved[-1]
+
+
+def _flows(moved):
+    """Whether the displacements of equal times grew as much in the last quarter of them as in the one before, or more."""
+    quarter = len(moved) // 4
+    return moved[-1] - moved[-1 - quarter] >= moved[-1 - quarter] - moved[-1 - 2 * quarter]
+
+
+def _scales(model):
+    """Time that a shear wave takes through the body [s], and its elastic settlement under its weight [m]. Collective."""
+    p, comm = model.particles, model.comm
+    low = comm.allreduce(p.position.min(axis=0, initial=np.inf), MPI.MIN)
+    high = comm.allreduce(p.position.max(axis=0, initial=-np.inf), MPI.MAX)
+    density = comm.allreduce(float((p.mass / p.volume).max(initial=0.0)), MPI.MAX)
+    shear = min(law.shear_modulus for law in model.laws)
+    wave = min(law.p_wave_modulus for law in model.laws)
+    gravity = float(np.linalg.norm(model.gravity))
+    return (
+        float(np.linalg.norm(high - low)) * math.sqrt(density / shear),
+        density * gravity * (high - low)[-1] ** 2 / wave,
+    )
+
+
+def _largest_displacement(model):
+    """Of a particle [m]. Collective."""
+    lengths = np.linalg.norm(model.particles.displacement, axis=1)
+    return model.comm.allreduce(float(lengths.max(initial=0.0)), MPI.MAX)

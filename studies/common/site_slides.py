@@ -1,0 +1,159 @@
+"""How the particles of a site slide when their soils are too weak: the run by the explicit scheme, its history and pictures."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.output import ModelOutput
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+from .animation import Frame, save_animation
+from .history import History
+from .interrupt import Interrupt
+from .movie import Movie, particle_frame
+from .options import add_number
+from .page import Page
+from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_history, save_particles
+from .progress import Progress
+from .results import open_results
+from .scenes import scene_of
+from .site_file import Site, read_site
+from .summary import write_summary
+
+comm = MPI.COMM_WORLD
+COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_share"]
+CAPTIONS = {
+    "slide_displacement": "Displacement at the end of the slide",
+    "slide_strain": "Accumulated plastic shear strain at the end of the slide",
+    "largest_displacement": "Largest displacement of a particle during the slide",
+}
+
+
+def add_strength_factor(parser: ArgumentParser) -> None:
+    """Option ``--factor``."""
+    add_number(
+        parser,
+        "--factor",
+        1.5,
+        "-",
+        "by what the strength of all soils of a site is divided before the slide",
+        at_least=1,
+    )
+
+
+@dataclass
+class Slide:
+    """What came of the slide."""
+
+    model: mpm.Model
+    history: History
+    files: ModelOutput
+    frames: list[dict] = field(default_factory=list)
+
+    def look(self, report: mpm.Report) -> None:
+        """Note how far the particles have moved, and keep a frame. Collective."""
+        moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
+        self.history.add(
+            time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
+            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share,
+        )  # fmt: skip
+        self.files.write()
+        frame = particle_frame(self.model, report.time)
+        if frame is not None:
+            self.frames.append(frame)
+
+
+def slide(a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt) -> tuple[Slide, str | None]:
+    """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective.
+
+    Args:
+        a: options with time, frames, damping, pic and nmd.
+    """
+    with (
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        ModelOutput(model, folder / "particles", folder / "mesh") as files,
+        Progress("slide", a.time, comm) as progress,
+    ):
+        result = Slide(model, history, files)
+        result.look(model.report())
+        try:
+            for report in model.explicit(
+                model.time + a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd
+            ):
+                result.look(report)
+                progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")
+                if interrupt.requested():
+                    return result, f"interrupted at {report.time:g} s"
+        except mpm.RunError as error:
+            return result, str(error)
+    return result, None
+
+
+def draw_slide(result: Slide, scene: Scene | None, folder: Path, film: bool = True) -> None:
+    """Displacement and strain in the end, the largest displacement over time, and a film if asked for; on the first rank."""
+    if scene is None:
+        return
+    last, history = result.frames[-1], result.history
+    for name, key, quantity in (
+        ("slide_displacement", "displacement", DISPLACEMENT),
+        ("slide_strain", "shear_strain", SHEAR_STRAIN),
+    ):
+        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+                       title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
+    save_history(folder / "largest_displacement.png", history["time_s"], {"largest": history["largest_displacement_m"]},
+                 "Largest displacement [m]", limits=(0, max(0.1, 1.05 * history["largest_displacement_m"].max())))  # fmt: skip
+    if film:
+        frames = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
+        save_animation(folder / "slide", scene, frames, SHEAR_STRAIN)
+
+
+def site_slide(a: Namespace) -> int:
+    """A site in elasto-plastic equilibrium under its weight, whose soils then lose strength and slide; returns its exit code.
+
+    Finite elements on the particles' own cells find the equilibrium, particles take it over, and the strength of all soils is
+    divided by the factor. Stages of the site are left out: all its soils are there at once. Collective.
+
+    Args:
+        a: options with site, factor, particles_per_cell and those of `slide`.
+    """
+    start = perf_counter()
+    folder = open_results(a, comm)
+    site = read_site(a.site, comm)
+    fem = site.finite_elements(1, solver=bridge.Solver(tolerance=1e-10))
+    steps = fem.solve(site.load())
+    if not fem.converged:
+        reason = next(step.report.reason for step in reversed(steps) if not step.converged)
+        carried = max((step.value for step in steps if step.converged), default=0.0)
+        raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
+    weaker = [bridge.reduced_strength(law, a.factor) for law in site.laws.values()]
+    model = site.particles(a.particles_per_cell, more=weaker)
+    handover = bridge.initialise(model, fem, count_displacement=False)
+    model.assign(model.particles.material + len(site.laws))
+    with Interrupt(comm) as interrupt:
+        result, stopped = slide(a, model, folder, interrupt)
+    moved = result.history["largest_displacement_m"][-1]
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped, "factor": a.factor,
+        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_share": handover.yielded_share,
+        "largest_displacement_m": moved, "particles": comm.allreduce(len(model.particles)),
+        "wall_seconds": perf_counter() - start,
+    }  # fmt: skip
+    scene = scene_of(model, sorted(site.laws))
+    if a.pictures:
+        draw_slide(result, scene, folder, a.film)
+    movies = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
+    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS))
+    if comm.rank == 0:
+        print(f"strength divided by {a.factor:g}: largest displacement {moved:.3f} m after "
+              f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip
+        if stopped:
+            print(f"the run ended early: {stopped}", file=sys.stderr)
+    return interrupt.exit_code or (1 if stopped else 0)

@@ -1,0 +1,68 @@
+"""Factor of safety by particles that rest or flow, against linear finite elements on the same cells."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+UNIT_WEIGHT, GRAVITY = 20e3, 9.81
+SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+MESH = bridge.slope_mesh(MPI.COMM_WORLD, crest=1.0, cell_size=0.2)
+
+
+def soil(friction_angle=25.0, dilation_angle=0.0, cohesion=1e3):
+    return mpm.MohrCoulomb(
+        young=20e6, poisson=0.33, cohesion=cohesion, friction_angle=friction_angle, dilation_angle=dilation_angle
+    )
+
+
+def particles(law, gravity=GRAVITY):
+    """Function of the factor that returns the slope's particles, unstressed."""
+    mesh = bridge.background_mesh(*MESH)
+
+    def model_of(factor):
+        model = mpm.Model(mesh, bridge.reduced_strength(law, factor))
+        model.seed(density=UNIT_WEIGHT / GRAVITY, per_cell=3, cell_tag=bridge.SOIL)
+        bridge.apply_supports(model, SUPPORTS)
+        model.set_gravity((0.0, -gravity))
+        return model
+
+    return model_of
+
+
+@pytest.mark.parametrize(
+    ("friction_angle", "dilation_angle", "cohesion"), [(25.0, 0.0, 1e3), (25.0, 25.0, 1e3), (0.0, 0.0, 4e3)]
+)
+def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilation_angle, cohesion):
+    """On the same linear cells, whose particles hardly move: the brackets, at most 1 % wide, overlap within 1 %."""
+    law = soil(friction_angle, dilation_angle, cohesion)
+    body, _, facet_tags = bridge.soil_mesh(*MESH)
+    model = bridge.QuasiStatic(body, law, facet_tags, SUPPORTS, degree=1)
+    elements = bridge.factor_of_safety(model, bridge.Load(unit_weight=UNIT_WEIGHT), first_step=0.2)
+    found = bridge.particle_safety(particles(law), start=0.7)
+    assert elements.failed and found.failed and found.residual <= 1e-3
+    assert found.value <= 1.01 * elements.failed_at and elements.value <= 1.01 * found.failed_at
+    assert found.failed_at - found.value <= 2 * 5e-3 * found.value
+    assert len(found.curve) >= 3 and found.curve[-1, 0] == found.value
+    moving = found.model.particles
+    assert np.linalg.norm(moving.velocity, axis=1).max() > 0
+
+
+def test_the_factor_is_that_of_the_strength():
+    """Twice the cohesion of soil without friction, twice the factor."""
+    weak, strong = (bridge.particle_safety(particles(soil(0.0, 0.0, c)), start=f) for c, f in ((4e3, 0.7), (8e3, 1.4)))
+    assert strong.value == pytest.approx(2 * weak.value, rel=0.01)
+
+
+def test_wrong_arguments_are_named():
+    with pytest.raises(
+        bridge.InputError, match="start: with the strength divided by 3.0 the particles do not rest: .*flow"
+    ):
+        bridge.particle_safety(particles(soil()), start=3.0)
+    with pytest.raises(bridge.InputError, match="model_of: its model has no gravity"):
+        bridge.particle_safety(particles(soil(), gravity=0.0))
+    for name, value in (("start", 0.0), ("first_step", -1.0), ("tolerance", 1.0), ("damping", 1.0), ("rest", 0.0)):
+        with pytest.raises(bridge.InputError, match=f"{name}: got {value!r}, expected"):
+            bridge.particle_safety(particles(soil()), **{name: value})
