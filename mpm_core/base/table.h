@@ -12,5 +12,6 @@ struct Table
   std::string name;
   int width = 1;
   std::vector<double> values;
+  double most_count = 0; ///< where above 0, the numbers are counts: whole numbers from 0 to this one
 };
 } // namespace mpm

@@ -272,6 +272,8 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
       throw RunError("cannot read /particles/cell in " + path.string() + ": " + error.what());
     }
   }
+  check_positions<D>(file, mesh, particles);
+  file.check();
   checkpoint.state = expected;
   const RowSlice rows = checkpoint.same_parts ? RowSlice{exchange.rank, 1, ranks} : RowSlice{0, ranks, ranks};
   for (Table& table : checkpoint.state.ranks)

@@ -7,6 +7,7 @@
 #include "io/hdf5_input.h"
 #include "parallel/migration.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -17,6 +18,9 @@ namespace mpm
 inline constexpr double most_exact = 9007199254740992.0;
 /// No total comes near it, and a whole number of 64 bits holds it.
 inline constexpr double most_total = 9e18;
+
+/// Of the height of a cell, how far outside of it a particle may lie; far more than the search for cells allows.
+inline constexpr double most_outside = 1e-6;
 
 /// This rank's rows of an array of which each rank of the file wrote some, on as many ranks as now.
 /// @param array  any of those that have these rows
@@ -83,13 +87,34 @@ void check_cells(Hdf5Input& file, const Mesh<D>& mesh, const Table& table)
   }
 }
 
+/// Refuses particles that are not in their cells, but for round-off.
+template <int D>
+void check_positions(Hdf5Input& file, const Mesh<D>& mesh, const Particles<D>& particles)
+{
+  for (std::size_t p = 0; p < particles.cell.size(); ++p)
+  {
+    const Index cell = particles.cell[p];
+    const Vector<D> position = at<D>(particles.position, static_cast<Index>(p));
+    const auto n = shape_functions<D>(mesh.shapes[cell], position);
+    if (*std::min_element(n.begin(), n.end()) >= -most_outside)
+      continue;
+    std::string place;
+    for (double x : position)
+      place += (place.empty() ? "(" : ", ") + std::to_string(x);
+    return file.reject("/particles/position", "it has the place " + place + "), which is not in that particle's cell " +
+                                                  std::to_string(mesh.global_cells[cell]));
+  }
+}
+
 /// Refuses totals that no run writes.
 inline void check_totals(Hdf5Input& file, const Table& table, std::size_t rows)
 {
   if (table.values.size() != rows * static_cast<std::size_t>(table.width))
     return file.reject("/ranks/" + table.name, "it is too short");
+  const double most = std::min(table.most_count, most_exact);
+  const auto is_count = [most](double value) { return value >= 0 && value <= most && value == std::floor(value); };
   for (double value : table.values)
-    if (!(std::abs(value) < most_total))
+    if (table.most_count > 0 ? !is_count(value) : !(std::abs(value) < most_total))
       return file.reject("/ranks/" + table.name, "it has the value " + std::to_string(value));
 }
 

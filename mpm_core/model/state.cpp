@@ -3,6 +3,7 @@
 #include "model/mapping.h"
 
 #include <cstring>
+#include <limits>
 
 namespace mpm
 {
@@ -86,8 +87,11 @@ std::vector<Table> rank_state(const Model<D>& model)
 {
   std::vector<Table> tables;
   for_each_number(model,
-                  [&](const char* name, Kind, const auto& number) {
-                    tables.push_back({name, 1, {static_cast<double>(number)}});
+                  [&](const char* name, Kind, const auto& number)
+                  {
+                    using Limits = std::numeric_limits<std::remove_cvref_t<decltype(number)>>;
+                    const double most_count = Limits::is_integer ? static_cast<double>(Limits::max()) : 0.0;
+                    tables.push_back({name, 1, {static_cast<double>(number)}, most_count});
                   });
   return tables;
 }

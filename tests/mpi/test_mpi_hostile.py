@@ -30,6 +30,17 @@ def placed(name, row, value):
     return change
 
 
+def swapped(name):
+    """The first and the last row change places."""
+
+    def change(file):
+        rows = file[name][()]
+        rows[[0, -1]] = rows[[-1, 0]]
+        file[name][...] = rows
+
+    return change
+
+
 def described(**entries):
     def change(file):
         text = json.loads(file.attrs["description"])
@@ -82,6 +93,16 @@ HOSTILE = {
     "too many rows": (placed("ranks/rows_of_particles", 0, 2**60), "/ranks/rows_of_particles"),
     "a cell of sums": (placed("cells/moments", (0, 0), 1e9), "/cells/moments in .* cell 1000000000"),
     "a sum": (placed("cells/moments", (0, 1), np.inf), "/cells/moments in .* inf"),
+    "steps that overflow": (placed("ranks/steps", 0, 8e18), "/ranks/steps in .* value 8000"),
+    "steps below zero": (placed("ranks/steps", 0, -1.0), "/ranks/steps in .* -1.0"),
+    "half a step": (placed("ranks/steps", 0, 1.5), "/ranks/steps in .* 1.5"),
+    "a count beyond its type": (placed("ranks/strays", 0, 2.0**31), "/ranks/strays in .* 2147483648"),
+    "a place far off": (
+        placed("particles/position", 4, 1e3),
+        "/particles/position in .* place .1000.* not in that particle's cell",
+    ),
+    "a place in another cell": (swapped("particles/position"), "/particles/position in .* not in that particle's cell"),
+    "cells of others": (swapped("particles/cell"), "/particles/position in .* not in that particle's cell"),
     "total": (placed("ranks/steps", 0, np.nan), "/ranks/steps in .* nan"),
     "a field that is missing": (without("particles/stress"), "/particles/stress"),
 }
