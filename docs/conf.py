@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import mpm_core
+from mpm_core.particles import field_table
 
 project = "Talus"
 author = copyright = "The Talus developers"
@@ -42,6 +43,14 @@ def readable(app, what, name, obj, options, lines):
         lines[:] = [f"| {line}" if line.strip() else "" for line in lines]
 
 
+def with_field_tables(app, name, source):
+    """Tables of fields are made from the schedules that the code follows."""
+    for words, core in (("plane", mpm_core._core.Model2), ("space", mpm_core._core.Model3)):
+        for what in ("particle", "nodal"):
+            schedule = core.default_particle_schedule() if what == "particle" else core.nodal_schedule()
+            source[0] = source[0].replace(f"TABLE_OF_{what}_fields_{words}".upper(), field_table(schedule))
+
+
 def copy_mathjax(app, error):
     if MATHJAX.is_dir() and app.builder.name == "html" and not error:
         parts = shutil.ignore_patterns(
@@ -51,6 +60,7 @@ def copy_mathjax(app, error):
 
 
 def setup(app):
+    app.connect("source-read", with_field_tables)
     app.connect("build-finished", copy_mathjax)
     # Before napoleon, which makes markup of its own.
     app.connect("autodoc-process-docstring", readable, priority=400)

@@ -20,72 +20,40 @@ namespace
 /// Of the table that says which cells each rank owns.
 constexpr char owned_cells_name[] = "owned_cells";
 
-/// The columns of one real field.
-template <class C>
-struct Field
-{
-  std::string name;
-  std::vector<C*> columns;
-};
-
-/// The fields of real numbers, from the one list of columns.
-template <class P>
-auto real_fields(P& particles)
-{
-  using C = std::remove_reference_t<decltype((particles.mass))>;
-  std::vector<Field<C>> fields;
-  for_each_column(particles,
-                  [&](const char* name, int component, auto& column)
-                  {
-                    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
-                    {
-                      if (component == 0)
-                        fields.push_back({name, {}});
-                      fields.back().columns.push_back(&column);
-                    }
-                  });
-  return fields;
-}
-
-/// Calls f(name, column) for the fields of whole numbers.
-template <class P, class F>
-void for_each_integer_field(P& particles, F&& f)
-{
-  for_each_column(particles,
-                  [&](const char* name, int, auto& column)
-                  {
-                    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
-                      f(std::string(name), column);
-                  });
-}
+/// Whether the columns of a field hold real numbers.
+template <class Columns>
+inline constexpr bool is_real =
+    std::is_same_v<typename decltype(columns_of(std::declval<Columns&>()))::value_type, Column>;
 
 template <int D>
 void write_particles(Hdf5File& file, const Mesh<D>& mesh, const Particles<D>& particles)
 {
   const RowSlice rows = row_slice(file.comm(), particles.id.size());
-  int loaded = particles.loaded;
-  MPI_Allreduce(MPI_IN_PLACE, &loaded, 1, MPI_INT, MPI_MAX, file.comm());
   const auto n = particles.id.size();
-  for (const auto& field : real_fields(particles))
+  const auto write_field = [&](const Field& field, const auto& columns)
   {
-    if (field.name == "traction" && !loaded)
-      continue;
-    const std::size_t width = field.columns.size();
-    std::vector<double> values(n * width, 0.0);
-    for (std::size_t k = 0; k < width; ++k)
-      for (std::size_t p = 0; p < field.columns[k]->size(); ++p)
-        values[p * width + k] = (*field.columns[k])[p];
-    file.write<double>("/particles/" + field.name, rows, static_cast<int>(width), values);
-  }
-  for_each_integer_field(particles,
-                         [&](const std::string& name, const auto& column)
-                         {
-                           std::vector<std::int64_t> values(column.begin(), column.end());
-                           if (name == "cell")
-                             for (auto& value : values)
-                               value = mesh.global_cells[static_cast<std::size_t>(value)];
-                           file.write<std::int64_t>("/particles/" + name, rows, 1, values);
-                         });
+    if (!is_present(columns))
+      return;
+    const auto all = columns_of(columns);
+    const std::string name = "/particles/" + std::string(field.name);
+    if constexpr (is_real<const std::remove_cvref_t<decltype(columns)>>)
+    {
+      std::vector<double> values(n * all.size());
+      for (std::size_t k = 0; k < all.size(); ++k)
+        for (std::size_t p = 0; p < n; ++p)
+          values[p * all.size() + k] = all[k][p];
+      file.write<double>(name, rows, static_cast<int>(all.size()), values);
+    }
+    else
+    {
+      std::vector<std::int64_t> values(all[0].begin(), all[0].end());
+      if (field.name == "cell")
+        for (auto& value : values)
+          value = mesh.global_cells[static_cast<std::size_t>(value)];
+      file.write<std::int64_t>(name, rows, 1, values);
+    }
+  };
+  for_each_field(particles, write_field);
 }
 
 void write_tables(Hdf5File& file, std::size_t particles, const StateTables& state)
@@ -123,43 +91,57 @@ std::string put_in_place(const std::filesystem::path& aside, const std::filesyst
   return failure;
 }
 
+/// A field of real numbers.
+template <class Columns>
+void read_real(Hdf5Input& file, const Field& field, const RowSlice& rows, Columns& columns)
+{
+  const auto all = columns_of(columns);
+  const std::string name(field.name), array = "/particles/" + name;
+  const auto n = static_cast<std::size_t>(rows.local);
+  if constexpr (is_optional<Columns>)
+  {
+    if (!file.has(array))
+      return;
+    require(columns, n, field.initial);
+  }
+  if (all.empty())
+    return;
+  auto values = file.read<double>(array, rows, static_cast<int>(all.size()));
+  values.resize(n * all.size());
+  check_values(file, name, values);
+  for (std::size_t k = 0; k < all.size(); ++k)
+    for (std::size_t p = 0; p < n; ++p)
+      all[k][p] = values[p * all.size() + k];
+}
+
 /// The rows of particles, and the numbers of their cells over all ranks.
 template <int D>
 std::vector<GlobalIndex> read_particles(Hdf5Input& file, const RowSlice& rows, std::size_t materials,
                                         Particles<D>& particles)
 {
-  file.read<std::int64_t>("/particles/id", rows, 1); // so many rows are there, before there is room for them
+  file.read<std::int64_t>("/particles/id", rows, 1); // so many rows are there, before memory is taken for them
   file.check();
   resize(particles, static_cast<Index>(rows.local));
-  if (file.has("/particles/traction"))
-    require_traction(particles);
-  for (auto& field : real_fields(particles))
-  {
-    if (!file.has("/particles/" + field.name) && (field.name == "traction" || field.name == "state"))
-      continue;
-    const std::size_t width = field.columns.size();
-    auto values = file.read<double>("/particles/" + field.name, rows, static_cast<int>(width));
-    values.resize(static_cast<std::size_t>(rows.local) * width);
-    check_values(file, field.name, values);
-    for (std::size_t k = 0; k < width; ++k)
-      for (std::size_t p = 0; p < field.columns[k]->size(); ++p)
-        (*field.columns[k])[p] = values[p * width + k];
-  }
   std::vector<GlobalIndex> cells;
-  for_each_integer_field(particles,
-                         [&](const std::string& name, auto& column)
-                         {
-                           auto values = file.read<std::int64_t>("/particles/" + name, rows, 1);
-                           values.resize(static_cast<std::size_t>(rows.local));
-                           if (name == "material")
-                             check_materials(file, values, materials);
-                           if (name == "cell")
-                             cells = values;
-                           else
-                             std::transform(values.begin(), values.end(), column.begin(),
-                                            [](std::int64_t value)
-                                            { return static_cast<std::remove_cvref_t<decltype(column[0])>>(value); });
-                         });
+  const auto read_field = [&](const Field& field, auto& columns)
+  {
+    if constexpr (is_real<std::remove_cvref_t<decltype(columns)>>)
+      read_real(file, field, rows, columns);
+    else
+    {
+      auto values = file.read<std::int64_t>("/particles/" + std::string(field.name), rows, 1);
+      values.resize(static_cast<std::size_t>(rows.local));
+      if (field.name == "material")
+        check_materials(file, values, materials);
+      if (field.name == "cell")
+        cells = values;
+      else
+        std::ranges::transform(values, columns.begin(),
+                               [](std::int64_t value)
+                               { return static_cast<std::remove_cvref_t<decltype(columns[0])>>(value); });
+    }
+  };
+  for_each_field(particles, read_field);
   return cells;
 }
 
@@ -240,14 +222,14 @@ std::vector<GlobalIndex> checkpoint_cells(MPI_Comm comm, const std::filesystem::
 
 template <int D>
 Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
-                              std::size_t state_columns, std::size_t materials, const StateTables& expected)
+                              const Particles<D>& fields, std::size_t materials, const StateTables& expected)
 {
   Hdf5Input file(exchange.comm, path);
   const GlobalIndex ranks = countable_rows(file, "/ranks/rows_of_particles");
   const GlobalIndex total = countable_rows(file, "/particles/id");
   Checkpoint<D> checkpoint;
   Particles<D>& particles = checkpoint.particles;
-  particles.state.resize(state_columns);
+  particles = empty_like(fields);
   checkpoint.same_parts = false;
   if (ranks == exchange.size)
   {
@@ -258,8 +240,7 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
   }
   if (!checkpoint.same_parts)
   {
-    particles = {};
-    particles.state.resize(state_columns);
+    particles = empty_like(fields);
     const GlobalIndex first = total * exchange.rank / exchange.size, last = total * (exchange.rank + 1) / exchange.size;
     const auto cells = read_particles(file, {first, last - first, total}, materials, particles);
     file.check();
@@ -327,7 +308,7 @@ std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh)
   template void write_checkpoint(MPI_Comm, const std::filesystem::path&, const Mesh<D>&, const Particles<D>&,          \
                                  const StateTables&, const std::string&);                                              \
   template Checkpoint<D> read_checkpoint(const NodeExchange&, const std::filesystem::path&, const Mesh<D>&,            \
-                                         std::size_t, std::size_t, const StateTables&);                                \
+                                         const Particles<D>&, std::size_t, const StateTables&);                        \
   template Table owned_cells_table(const Mesh<D>&);                                                                    \
   template std::uint64_t mesh_fingerprint(MPI_Comm, const Mesh<D>&);
 INSTANTIATE(2)

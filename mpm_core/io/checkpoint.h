@@ -2,10 +2,10 @@
 /// @file
 /// The complete state of a run in one parallel HDF5 file.
 ///
-/// Layout: `particles/NAME` has a row per particle for each field of the one list, `cell` by its number over all ranks;
-/// `cells/NAME` are tables with some rows per rank; `ranks/NAME` have one row per rank, among them the numbers of rows
-/// of the others; the attribute `description` is a text that says what the run is. Rows are by rising rank. The first
-/// 512 bytes are the file's stamp.
+/// Layout: `particles/NAME` has a row per particle for each field of the one schedule, `cell` by its number over all
+/// ranks; `cells/NAME` are tables with some rows per rank; `ranks/NAME` have one row per rank, among them the numbers
+/// of rows of the others; the attribute `description` is a text that says what the run is. Rows are by rising rank. The
+/// first 512 bytes are the file's stamp.
 
 #include "base/table.h"
 #include "parallel/node_exchange.h"
@@ -24,6 +24,7 @@ struct StateTables
 
 /// Writes a checkpoint aside, sees to it that it is whole and on the disk, then renames it; whatever was there stays
 /// until then.
+/// @pre agree_on_fields(particles) has been called
 /// @throws RunError on all ranks, with path and reason; nothing is left behind
 /// @note Collective
 template <int D>
@@ -57,14 +58,14 @@ struct Checkpoint
 };
 
 /// Reads a checkpoint of this mesh, each rank the particles in its cells.
-/// @param state_columns  number of state variables
-/// @param materials      number of laws
-/// @param expected       names and widths of the tables to read; those of cells may be missing in the file
+/// @param fields     particles with the fields that the file's are to have, state variables included
+/// @param materials  number of laws
+/// @param expected   names and widths of the tables to read; those of cells may be missing in the file
 /// @throws RunError on all ranks, with path and reason
 /// @note Collective
 template <int D>
 Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesystem::path& path, const Mesh<D>& mesh,
-                              std::size_t state_columns, std::size_t materials, const StateTables& expected);
+                              const Particles<D>& fields, std::size_t materials, const StateTables& expected);
 
 /// A number that depends on all nodes, cells and tags of a mesh, and not on its partition.
 /// @note Collective

@@ -12,7 +12,7 @@ OutputField real_field(const Particles<D>& particles, const std::string& name)
 {
   OutputField field{name, particles.id.size(), {}};
   for_each_column(particles,
-                  [&](const char* of, int, const auto& column)
+                  [&](std::string_view of, int, const auto& column)
                   {
                     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
                       if (name == of)
@@ -41,7 +41,7 @@ bool add_index_field(const Particles<D>& particles, const std::string& name, std
 {
   const std::size_t before = fields.size();
   for_each_column(particles,
-                  [&](const char* of, int, const auto& column)
+                  [&](std::string_view of, int, const auto& column)
                   {
                     if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
                       if (name == of)
@@ -62,8 +62,12 @@ ParticleFields particle_fields(const Particles<D>& particles, const std::vector<
     all.fields.push_back(named_field(particles, name));
     if (all.fields.back().columns.empty())
       throw InputError("particle field is '" + name + "', which does not exist");
-    if (name == "traction" && !particles.loaded)
-      throw InputError("particle field is 'traction', but no particle carries one");
+    for_each_field(particles,
+                   [&](const Field& field, const auto& columns)
+                   {
+                     if (field.name == name && !is_present(columns))
+                       throw InputError("particle field is '" + name + "', but no particle carries one");
+                   });
   }
   return all;
 }

@@ -14,7 +14,7 @@ template <int D>
 void check_particles(const Particles<D>& particles)
 {
   for_each_column(particles,
-                  [&](const char* name, int, const auto& column)
+                  [&](std::string_view name, int, const auto& column)
                   {
                     for (std::size_t p = 0; p < column.size(); ++p)
                       if (!std::isfinite(static_cast<double>(column[p])))
@@ -114,11 +114,8 @@ void prepare(Model<D>& model)
 
   sort_particles(model);
   work.moments.assign(cells, CellMoments<D>{});
-  // A rank without particles must still agree with the others on what is exchanged.
-  int loaded = model.particles.loaded;
-  MPI_Allreduce(MPI_IN_PLACE, &loaded, 1, MPI_INT, MPI_MAX, model.exchange.comm);
-  if (loaded)
-    require_traction(model.particles);
+  agree_on_fields(model.particles, model.exchange.comm);
+  const bool loaded = model.particles.traction.present;
   work.tractions.assign(loaded ? cells : 0, TractionMoments<D>{});
   for (const Run& run : work.runs)
   {

@@ -9,8 +9,8 @@ namespace
 {
 using Bytes = std::vector<std::byte>;
 
-/// Appends a particle's columns in the order of the list of fields, and ahead of them its cell by its global number. An
-/// optional column that is not there goes as zero.
+/// Appends a particle's columns in the order of the schedule, and ahead of them its cell by its global number. The
+/// initial value stands for an optional column that is absent.
 template <int D>
 void pack(const Particles<D>& particles, const Leaver& leaver, Bytes& bytes)
 {
@@ -20,11 +20,16 @@ void pack(const Particles<D>& particles, const Leaver& leaver, Bytes& bytes)
     bytes.insert(bytes.end(), data, data + sizeof(value));
   };
   put(leaver.cell);
-  for_each_column(particles, [&](const char*, int, const auto& column)
-                  { put(column.empty() ? std::remove_cvref_t<decltype(column[0])>{} : column[leaver.particle]); });
+  for_each_field(particles,
+                 [&](const Field& field, const auto& columns)
+                 {
+                   for (const auto& column : columns_of(columns))
+                     put(is_present(columns) ? column[leaver.particle]
+                                             : static_cast<std::remove_cvref_t<decltype(column[0])>>(field.initial));
+                 });
 }
 
-/// Appends the particles that a message holds; tractions among them are made room for.
+/// Appends the particles that a message holds, and the columns of optional fields that one of them has a value in.
 template <int D>
 void unpack(const Bytes& bytes, const std::unordered_map<GlobalIndex, Index>& cell_numbers, Particles<D>& particles)
 {
@@ -40,16 +45,22 @@ void unpack(const Bytes& bytes, const std::unordered_map<GlobalIndex, Index>& ce
     resize(particles, p + 1);
     GlobalIndex cell;
     get(cell);
-    for_each_column(particles,
-                    [&](const char*, int, auto& column)
-                    {
-                      std::remove_cvref_t<decltype(column[0])> value;
-                      get(value);
-                      if (column.empty() && value != 0)
-                        require_traction(particles);
-                      if (!column.empty())
-                        column[p] = value;
-                    });
+    const auto get_entry = [&](const Field& field, auto& columns)
+    {
+      for (auto& column : columns_of(columns))
+      {
+        std::remove_cvref_t<decltype(column[0])> value;
+        get(value);
+        if constexpr (is_optional<std::remove_cvref_t<decltype(columns)>>)
+        {
+          if (!columns.present && value == field.initial)
+            continue;
+          require(columns, particles.id.size(), field.initial);
+        }
+        column[p] = value;
+      }
+    };
+    for_each_field(particles, get_entry);
     particles.cell[p] = cell_numbers.at(cell);
   }
 }
@@ -65,6 +76,22 @@ std::vector<int> partners_of(const NodeExchange& exchange, std::span<const int> 
   return ranks;
 }
 } // namespace
+
+template <int D>
+void agree_on_fields(Particles<D>& particles, MPI_Comm comm)
+{
+  for_each_field(particles,
+                 [&](const Field& field, auto& columns)
+                 {
+                   if constexpr (is_optional<std::remove_cvref_t<decltype(columns)>>)
+                   {
+                     int present = columns.present;
+                     MPI_Allreduce(MPI_IN_PLACE, &present, 1, MPI_INT, MPI_MAX, comm);
+                     if (present)
+                       require(columns, particles.id.size(), field.initial);
+                   }
+                 });
+}
 
 template <int D>
 std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh)
@@ -113,6 +140,7 @@ Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const 
 }
 
 #define INSTANTIATE(D)                                                                                                 \
+  template void agree_on_fields(Particles<D>&, MPI_Comm);                                                              \
   template std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>&);                                  \
   template Index migrate(const std::unordered_map<GlobalIndex, Index>&, const NodeExchange&, const Departures&,        \
                          Particles<D>&);

@@ -26,6 +26,11 @@ struct Departures
   std::span<const int> far_partners;
 };
 
+/// Makes the columns of each optional field that some rank has.
+/// @note Collective
+template <int D>
+void agree_on_fields(Particles<D>& particles, MPI_Comm comm);
+
 /// Local number of each owned cell, by its global number.
 template <int D>
 std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh);

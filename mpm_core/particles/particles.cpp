@@ -1,42 +1,67 @@
 #include "particles/particles.h"
 
 #include <algorithm>
-#include <string_view>
+#include <cctype>
 #include <tuple>
+#include <utility>
 
 namespace mpm
 {
 template <int D>
-void resize(Particles<D>& particles, Index size)
+void add_field(Particles<D>& particles, AddedField field, int components)
 {
-  const auto n = static_cast<std::size_t>(size);
-  for_each_column(particles,
-                  [n, &particles](const char* name, int, auto& column)
-                  {
-                    const bool missing = std::string_view(name) == "traction" && !particles.loaded;
-                    column.resize(missing ? 0 : n);
-                  });
+  const bool is_word =
+      !field.name.empty() && std::ranges::all_of(field.name, [](char c) { return std::isalnum(c) || c == '_'; });
+  if (!is_word)
+    throw InputError("name of the field is '" + field.name + "', expected letters, digits and _");
+  if (components < 1)
+    throw InputError("components of the field " + field.name + " are " + std::to_string(components) +
+                     ", expected 1 or more");
+  for_each_field(particles,
+                 [&](const Field& known, const auto&)
+                 {
+                   if (known.name == field.name)
+                     throw InputError("name of the field is '" + field.name + "', which another field has");
+                 });
+  field.columns.assign(static_cast<std::size_t>(components), Column(particles.id.size(), field.initial));
+  particles.added.push_back(std::move(field));
 }
 
 template <int D>
-void require_traction(Particles<D>& particles)
+Particles<D> empty_like(const Particles<D>& particles)
 {
-  particles.loaded = true;
-  for (auto& column : particles.traction)
-    column.resize(particles.id.size(), 0.0);
+  Particles<D> empty;
+  empty.state.resize(particles.state.size());
+  for (const AddedField& field : particles.added)
+    empty.added.push_back(
+        {field.name, field.unit, field.meaning, field.initial, std::vector<Column>(field.columns.size())});
+  return empty;
+}
+
+template <int D>
+void resize(Particles<D>& particles, Index size)
+{
+  for_each_field(particles,
+                 [n = static_cast<std::size_t>(size)](const Field& field, auto& columns)
+                 {
+                   if (!is_present(columns))
+                     return;
+                   for (auto& column : columns_of(columns))
+                     column.resize(n, static_cast<std::remove_cvref_t<decltype(column[0])>>(field.initial));
+                 });
 }
 
 template <int D>
 void reorder(Particles<D>& particles, std::span<const Index> order)
 {
-  // One column of each type makes room for the next: memory that is new costs more than the copies.
-  std::tuple<Column, std::vector<Index>, std::vector<GlobalIndex>> rooms;
+  // One column of each type is the scratch of the next: memory that is new costs more than the copies.
+  std::tuple<Column, std::vector<Index>, std::vector<GlobalIndex>> scratch;
   for_each_column(particles,
-                  [order, &rooms](const char*, int, auto& column)
+                  [order, &scratch](std::string_view, int, auto& column)
                   {
                     if (column.empty())
                       return;
-                    auto& sorted = std::get<std::remove_reference_t<decltype(column)>>(rooms);
+                    auto& sorted = std::get<std::remove_reference_t<decltype(column)>>(scratch);
                     sorted.resize(column.size());
                     for (std::size_t p = 0; p < sorted.size(); ++p)
                       sorted[p] = column[static_cast<std::size_t>(order[p])];
@@ -74,7 +99,7 @@ void remove(Particles<D>& particles, std::span<const Index> numbers)
     --last;
     const auto hole = static_cast<std::size_t>(numbers[k]);
     for_each_column(particles,
-                    [hole, last](const char*, int, auto& column)
+                    [hole, last](std::string_view, int, auto& column)
                     {
                       if (!column.empty())
                         column[hole] = column[last];
@@ -137,14 +162,15 @@ template <int D>
 double bytes_per_particle(const Particles<D>& particles)
 {
   double bytes = 0;
-  for_each_column(particles, [&bytes](const char*, int, const auto& column)
+  for_each_column(particles, [&bytes](std::string_view, int, const auto& column)
                   { bytes += static_cast<double>(column.size() * sizeof(column[0])); });
   return particles.size() == 0 ? 0 : bytes / particles.size();
 }
 
 #define INSTANTIATE(D)                                                                                                 \
   template void resize(Particles<D>&, Index);                                                                          \
-  template void require_traction(Particles<D>&);                                                                       \
+  template void add_field(Particles<D>&, AddedField, int);                                                             \
+  template Particles<D> empty_like(const Particles<D>&);                                                               \
   template void reorder(Particles<D>&, std::span<const Index>);                                                        \
   template void sort_by_cell(Particles<D>&, Index, Index);                                                             \
   template void remove(Particles<D>&, std::span<const Index>);                                                         \

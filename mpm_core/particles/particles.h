@@ -1,8 +1,8 @@
 #pragma once
 /// @file
-/// Particles as a structure of arrays, and the one list of their fields.
+/// Particles as a structure of arrays, and the one schedule of their fields.
 
-#include "base/types.h"
+#include "particles/field.h"
 
 #include <span>
 
@@ -19,59 +19,88 @@ struct Run
   bool scattered = false;     ///< whether some of its particles are in another cell by now
 };
 
-/// All columns have one entry per particle, but for `traction`, which is empty unless `loaded`.
+/// All columns have one entry per particle; those of optional fields may be absent.
 template <int D>
 struct Particles
 {
-  std::vector<GlobalIndex> id;            ///< unique over all ranks, never changes
-  std::array<Column, D> position;         ///< [m]
-  std::array<Column, D> velocity;         ///< [m/s]
-  std::array<Column, n_stress<D>> stress; ///< Cauchy stress [Pa]
-  Column volume;                          ///< [m^D]; per metre of thickness in plane strain
-  Column mass;                            ///< [kg], [kg/m] in plane strain
-  Column deviatoric_strain;               ///< accumulated deviatoric strain, sum of sqrt(2/3 de : de)
-  std::vector<Column> state; ///< state variables of the law; 0 is the accumulated plastic deviatoric strain
-  std::array<Column, D> initial_position; ///< [m]; displacement is position minus this
-  bool loaded = false;                    ///< whether there are tractions; a rank without particles must know it too
-  std::array<Column, D> traction;         ///< force from a loaded boundary, t_p of (15) [N], moves with the particle
-  std::vector<Index> material;            ///< number of the law
-  std::vector<Index> cell;                ///< cell on this rank that holds the particle
+  std::vector<GlobalIndex> id;
+  std::array<Column, D> position;
+  std::array<Column, D> velocity;
+  std::array<Column, n_stress<D>> stress;
+  Column volume;
+  Column mass;
+  Column deviatoric_strain;
+  std::vector<Column> state;
+  std::array<Column, D> initial_position;
+  OptionalColumns<D> traction;
+  std::vector<Index> material;
+  std::vector<Index> cell;
+  std::vector<AddedField> added; ///< fields that the run has declared for itself
 
   Index size() const { return static_cast<Index>(id.size()); }
 };
 
-/// The one list of fields: calls f(name, component, column) for every column. Sorting, migration, checkpoints and
-/// output iterate this list, so a field that is added here is everywhere.
-/// @note A column of an optional field may be empty.
+/// The one schedule of fields: calls f(field, columns) for every field. Sorting, migration, checkpoints, files, Python
+/// and its documentation follow it, so a field that is entered here, beside its columns above, is everywhere.
+template <class P, class F>
+void for_each_field(P& particles, F&& f)
+{
+  constexpr bool settable = true;
+  f(Field{"id", "-", "Number, unique over all ranks, which never changes"}, particles.id);
+  f(Field{"position", "m", "Position"}, particles.position);
+  f(Field{"velocity", "m/s", "Velocity", settable}, particles.velocity);
+  f(Field{"stress", "Pa", "Cauchy stress, tension positive", settable}, particles.stress);
+  f(Field{"volume", "m^D", "Volume, per metre of thickness in plane strain", settable}, particles.volume);
+  f(Field{"mass", "kg", "Mass, per metre of thickness in plane strain", settable}, particles.mass);
+  f(Field{"deviatoric_strain", "-", "Accumulated deviatoric strain, sum of sqrt(2/3 de : de)", settable},
+    particles.deviatoric_strain);
+  f(Field{"state", "as the law says",
+          "State variables of the law; the first is the accumulated plastic deviatoric strain", settable},
+    particles.state);
+  f(Field{"initial_position", "m", "Position from which displacement counts", settable}, particles.initial_position);
+  f(Field{"traction", "N", "Force from a loaded boundary, t_p of (15), which moves with the particle", settable},
+    particles.traction);
+  f(Field{"material", "-", "Number of the law"}, particles.material);
+  f(Field{"cell", "-", "Number of the cell on this rank that holds the particle"}, particles.cell);
+  for (auto& added : particles.added)
+    f(added.field(), added.columns);
+}
+
+/// Calls f(name, component, column) for every column of every field.
+/// @note The columns of an optional field may be empty.
 template <class P, class F>
 void for_each_column(P& particles, F&& f)
 {
-  auto components = [&f](const char* name, auto& columns)
-  {
-    for (std::size_t i = 0; i < columns.size(); ++i)
-      f(name, static_cast<int>(i), columns[i]);
-  };
-  f("id", 0, particles.id);
-  components("position", particles.position);
-  components("velocity", particles.velocity);
-  components("stress", particles.stress);
-  f("volume", 0, particles.volume);
-  f("mass", 0, particles.mass);
-  f("deviatoric_strain", 0, particles.deviatoric_strain);
-  components("state", particles.state);
-  components("initial_position", particles.initial_position);
-  components("traction", particles.traction);
-  f("material", 0, particles.material);
-  f("cell", 0, particles.cell);
+  for_each_field(particles,
+                 [&f](const Field& field, auto& columns)
+                 {
+                   int component = 0;
+                   for (auto& column : columns_of(columns))
+                     f(field.name, component++, column);
+                 });
 }
 
-/// Changes the number of particles; new ones are zero. Optional columns stay empty where they are.
+/// Declares a field of the run's own, with its initial value in all particles there are.
+/// @throws InputError a name that another field has, or that is no word; no components
+template <int D>
+void add_field(Particles<D>& particles, AddedField field, int components);
+
+/// Particles with the same fields, and none of them there.
+template <int D>
+Particles<D> empty_like(const Particles<D>& particles);
+
+/// Changes the number of particles; new ones have the initial values. Optional fields that are absent stay so.
 template <int D>
 void resize(Particles<D>& particles, Index size);
 
-/// Makes the optional traction columns, zero, where they are not there yet.
-template <int D>
-void require_traction(Particles<D>& particles);
+/// Makes the columns of an optional field, with its initial value, where they are not there yet.
+template <std::size_t N>
+void require(OptionalColumns<N>& field, std::size_t size, double initial = 0)
+{
+  field.present = true;
+  for (Column& column : field.columns)
+    column.resize(size, initial);
+}
 
 template <int D>
 inline Vector<D> at(const std::array<Column, D>& columns, Index p)

@@ -188,7 +188,8 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
 template <int D>
 double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& traction, Particles<D>& particles)
 {
-  require_traction(particles); // on ranks without such facets, too, so that all have the same columns
+  require(particles.traction,
+          particles.id.size()); // on ranks without such facets, too, so that all have the same columns
   std::vector<std::vector<Index>> of_cell(static_cast<std::size_t>(mesh.owned_cells));
   for (Index p = 0; p < particles.size(); ++p)
     of_cell[static_cast<std::size_t>(particles.cell[p])].push_back(p);

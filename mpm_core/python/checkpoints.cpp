@@ -25,7 +25,7 @@ void restore(Model<D>& model, const std::string& path)
 {
   const StateTables expected{rank_state(model), empty_cell_state<D>()};
   Checkpoint<D> checkpoint =
-      read_checkpoint<D>(model.exchange, path, model.mesh, model.particles.state.size(), model.laws.size(), expected);
+      read_checkpoint<D>(model.exchange, path, model.mesh, model.particles, model.laws.size(), expected);
   if (checkpoint.same_parts)
     restore_same(model, std::move(checkpoint.particles), checkpoint.state.ranks, checkpoint.state.cells);
   else

@@ -75,7 +75,8 @@ ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector
       [&]
       {
         particle_fields<D>(model.particles, names.particles);
-        std::ranges::for_each(names.nodes, require_nodal_field);
+        for (const std::string& name : names.nodes)
+          require_nodal_field(model, name);
       });
   std::string text;
   for (const std::string& name : names.particles)

@@ -185,6 +185,22 @@ void bind_model(py::module_& m, const std::string& suffix)
              prepare(model);
              return as_dict(diagnostics(model));
            })
+      .def("add_field",
+           [](M& model, const std::string& name, const std::string& unit, const std::string& meaning, int components,
+              double initial) {
+             add_field(model.particles, {name, unit, meaning, initial, {}}, components);
+           })
+      .def("particle_schedule", [](const M& model) { return particle_schedule(model.particles); })
+      .def_static("default_particle_schedule", [] { return particle_schedule(Particles<D>{}); })
+      .def_static("nodal_schedule",
+                  []
+                  {
+                    py::list entries;
+                    for_each_nodal_field(M{},
+                                         [&](const Field& field, const double*, std::size_t components, std::size_t)
+                                         { entries.append(described(field, components, false)); });
+                    return entries;
+                  })
       .def("column", &column<D>)
       .def("single_precision", &single_precision<D>)
       .def("row_numbers", &row_numbers<D>)

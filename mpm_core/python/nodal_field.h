@@ -7,47 +7,60 @@
 
 namespace mpm::python
 {
-/// The first value, or any where there is none.
-template <class Values>
-const auto& first_of(const Values& values)
+/// The one schedule of nodal fields: calls f(field, first value of a node, components, bytes from node to node).
+template <int D, class F>
+void for_each_nodal_field(const Model<D>& model, F&& f)
 {
-  static const typename Values::value_type none{};
-  return values.empty() ? none : values[0];
+  static const Vector<D> no_vector{};
+  static const NodeSums<D> no_sums{};
+  const auto& work = model.work;
+  const auto first = [](const auto& values, const auto& none) -> const auto&
+  {
+    return values.empty() ? none : values[0];
+  };
+  const NodeSums<D>& sums = first(work.nodes, no_sums);
+  f(Field{"velocity", "m/s", "Velocity v_i that moves and strains the particles"},
+    first(work.velocity, no_vector).data(), D, sizeof(Vector<D>));
+  f(Field{"acceleration", "m/s2", "Acceleration a_i"}, first(work.acceleration, no_vector).data(), D,
+    sizeof(Vector<D>));
+  f(Field{"internal_force", "N", "f_int,i of (14), per metre of thickness in plane strain"}, sums.internal.data(), D,
+    sizeof(NodeSums<D>));
+  f(Field{"mass", "kg", "Lumped mass m_i of (11), per metre of thickness in plane strain"}, &sums.mass, 1,
+    sizeof(NodeSums<D>));
 }
 
 /// @throws InputError for a name that no nodal field has
-inline void require_nodal_field(const std::string& name)
+template <int D>
+void require_nodal_field(const Model<D>& model, const std::string& name)
 {
-  for (const char* known : {"velocity", "acceleration", "internal_force", "mass"})
-    if (name == known)
-      return;
-  throw InputError("nodal field is '" + name + "', expected velocity, acceleration, internal_force or mass");
+  bool exists = false;
+  std::string known;
+  for_each_nodal_field(model,
+                       [&](const Field& field, auto...)
+                       {
+                         exists = exists || field.name == name;
+                         known += (known.empty() ? "" : ", ") + std::string(field.name);
+                       });
+  if (!exists)
+    throw InputError("nodal field is '" + name + "', expected " + known);
 }
 
 /// A nodal field of the last step, where it is.
-/// @throws InputError for another name than those above, and before the first step
+/// @throws InputError for a name that no nodal field has, and before the first step
 template <int D>
 OutputField nodal_field(const Model<D>& model, const std::string& name)
 {
-  require_nodal_field(name);
-  const auto& work = model.work;
-  if (!work.ready)
+  require_nodal_field(model, name);
+  if (!model.work.ready)
     throw InputError("nodal values of '" + name + "' are there only after a step or a report");
-  OutputField field{name, work.nodes.size(), {}};
-  const auto add = [&](const auto& first, std::size_t components, std::size_t bytes_apart)
-  {
-    for (std::size_t k = 0; k < components; ++k)
-      field.columns.push_back({&first + k, bytes_apart / sizeof(double)});
-  };
-  static_assert(sizeof(NodeSums<D>) % sizeof(double) == 0);
-  if (name == "velocity")
-    add(first_of(work.velocity)[0], D, sizeof(Vector<D>));
-  else if (name == "acceleration")
-    add(first_of(work.acceleration)[0], D, sizeof(Vector<D>));
-  else if (name == "internal_force")
-    add(first_of(work.nodes).internal[0], D, sizeof(NodeSums<D>));
-  else
-    add(first_of(work.nodes).mass, 1, sizeof(NodeSums<D>));
-  return field;
+  OutputField found{name, model.work.nodes.size(), {}};
+  for_each_nodal_field(model,
+                       [&](const Field& field, const double* first, std::size_t components, std::size_t bytes_apart)
+                       {
+                         if (field.name == name)
+                           for (std::size_t k = 0; k < components; ++k)
+                             found.columns.push_back({first + k, bytes_apart / sizeof(double)});
+                       });
+  return found;
 }
 } // namespace mpm::python

@@ -103,17 +103,40 @@ py::array_t<double> rows(const C& columns, std::size_t size, const ChosenRows& c
   return array;
 }
 
-template <class C>
-void set_rows(const char* name, const py::array& array, C& columns, std::size_t size)
+/// Columns from rows of numbers.
+inline void set_rows(std::span<const double> in, std::span<Column> columns)
 {
-  check_array<double>(name, array, {static_cast<py::ssize_t>(size), static_cast<py::ssize_t>(columns.size())});
-  const double* in = values<double>(array).data();
   for (std::size_t k = 0; k < columns.size(); ++k)
-  {
-    columns[k].resize(size);
-    for (std::size_t p = 0; p < size; ++p)
+    for (std::size_t p = 0; p < columns[k].size(); ++p)
       columns[k][p] = in[p * columns.size() + k];
-  }
+}
+
+/// Calls f(field, columns) for the field of that name.
+/// @returns whether there is one
+template <class P, class F>
+bool with_field(P& particles, const std::string& name, F&& f)
+{
+  bool found = false;
+  for_each_field(particles,
+                 [&](const Field& field, auto& columns)
+                 {
+                   if (field.name != name)
+                     return;
+                   found = true;
+                   f(field, columns);
+                 });
+  return found;
+}
+
+/// Whether a field is one number for each particle, shape (n,), and not several, (n, k). State variables are rows,
+/// however many there are.
+template <class Columns>
+bool is_scalar(const Field& field, const Columns& columns)
+{
+  if constexpr (std::is_same_v<Columns, std::vector<Column>>)
+    return columns.size() == 1 && field.name != "state";
+  else
+    return std::is_same_v<std::remove_cvref_t<decltype(columns_of(columns)[0])>, Columns>;
 }
 
 /// A copy of a field, of all particles or of the chosen ones.
@@ -121,35 +144,22 @@ void set_rows(const char* name, const py::array& array, C& columns, std::size_t 
 template <int D>
 py::object column(const Model<D>& model, const std::string& name, const ChosenRows& chosen)
 {
-  const Particles<D>& p = model.particles;
-  const std::size_t n = p.id.size();
+  const Particles<D>& particles = model.particles;
+  const std::size_t n = particles.id.size();
   if (chosen)
     require_rows(*chosen, n);
-  if (name == "id")
-    return chosen_of(p.id, chosen);
-  if (name == "material")
-    return chosen_of(p.material, chosen);
-  if (name == "cell")
-    return chosen_of(p.cell, chosen);
-  if (name == "volume")
-    return chosen_of(p.volume, chosen);
-  if (name == "mass")
-    return chosen_of(p.mass, chosen);
-  if (name == "deviatoric_strain")
-    return chosen_of(p.deviatoric_strain, chosen);
-  if (name == "position")
-    return rows(p.position, n, chosen);
-  if (name == "velocity")
-    return rows(p.velocity, n, chosen);
-  if (name == "stress")
-    return rows(p.stress, n, chosen);
-  if (name == "initial_position")
-    return rows(p.initial_position, n, chosen);
-  if (name == "traction")
-    return p.loaded ? rows(p.traction, n, chosen) : rows(p.traction, 0, {});
-  if (name == "state")
-    return rows(p.state, n, chosen);
-  throw InputError("particle field is '" + name + "', which does not exist");
+  py::object copy;
+  const auto copy_field = [&](const Field& field, const auto& columns)
+  {
+    const auto all = columns_of(columns);
+    if (is_scalar(field, columns))
+      copy = chosen_of(all[0], chosen);
+    else if constexpr (std::is_same_v<const Column&, decltype(all[0])>)
+      copy = is_present(columns) ? rows(all, n, chosen) : rows(all, 0, {});
+  };
+  if (!with_field(particles, name, copy_field))
+    throw InputError("particle field is '" + name + "', which does not exist");
+  return copy;
 }
 
 /// Copies of fields by name, real ones in single precision; the position is always there.
@@ -177,35 +187,53 @@ py::dict single_precision(const Model<D>& model, const std::vector<std::string>&
 template <int D>
 void set_column(Model<D>& model, const std::string& name, const py::array& array)
 {
-  Particles<D>& p = model.particles;
-  const std::size_t n = p.id.size();
-  auto scalar = [&](Column& column)
+  Particles<D>& particles = model.particles;
+  const std::size_t n = particles.id.size();
+  bool is_set = false;
+  const auto set_field = [&](const Field& field, auto& columns)
   {
-    check_array<double>(name.c_str(), array, {static_cast<py::ssize_t>(n)});
-    const auto in = values<double>(array);
-    column.assign(in.begin(), in.end());
+    using Columns = std::remove_cvref_t<decltype(columns)>;
+    if constexpr (std::is_same_v<typename decltype(columns_of(columns))::value_type, Column>)
+    {
+      if (!field.settable)
+        return;
+      const bool is_one = is_scalar(field, columns);
+      if (is_one)
+        check_array<double>(name.c_str(), array, {static_cast<py::ssize_t>(n)});
+      else
+        check_array<double>(name.c_str(), array,
+                            {static_cast<py::ssize_t>(n), static_cast<py::ssize_t>(columns_of(columns).size())});
+      if constexpr (is_optional<Columns>)
+        require(columns, n, field.initial);
+      set_rows(values<double>(array), columns_of(columns));
+      is_set = true;
+    }
   };
-  if (name == "volume")
-    scalar(p.volume);
-  else if (name == "mass")
-    scalar(p.mass);
-  else if (name == "deviatoric_strain")
-    scalar(p.deviatoric_strain);
-  else if (name == "velocity")
-    set_rows(name.c_str(), array, p.velocity, n);
-  else if (name == "stress")
-    set_rows(name.c_str(), array, p.stress, n);
-  else if (name == "initial_position")
-    set_rows(name.c_str(), array, p.initial_position, n);
-  else if (name == "traction")
-  {
-    set_rows(name.c_str(), array, p.traction, n);
-    p.loaded = true;
-  }
-  else if (name == "state")
-    set_rows(name.c_str(), array, p.state, n);
-  else
+  with_field(particles, name, set_field);
+  if (!is_set)
     throw InputError("particle field is '" + name + "', which cannot be set");
   model.work.ready = false;
+}
+
+/// An entry of a schedule of fields, for Python.
+inline py::dict described(const Field& field, std::size_t components, bool optional)
+{
+  using namespace py::literals;
+  return py::dict("name"_a = field.name, "unit"_a = field.unit, "meaning"_a = field.meaning,
+                  "components"_a = components, "initial"_a = field.initial, "optional"_a = optional,
+                  "settable"_a = field.settable);
+}
+
+/// The schedule of a model's particle fields.
+template <int D>
+py::list particle_schedule(const Particles<D>& particles)
+{
+  py::list entries;
+  for_each_field(particles,
+                 [&](const Field& field, const auto& columns) {
+                   entries.append(described(field, columns_of(columns).size(),
+                                            is_optional<std::remove_cvref_t<decltype(columns)>>));
+                 });
+  return entries;
 }
 } // namespace mpm::python

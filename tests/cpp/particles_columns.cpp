@@ -16,11 +16,12 @@ Particles<D> marked(Index size, Index n_cells, Index n_materials)
 {
   Particles<D> particles;
   particles.state.resize(3);
+  add_field(particles, {"shear_strength", "Pa", "Of undrained soil", 5e3, {}}, 2);
   resize(particles, size);
-  require_traction(particles);
+  require(particles.traction, particles.id.size());
   double column_number = 0;
   for_each_column(particles,
-                  [&](const char*, int, auto& column)
+                  [&](std::string_view, int, auto& column)
                   {
                     ++column_number;
                     for (std::size_t p = 0; p < column.size(); ++p)
@@ -42,7 +43,7 @@ bool rows_are_kept(Particles<D> before, Particles<D> now)
 {
   std::vector<std::vector<double>> old_columns, new_columns;
   auto copy_to = [](auto& list)
-  { return [&list](const char*, int, const auto& column) { list.emplace_back(column.begin(), column.end()); }; };
+  { return [&list](std::string_view, int, const auto& column) { list.emplace_back(column.begin(), column.end()); }; };
   for_each_column(before, copy_to(old_columns));
   for_each_column(now, copy_to(new_columns));
   for (std::size_t k = 0; k < new_columns.size(); ++k)
@@ -64,13 +65,13 @@ TYPED_TEST_SUITE(ParticlesTest, Dimensions);
 
 TYPED_TEST(ParticlesTest, EveryColumnIsOnTheList)
 {
-  // The struct holds nothing but columns and one flag, so its size counts them; the list visits each once (state has
-  // none here).
+  // The struct holds nothing but columns, one flag and the list of added fields, so its size counts them; the schedule
+  // visits each column once (state and added fields have none here).
   constexpr int D = TypeParam::value;
   Particles<D> particles;
   std::set<const void*> visited;
-  for_each_column(particles, [&](const char*, int, auto& column) { visited.insert(&column); });
-  EXPECT_EQ((visited.size() + 1) * sizeof(Column) + alignof(Column), sizeof(Particles<D>));
+  for_each_column(particles, [&](std::string_view, int, auto& column) { visited.insert(&column); });
+  EXPECT_EQ((visited.size() + 2) * sizeof(Column) + alignof(Column), sizeof(Particles<D>));
 }
 
 TYPED_TEST(ParticlesTest, SortingKeepsEveryRowWhole)
@@ -91,16 +92,29 @@ TYPED_TEST(ParticlesTest, SortingLeavesOptionalColumnsEmpty)
 {
   constexpr int D = TypeParam::value;
   Particles<D> particles = marked<D>(50, 5, 1);
-  particles.loaded = false;
-  for (auto& column : particles.traction)
-    column.clear();
+  particles.traction = {};
   sort_by_cell(particles, 5, 1);
   resize(particles, 60);
-  for (const auto& column : particles.traction)
+  for (const auto& column : particles.traction.columns)
     EXPECT_TRUE(column.empty());
-  require_traction(particles);
-  for (const auto& column : particles.traction)
+  require(particles.traction, particles.id.size());
+  for (const auto& column : particles.traction.columns)
     EXPECT_EQ(column, Column(60, 0.0));
+}
+
+TYPED_TEST(ParticlesTest, AddedFieldsBeginWithTheirInitialValue)
+{
+  constexpr int D = TypeParam::value;
+  Particles<D> particles;
+  resize(particles, 3);
+  add_field(particles, {"strength", "Pa", "", 7.0, {}}, 1);
+  resize(particles, 5);
+  EXPECT_EQ(particles.added[0].columns[0], Column(5, 7.0));
+  EXPECT_EQ(empty_like(particles).added[0].columns.size(), 1);
+  EXPECT_EQ(empty_like(particles).size(), 0);
+  for (const char* name : {"strength", "volume", "", "a b"})
+    EXPECT_THROW(add_field(particles, {name, "", "", 0, {}}, 1), InputError);
+  EXPECT_THROW(add_field(particles, {"other", "", "", 0, {}}, 0), InputError);
 }
 
 TYPED_TEST(ParticlesTest, RemovingKeepsTheOthersWhole)
@@ -167,8 +181,8 @@ TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
 
 TYPED_TEST(ParticlesTest, BytesPerParticleCountTheColumns)
 {
-  // 8 bytes: id, 3 D (position, velocity, initial position) + D (traction), stress, volume, mass, strain, 3 states; 4:
-  // two
+  // 8 bytes: id, 3 D (position, velocity, initial position) + D (traction), stress, volume, mass, strain, 3 states, 2
+  // of the added field; 4: two
   constexpr int D = TypeParam::value;
-  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (1 + 4 * D + n_stress<D> + 3 + 3) + 2 * 4);
+  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (1 + 4 * D + n_stress<D> + 3 + 3 + 2) + 2 * 4);
 }

@@ -18,7 +18,7 @@ Particles<D> random_particles(const Mesh<D>& mesh, Index size)
   std::uniform_real_distribution<double> unit(0, 1);
   Particles<D> particles;
   resize(particles, size);
-  require_traction(particles);
+  require(particles.traction, particles.id.size());
   for (Index p = 0; p < size; ++p)
   {
     particles.id[p] = p;

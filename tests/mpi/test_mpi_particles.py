@@ -161,3 +161,14 @@ def test_points_are_seeded_whoever_owns_their_cells(comm):
     np.testing.assert_array_equal(all_by_id(model, ("position",))["position"], points)
     with pytest.raises(mpm.InputError, match=r"points has \[5\.  0\.1\] at row 1"):
         model.seed_points([[0.5, 0.1], [5.0, 0.1]], [1e-3, 1e-3], density=1000.0)
+
+
+def test_an_added_field_follows_its_particles_to_other_ranks(comm):
+    model = block(comm, [40.0, 0.0])
+    model.add_field("origin", unit="m", meaning="Position at the start", components=2)
+    model.particles.set("origin", model.particles.initial_position)
+    *_, report = model.explicit(0.08)
+    particles = model.particles
+    np.testing.assert_array_equal(particles.origin, particles.initial_position)
+    assert len(particles) == 0 or particles.displacement[:, 0].min() > 3.0  # across all ranks
+    assert report.particles == comm.allreduce(len(particles)) > 0

@@ -161,6 +161,36 @@ class Body:
             raise InputError(f"facet_tag {facet_tag!r} has no filled cell behind it to carry the traction")
         return area
 
+    def add_field(self, name: str, *, unit: str, meaning: str, components: int = 1, initial: float = 0.0) -> None:
+        """Declare a field of the particles of your own, which from now on is an attribute of ``particles``.
+
+        It is sorted, sent to other ranks, saved in checkpoints and offered to output as all fields are.
+
+        Args:
+            name: letters, digits and ``_``; no other field may have it.
+            unit: such as "Pa"; "-" without dimension.
+            meaning: a sentence.
+            components: numbers per particle.
+            initial: value of all particles there are, and of those to come.
+
+        Raises:
+            InputError: a name that is taken or no word, no components, an initial value that is not finite.
+
+        Example:
+            >>> model.add_field("first_yield", unit="s", meaning="Time at which the particle yielded first", initial=-1.0)
+            >>> model.particles.set("first_yield", np.where(model.particles.plastic_strain > 0, model.time, -1.0))
+        """
+
+        def add() -> None:
+            value = float(floats("initial", initial, ()))
+            if hasattr(self.particles, name) or name.startswith("_"):
+                raise InputError(f"name of the field is {name!r}, which an attribute of the particles has")
+            if isinstance(components, bool) or not isinstance(components, (int, np.integer)):
+                raise InputError(f"components is {components!r}, expected a whole number")
+            self._core.add_field(name, str(unit), str(meaning), int(components), value)
+
+        collectively(self.comm, add)
+
     def state(self, name: str) -> NDArray[np.float64]:
         """A state variable by its name in ``state_names`` of the laws, such as "excess_pore_pressure".
 

@@ -59,6 +59,9 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
             raise RunError(f"cannot read /cells/owned_cells in {name}: it has not each cell of the mesh once")
         partition.take_partition(model, cells)
         model.cuts = there["cuts"]
+    for field in there.get("added_fields", []):
+        if field["name"] not in {known["name"] for known in model.particles.schedule()}:
+            model.add_field(**field)
     _core.restore(model._core, name)
     _take(model, there)
 
@@ -95,10 +98,18 @@ def _description(model: Model) -> dict[str, Any]:
         "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
         "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
         "next_id": model._next_id,
+        "added_fields": _added_fields(model),
         "cuts": model.cuts,
         "left_imbalance": model._left_imbalance,
         "implicit": None if model._control is None else vars(model._control),
     }
+
+
+def _added_fields(model: Model) -> list[dict[str, Any]]:
+    """The fields of particles that the model has declared beside those of every model."""
+    own = {field["name"] for field in type(model._core).default_particle_schedule()}
+    keys = ("name", "unit", "meaning", "components", "initial")
+    return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
 
 
 def _material(law: Any) -> str:

@@ -65,6 +65,17 @@ def _is_support(value: Any) -> bool:
     )
 
 
+def _is_field(value: Any) -> bool:
+    return (
+        isinstance(value, dict)
+        and set(value) == {"name", "unit", "meaning", "components", "initial"}
+        and all(isinstance(value[key], str) for key in ("name", "unit", "meaning"))
+        and _is_count(value["components"])
+        and 0 < value["components"] < 1000
+        and _is_number(value["initial"])
+    )
+
+
 def _is_control(value: Any) -> bool:
     if value is None:
         return True
@@ -75,7 +86,7 @@ def _is_control(value: Any) -> bool:
     )
 
 
-_OPTIONAL = ("cuts", "left_imbalance", "implicit", "notes")
+_OPTIONAL = ("added_fields", "cuts", "left_imbalance", "implicit", "notes")
 _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),
@@ -89,6 +100,7 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "supports": (lambda v: _are(_is_support, v), "a list of [tag, whole, vector]"),
     "prescribed": (lambda v: isinstance(v, dict), "a table"),
     "next_id": (_is_count, "a whole number from 0 on"),
+    "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
     "implicit": (_is_control, "null, or the state of an implicit run"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _core
 from ._core import InputError
 from .mesh import floats
 
@@ -57,74 +58,31 @@ class Particles:
         return values
 
     @property
-    def id(self) -> NDArray[np.int64]:
-        """Number of each particle, unique over all ranks; shape (n,)."""
-        return self._column("id")
-
-    @property
-    def position(self) -> NDArray[np.float64]:
-        """Position [m], shape (n, D)."""
-        return self._column("position")
-
-    @property
-    def initial_position(self) -> NDArray[np.float64]:
-        """Position from which displacement counts [m], shape (n, D)."""
-        return self._column("initial_position")
-
-    @property
     def displacement(self) -> NDArray[np.float64]:
         """Position minus initial position [m], shape (n, D)."""
         return self.position - self.initial_position
-
-    @property
-    def velocity(self) -> NDArray[np.float64]:
-        """Velocity [m/s], shape (n, D)."""
-        return self._column("velocity")
-
-    @property
-    def stress(self) -> NDArray[np.float64]:
-        """Cauchy stress [Pa], tension positive, shape (n, 4) or (n, 6)."""
-        return self._column("stress")
-
-    @property
-    def volume(self) -> NDArray[np.float64]:
-        """Volume [m^D], shape (n,)."""
-        return self._column("volume")
-
-    @property
-    def mass(self) -> NDArray[np.float64]:
-        """Mass [kg], per metre of thickness in plane strain; shape (n,)."""
-        return self._column("mass")
-
-    @property
-    def deviatoric_strain(self) -> NDArray[np.float64]:
-        """Accumulated deviatoric strain, sum of sqrt(2/3 de : de) [-], shape (n,)."""
-        return self._column("deviatoric_strain")
-
-    @property
-    def state(self) -> NDArray[np.float64]:
-        """State variables of the law, shape (n, n_state)."""
-        return self._column("state")
 
     @property
     def plastic_strain(self) -> NDArray[np.float64]:
         """Accumulated plastic deviatoric strain, the first state variable of every law [-], shape (n,)."""
         return self.state[:, 0]
 
-    @property
-    def traction(self) -> NDArray[np.float64]:
-        """Force from a loaded boundary that each particle carries [N], shape (n, D); (0, D) where none does."""
-        return self._column("traction")
+    def schedule(self) -> list[dict[str, Any]]:
+        """What fields there are, those that `Model.add_field` declared included: ``name``, ``unit``, ``meaning``, number of
+        ``components``, ``initial`` value, whether it is ``optional`` and whether it is ``settable``."""
+        return self._core.particle_schedule()
 
-    @property
-    def material(self) -> NDArray[np.int32]:
-        """Number of each particle's law, shape (n,)."""
-        return self._column("material")
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """A field that the model has declared."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._column(name)
+        except InputError as error:
+            raise AttributeError(str(error)) from None
 
-    @property
-    def cell(self) -> NDArray[np.int32]:
-        """Number of the cell on this rank that holds each particle, shape (n,)."""
-        return self._column("cell")
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(field["name"] for field in self.schedule())})
 
     def single(self, *names: str) -> dict[str, NDArray[Any]]:
         """Copies of fields of all particles in single precision, such as frames that are kept in memory; sooner than one by one.
@@ -139,7 +97,7 @@ class Particles:
         return self._core.single_precision(names)
 
     def set(self, name: str, values: ArrayLike) -> None:
-        """Overwrite a field: velocity, stress, volume, mass, deviatoric_strain, state, initial_position or traction.
+        """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.
 
         Args:
             name: the field.
@@ -151,3 +109,39 @@ class Particles:
         self._require_all("set")
         shape: tuple[int | None, ...] = tuple(None for _ in np.shape(values))
         self._core.set_column(name, floats(name, values, shape))
+
+
+def field_text(field: dict[str, Any], shape: str) -> str:
+    """A field of the schedule in a sentence: meaning, unit, shape."""
+    optional = "; no rows as long as no particle has one" if field["optional"] else ""
+    return f"{field['meaning']} [{field['unit']}], shape {shape}{optional}."
+
+
+def field_table(schedule: list[dict[str, Any]]) -> str:
+    """A schedule of fields as a table in Markdown."""
+    rows = [
+        f"| `{field['name']}` | {field['unit']} | {field['components'] or 'as the law says'} | {field['meaning']}"
+        f"{' (optional)' if field['optional'] else ''} | {'yes' if field['settable'] else 'no'} |"
+        for field in schedule
+    ]
+    return "\n".join(["| field | unit | components | meaning | can be set |", "| --- | --- | --- | --- | --- |", *rows])
+
+
+def _add_properties() -> None:
+    """An attribute of `Particles` for each field of the schedule, with what the schedule says of it."""
+
+    def getter(name: str) -> Callable[[Particles], NDArray[Any]]:
+        return lambda particles: particles._column(name)
+
+    plane, solid = (core.default_particle_schedule() for core in (_core.Model2, _core.Model3))
+    for field, in_space in zip(plane, solid, strict=True):
+        shapes = {1: "(n,)", 2: "(n, D)", 4: "(n, 4) or (n, 6)", 0: "(n, number of state variables)"}
+        assert in_space["name"] == field["name"]
+        setattr(
+            Particles,
+            field["name"],
+            property(getter(field["name"]), doc=field_text(field, shapes[field["components"]])),
+        )
+
+
+_add_properties()
