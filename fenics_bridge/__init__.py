@@ -19,6 +19,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, reduced_strength
 from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller
+from fenics_bridge.forms import redirect_compiler_lines
 from fenics_bridge.mesh.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.mesh.box_mesh import BODY, box_mesh
 from fenics_bridge.mesh.graded import graded_tags
@@ -44,3 +45,5 @@ __all__ = [
     "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]
 # fmt: on
+
+redirect_compiler_lines()

@@ -104,15 +104,16 @@ def main(arguments: list[str] | None = None) -> int:
         "largest_difference_m": difference(first, anew),
         "wall_seconds": {name: run.seconds for name, run in runs.items()},
     }
-    page = None
+    page, pictures = None, {}
     if scene is not None:
-        save_history(folder / "imbalance.png", np.array(first.time), {name: run.imbalance for name, run in runs.items()},
-                     "Most particles on a rank over their mean [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
+        pictures["imbalance"] = lambda: save_history(
+            folder / "imbalance.png", np.array(first.time), {name: run.imbalance for name, run in runs.items()},
+            "Most particles on a rank over their mean [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
         page = Page(movies=[Movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
                     captions={"imbalance": "Most particles on a rank over their mean"})  # fmt: skip
         print(f"most particles on a rank over their mean: {results['mean_imbalance_as_cut_at_first']:.2f} as cut at first, "
               f"{results['mean_imbalance_cut_anew']:.2f} cut anew, {anew.cuts} times; results in {folder}")  # fmt: skip
-    write_summary(folder, a, results, comm, page)
+    write_summary(folder, a, results, comm, page, pictures)
     return 0
 
 

@@ -12,6 +12,7 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.figures import Pictures
 from common.files import OutputError
 from common.options import check, study_parser
 from common.ranks import run_study
@@ -85,11 +86,13 @@ def davis_unit_weight(a: Namespace) -> float:
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> None:
-    """Load-displacement curves, convergence and mechanism. Collective."""
-    found.draw_mechanisms(folder, lambda: spiral.curve, "log-spiral, limit analysis")
-    if comm.rank == 0:
-        found.draw_curves(folder, "load_displacement", ("Largest displacement [mm]", "Unit weight [kN/m$^3$]"))
+def drawn(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> Pictures:
+    """Mechanism, load-displacement curves and convergence. Collective."""
+    labels = "Largest displacement [mm]", "Unit weight [kN/m$^3$]"
+    return {
+        **found.mechanism_pictures(folder, spiral.curve, "log-spiral, limit analysis"),
+        **found.curve_pictures(folder, "load_displacement", labels),
+    }
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -106,7 +109,6 @@ def main(arguments: list[str] | None = None) -> int:
     sizes = mesh_sizes(a)
     runs = {angle: [collapse(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(spiral), a.friction_angle, sizes, runs)
-    draw(found, spiral, folder)
 
     curve = found.finest_curve()
     summary = {
@@ -118,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm)
+    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder))
     if comm.rank == 0:
         print(f"limit analysis: {spiral.unit_weight / 1e3:.2f} kN/m3 with associated flow, {davis_unit_weight(a) / 1e3:.2f} "
               "with Davis' reduced strength without dilation")  # fmt: skip

@@ -122,14 +122,14 @@ def main(arguments: list[str] | None = None) -> int:
     shown = {
         name: (1e3 * curve[:, 1], curve[:, 0] / 1e3) for name, curve in curves.items() if not name.endswith("particles")
     }
-    save_curves(
+    pictures = {"load_displacement": lambda: save_curves(
         folder / "load_displacement.png", shown, ("Largest displacement [mm]", "Unit weight [kN/m$^3$]"),
         reference=(expected / 1e3, "limit analysis"), per_colour=2,
         limits=((0, 1e3 * bend(list(curves.values()))), (0, None)),
-    )  # fmt: skip
+    )}  # fmt: skip
     captions = {"load_displacement": "Unit weight over displacement on the way to collapse."}
     summary = {"limit_analysis_unit_weight": expected, "runs": rows, "curves": curves}
-    write_summary(folder, a, summary, comm, Page(captions=captions))
+    write_summary(folder, a, summary, comm, Page(captions=captions), pictures)
     print(f"results in {folder}")
     return 0
 

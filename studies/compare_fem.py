@@ -10,11 +10,13 @@ which makes them settle more, the less the more particles there are (--particles
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
+from common.figures import Pictures
 from common.files import OutputError
 from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_choice, add_count, add_number, change_defaults, study_parser
@@ -160,7 +162,7 @@ def compared(a: Namespace, fem: bridge.QuasiStatic, cell_size: float, unit_weigh
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw_fields(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float, folder: Path) -> None:
+def field_pictures(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float, folder: Path) -> Pictures:
     """FEM, particles and their difference side by side. Collective."""
     scene, p = case.scene(), case.model.particles
     here = bridge.compare(fem, case.model)["displacement"].here
@@ -168,11 +170,16 @@ def draw_fields(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float, fo
     values = {name: np.linalg.norm(field, axis=1) for name, field in fields.items()}
     parts = comm.gather((p.initial_position, p.volume, values))
     if parts is None:
-        return
+        return {}
     position, volume = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     panels = {name: np.concatenate([part[2][name] for part in parts]) for name in values}
-    save_side_by_side(folder / f"side_by_side_{unit_weight / 1e3:g}kN.png", scene, position, volume, panels, DISPLACEMENT,
-                      f"{unit_weight / 1e3:g} kN/m$^3$, cells of {case.args.cell_size:g} m")  # fmt: skip
+    name, title = (
+        f"side_by_side_{unit_weight / 1e3:g}kN",
+        f"{unit_weight / 1e3:g} kN/m$^3$, cells of {case.args.cell_size:g} m",
+    )
+    return {
+        name: partial(save_side_by_side, folder / f"{name}.png", scene, position, volume, panels, DISPLACEMENT, title)
+    }
 
 
 def frames_of(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float) -> tuple[dict | None, dict | None]:
@@ -180,8 +187,9 @@ def frames_of(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float) -> t
     return fem_frame(case.model, fem, unit_weight / 1e3), particle_frame(case.model, unit_weight / 1e3)
 
 
-def draw_convergence(rows: list[dict], sizes: list[float], folder: Path) -> None:
+def convergence_pictures(rows: list[dict], sizes: list[float], folder: Path) -> Pictures:
     """Differences over the mesh size, in logarithmic axes."""
+    pictures = {}
     for key, label, name in (
         ("displacement_difference_l2", "Difference in displacement, relative $L_2$ norm [-]", "convergence"),
         ("crest_displacement_difference", "Difference in displacement at the crest, relative [-]", "convergence_crest"),
@@ -189,7 +197,8 @@ def draw_convergence(rows: list[dict], sizes: list[float], folder: Path) -> None
         curves = {}
         for row in rows:
             curves.setdefault(f"{row['unit_weight'] / 1e3:g} kN/m$^3$", []).append(row[key])
-        save_log_log(folder / f"{name}.png", sizes, curves, label)
+        pictures[name] = partial(save_log_log, folder / f"{name}.png", sizes, curves, label)
+    return pictures
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -201,17 +210,16 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     sizes = mesh_sizes(a)
     fems = finite_elements(a)
-    rows, frames = [], []
+    rows, frames, pictures = [], [], {}
     for unit_weight, fem in fems.items():
         for size in sizes:
             row, case = compared(a, fem, size, unit_weight)
             rows.append(row)
             if comm.rank == 0:
                 print(line(row), flush=True)
-        draw_fields(case, fem, unit_weight, folder)
+        pictures |= field_pictures(case, fem, unit_weight, folder)
         frames.append(frames_of(case, fem, unit_weight))
-    if comm.rank == 0:
-        draw_convergence(rows, sizes, folder)
+    pictures |= convergence_pictures(rows, sizes, folder)
     finest = {f"{row['unit_weight']:g}": row for row in rows if row["cell_size_m"] == sizes[-1]}
     summary = {
         "scheme": a.scheme,
@@ -227,7 +235,7 @@ def main(arguments: list[str] | None = None) -> int:
     }
     scene = case.scene() if frames else None
     movies = [Movie(name, scene, shown) for name, shown in zip(("FEM", "MPM"), zip(*frames))] if scene else []
-    write_summary(folder, a, summary, comm, Page(movies=movies, slider=("unit weight", "kN/m\u00b3")))
+    write_summary(folder, a, summary, comm, Page(movies=movies, slider=("unit weight", "kN/m\u00b3")), pictures)
     if comm.rank == 0:
         print(f"results in {folder}")
     return 0

@@ -259,11 +259,11 @@ def main(arguments: list[str] | None = None) -> int:
                 tell(steps[-1:])
     save_table(folder / "equilibrium.csv", rows)
     save_table(folder / "steps.csv", steps)
-    save_costs(folder / "cost.png", rows)
     ratios = speed_up(rows)
     results = {f"explicit_over_newton_{soil}_seconds_ratio": ratio for soil, ratio in ratios.items()}
     captions = {"cost": "Cost of equilibrium; hollow markers with an arrow are lower bounds."}
-    write_summary(folder, a, {**results, "equilibrium": rows, "steps": steps}, comm, Page(captions=captions))
+    write_summary(folder, a, {**results, "equilibrium": rows, "steps": steps}, comm, Page(captions=captions),
+                  {"cost": lambda: save_costs(folder / "cost.png", rows)})  # fmt: skip
     print(f"results in {folder}")
     return 0
 

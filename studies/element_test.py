@@ -132,11 +132,10 @@ def main(arguments: list[str] | None = None) -> int:
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
     with History(folder / "history.csv", COLUMNS) as history:
         stopped = run(test, a, history)
-        draw(history, a, folder / "stress_path.png")
     end = {name: float(history[name][-1]) for name in COLUMNS}
-    write_summary(
-        folder, a, {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
-    )
+    summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
+    pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
+    write_summary(folder, a, summary, pictures=pictures)
     largest = history["q_Pa"].max()
     print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa")
     if stopped:

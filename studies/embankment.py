@@ -9,7 +9,7 @@ has no equilibrium is followed as it is.
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from time import perf_counter
 
 import numpy as np
@@ -18,13 +18,15 @@ from common.files import OutputError
 from common.interrupt import Interrupt
 from common.movie import Movie
 from common.options import add_count, add_number, add_switch, study_parser
+from common.output_options import add_picture_options
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.schemes import add_pic
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
-from common.stage_plots import draw_stages
+from common.stage_plots import stage_pictures
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -50,18 +52,11 @@ def parser() -> ArgumentParser:
     add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_strength_factor(p)
     add_number(p, "--damping", 0.05, "-", "local damping of the slide", at_least=0, below=1)
-    add_number(
-        p,
-        "--pic",
-        0.1,
-        "-",
-        "fraction of the particles' own velocities that the grid's replaces in a critical time step (0 is FLIP)",
-        at_least=0,
-        at_most=1,
-    )
+    add_pic(p, 0.1)
     add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
     add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
     add_count(p, "--frames", 60, "times at which particles are stored and drawn")
+    add_picture_options(p)
     return p
 
 
@@ -116,7 +111,6 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
     staged, rows, pictures, failed = carry_out(site, int(a.elements[1]), folder, comm)
-    draw_stages(site.stages, rows, pictures, folder)
     built = perf_counter()
     particles, failed_particles = build(site, a.particles_per_cell, a.factor)
     apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
@@ -137,9 +131,12 @@ def main(arguments: list[str] | None = None) -> int:
         "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
         "wall_seconds": {"stages_fem": built - start, "all": perf_counter() - start},
     }  # fmt: skip
-    site_slides.draw_slide(result, scene, folder)
+    drawn = {
+        **(stage_pictures(site.stages, rows, pictures, folder) if a.pictures else {}),
+        **site_slides.slide_pictures(a, result, scene, folder),
+    }
     movie = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
-    write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS))
+    write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn)
     if comm.rank == 0:
         for who, message in (("finite elements", failed), ("particles", failed_particles), ("slide", stopped)):
             if message:

@@ -19,7 +19,7 @@ from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site, read_site
-from common.stage_plots import draw_stages
+from common.stage_plots import stage_pictures
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -86,7 +86,6 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
     staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder, comm)
-    draw_stages(site.stages, rows, pictures, folder)
     compared = comparison(site, staged) if a.compare and stopped is None else {}
     last = rows[-1] if rows else {}
     summary = {
@@ -98,7 +97,9 @@ def main(arguments: list[str] | None = None) -> int:
     captions = {"stages_displacement": "The soil after each stage, by its displacement",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
                 "movements": "Largest movements after each stage"}  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=captions))
+    write_summary(
+        folder, a, summary, comm, Page(captions=captions), stage_pictures(site.stages, rows, pictures, folder)
+    )
     if comm.rank == 0:
         for name, value in compared.items():
             print(f"{name.replace('_', ' ')}: {'not carried at once' if value is None else f'{value:.2g}'}")

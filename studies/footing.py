@@ -12,6 +12,7 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.figures import Pictures
 from common.files import OutputError
 from common.options import add_count, add_number, check, study_parser
 from common.ranks import run_study
@@ -126,13 +127,15 @@ def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[brid
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
-    """Load-settlement curves, convergence and mechanism. Collective."""
+def drawn(a: Namespace, found: CollapseRuns, folder: Path) -> Pictures:
+    """Mechanism, load-settlement curves and convergence. Collective."""
     line = prandtl_line(a.half_width, a.friction_angle)
     box = ((0.0, 1.3 * line[:, 1].min()), (1.15 * line[-1, 0], 0.0))
-    found.draw_mechanisms(folder, lambda: line, "slip line of Prandtl", box=box)
-    if comm.rank == 0:
-        found.draw_curves(folder, "load_settlement", ("Settlement of the centre [mm]", "Pressure over cohesion [-]"))
+    labels = "Settlement of the centre [mm]", "Pressure over cohesion [-]"
+    return {
+        **found.mechanism_pictures(folder, line, "slip line of Prandtl", box=box),
+        **found.curve_pictures(folder, "load_settlement", labels),
+    }
 
 
 # --- 5. All together -------------------------------------------------------------------------------------------------
@@ -148,7 +151,6 @@ def main(arguments: list[str] | None = None) -> int:
     both = {angle: [footing(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     runs, curves = ({angle: [pair[k] for pair in pairs] for angle, pairs in both.items()} for k in (0, 1))
     found = CollapseRuns(target(a), a.friction_angle, sizes, runs, curves)
-    draw(a, found, folder)
 
     curve = found.finest_curve()
     summary = {
@@ -158,7 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_settlement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm)
+    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder))
     if comm.rank == 0:
         print(f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}\nresults in {folder}")
     return found.exit_code()

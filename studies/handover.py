@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_curves
+from common.figures import Pictures
 from common.files import OutputError
 from common.movie import Movie, fem_frame, particle_frame
 from common.options import add_number, add_switch, check, study_parser
@@ -104,16 +105,20 @@ def run(a: Namespace, share: float, unit_weight: float) -> dict:
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(runs: list[dict], folder: Path) -> None:
-    """Run-out over the share, and over time; on the first rank."""
+def drawn(runs: list[dict], folder: Path) -> Pictures:
+    """Run-out over the share, and over time."""
     shares = np.array([run["share"] for run in runs])
     final = {"run-out": (100 * shares, np.array([run["history"][-1, 1] for run in runs])),
              "displacement at the crest": (100 * shares, np.array([run["history"][-1, 2] for run in runs]))}  # fmt: skip
-    save_curves(folder / "runout_over_share.png", final, ("Unit weight at hand-over [% of collapse]", "At the end [m]"),
-                limits=((-2, 102), (0, None)))  # fmt: skip
     crest = {f"{run['share']:.0%}": run["history"][:, 2] for run in runs}
-    save_history(folder / "crest_over_time.png", runs[0]["history"][:, 0], crest, "Displacement of the particle at the crest [m]",
-                 limits=(0, 1.08 * max(curve.max() for curve in crest.values())))  # fmt: skip
+    return {
+        "runout_over_share": lambda: save_curves(
+            folder / "runout_over_share.png", final, ("Unit weight at hand-over [% of collapse]", "At the end [m]"),
+            limits=((-2, 102), (0, None))),
+        "crest_over_time": lambda: save_history(
+            folder / "crest_over_time.png", runs[0]["history"][:, 0], crest, "Displacement of the particle at the crest [m]",
+            limits=(0, 1.08 * max(curve.max() for curve in crest.values()))),
+    }  # fmt: skip
 
 
 def movies(runs: list[dict]) -> list[Movie]:
@@ -138,8 +143,6 @@ def main(arguments: list[str] | None = None) -> int:
     fem = soil_fem(build_slope(a, comm))
     collapse = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse")).value
     runs = [run(a, share, share * collapse) for share in SHARES]
-    if comm.rank == 0:
-        draw(runs, folder)
     runouts = [float(run["history"][-1, 1]) for run in runs]
     summary = {
         "collapse_unit_weight_of_the_finite_elements": collapse,
@@ -148,7 +151,8 @@ def main(arguments: list[str] | None = None) -> int:
         "handovers": [told(run) for run in runs],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, Page(movies=movies(runs) if comm.rank == 0 else ()))
+    write_summary(folder, a, summary, comm, Page(movies=movies(runs) if comm.rank == 0 else ()),
+                  drawn(runs, folder))  # fmt: skip
     if comm.rank == 0:
         tell(summary, folder)
     return 0

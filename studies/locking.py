@@ -9,10 +9,12 @@ on meshes of rising fineness. The explicit step shrinks as the Poisson ratio nea
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 
+from common.figures import Pictures
 from common.files import OutputError
 from common.options import add_count, check, study_parser
 from common.page import Page
@@ -98,21 +100,23 @@ def finest(rows: list[dict]) -> dict[str, dict[str, float]]:
 # --- 3. All together -------------------------------------------------------------------------------------------------
 
 
-def draw(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]], folder: Path) -> None:
-    """Error over cell size, and the mean stresses side by side; on the first rank."""
-    save_errors(folder / f"error_{case.NAME}.png", rows, case.TITLE)
+def drawn(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]], folder: Path) -> Pictures:
+    """Error over cell size, and the mean stresses side by side."""
+    pictures = {f"error_{case.NAME}": partial(save_errors, folder / f"error_{case.NAME}.png", rows, case.TITLE)}
     for scheme, found in last.items():
         poisson = case.POISSON[scheme][-1]
         title = f"{case.TITLE}, {scheme}, $\\nu$ = {poisson:.9g}"
         fields = {name: one.field for name, one in found.items()}
-        save_pressures(folder / f"pressure_{case.NAME}_{scheme}.png", fields, case.PRESSURE_UNIT, title)
+        name = f"pressure_{case.NAME}_{scheme}"
+        pictures[name] = partial(save_pressures, folder / f"{name}.png", fields, case.PRESSURE_UNIT, title)
+    return pictures
 
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
     folder = open_results(a, comm)
-    results, captions = {}, {}
+    results, captions, pictures = {}, {}, {}
     for name in a.cases.split(","):
         case, last = CASES[name], {}
         results[name] = []
@@ -122,15 +126,14 @@ def main(arguments: list[str] | None = None) -> int:
             captions[
                 f"pressure_{name}_{scheme}"
             ] = f"{case.TITLE}, {scheme}: mean stress of plain triangles and with NMD."
-        if comm.rank == 0:
-            draw(case, results[name], last, folder)
+        pictures |= drawn(case, results[name], last, folder)
         captions[f"error_{name}"] = f"{case.TITLE}: error of the {case.QUANTITY}. "
     summary = {
         **{f"{name} on its finest mesh": finest(rows) for name, rows in results.items()},
         **results,
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, Page(captions=captions))
+    write_summary(folder, a, summary, comm, Page(captions=captions), pictures)
     if comm.rank == 0:
         print(f"results in {folder}")
     return 0

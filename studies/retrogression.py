@@ -12,22 +12,25 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.animation import Frame, save_animation
-from common.figures import save_figure
+from common.animation import film_frames, save_animation
+from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import Movie, particle_frame
 from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
+from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, paper_style, save_particles
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
+from common.schemes import add_pic
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import write_summary
 from mpi4py import MPI
@@ -67,17 +70,10 @@ def parser() -> ArgumentParser:
         p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1
     )
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
-    add_number(
-        p,
-        "--pic",
-        0.1,
-        "-",
-        "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
-        at_least=0,
-        at_most=1,
-    )
+    add_pic(p, 0.1)
     add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")
+    add_picture_options(p)
     add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
     add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
     return p
@@ -173,30 +169,29 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(result: Slide, folder: Path) -> Movie | None:
-    """Shear strain at four times, displacement in the end, and a film; on the first rank. Returns the film for the page."""
-    scene = result.case.scene()
+def drawn(a: Namespace, result: Slide, scene: Scene | None, folder: Path) -> Pictures:
+    """Shear strain at four times, displacement in the end, and a film."""
     if scene is None:
-        return None
+        return {}
+    pictures, size = {}, result.cell_size
     shown = np.unique(np.linspace(0, len(result.frames) - 1, 5).astype(int)[1:])
     for k in shown:
-        f = result.frames[k]
-        title = f"$t$ = {f['time']:.1f} s, cells of {result.cell_size:g} m"
-        save_particles(folder / f"strain_{result.cell_size:g}_{k:03d}.png", scene, f["position"], f["volume"],
-                       f["shear_strain"], SHEAR_STRAIN, limits=(0, 2), title=title)  # fmt: skip
-    last = result.frames[-1]
-    save_particles(folder / f"displacement_{result.cell_size:g}.png", scene, last["position"], last["volume"],
-                   last["displacement"], DISPLACEMENT, title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
-    name = f"retrogression_{result.cell_size:g}".replace(".", "_")  # what follows a point would be taken for the suffix
-    film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
-    save_animation(folder / name, scene, film, SHEAR_STRAIN, limits=(0, 2))
-    return Movie(f"cells of {result.cell_size:g} m", scene, result.frames)
+        f, name = result.frames[k], f"strain_{size:g}_{k:03d}"
+        title = f"$t$ = {f['time']:.1f} s, cells of {size:g} m"
+        pictures[name] = partial(save_particles, folder / f"{name}.png", scene, f["position"], f["volume"], f["shear_strain"],
+                                 SHEAR_STRAIN, limits=(0, 2), title=title)  # fmt: skip
+    last, name = result.frames[-1], f"displacement_{size:g}"
+    pictures[name] = partial(save_particles, folder / f"{name}.png", scene, last["position"], last["volume"],
+                             last["displacement"], DISPLACEMENT, title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
+    if a.film:
+        name = f"retrogression_{size:g}".replace(".", "_")  # what follows a point would be taken for the suffix
+        frames = film_frames(result.frames)
+        pictures[name] = partial(save_animation, folder / name, scene, frames, SHEAR_STRAIN, limits=(0, 2))
+    return pictures
 
 
 def compare(results: list[Slide], folder: Path) -> None:
     """The measures over time on all mesh sizes; on the first rank."""
-    if comm.rank != 0:
-        return
     with paper_style():
         figure, axes = plt.subplots(1, len(MEASURES), figsize=(10, 3.2), layout="constrained")
         for ax, (column, label) in zip(axes, MEASURES.items(), strict=True):
@@ -227,13 +222,15 @@ def main(arguments: list[str] | None = None) -> int:
     a = p.parse_args(arguments)
     check_slope_options(p, a)
     folder = open_results(a, comm)
-    results, movies = [], []
+    results, movies, pictures = [], [], {}
     with Interrupt(comm) as interrupt:
         for size in [a.cell_size, a.cell_size / 2][: 1 if a.meshes == "one" else 2]:
             if not interrupt.requested():
                 results.append(slide(a, size, folder, interrupt))
-                movies.append(draw(results[-1], folder))
-        compare(results, folder)
+                scene = results[-1].case.scene()
+                movies.append(Movie(f"cells of {size:g} m", scene, results[-1].frames) if scene else None)
+                pictures |= drawn(a, results[-1], scene, folder)
+    pictures["meshes"] = lambda: compare(results, folder)
     found = {
         f"{r.cell_size:g}_m": {
             **{column: r.history[column][-1] for column in MEASURES},
@@ -244,7 +241,7 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     stopped = any(r.stopped for r in results)
     write_summary(folder, a, {"finished_run": not stopped, "cells": found, "difference_between_meshes": differences(results)},
-                  comm, Page(movies=movies))  # fmt: skip
+                  comm, Page(movies=movies), pictures if a.pictures else {})  # fmt: skip
     if comm.rank == 0:
         for result in results:
             if result.stopped:

@@ -13,6 +13,7 @@ from time import perf_counter
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.figures import Pictures
 from common.files import OutputError
 from common.options import add_flag, add_number, study_parser
 from common.ranks import run_study
@@ -123,12 +124,13 @@ def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(a: Namespace, found: CollapseRuns, folder: Path) -> None:
-    """Displacement over the factor, convergence and mechanism. Collective."""
-    found.draw_mechanisms(folder, lambda: slip_line(a, found.target.reference), "log-spiral, limit analysis")
-    if comm.rank == 0:
-        labels = "Largest displacement [mm]", "Factor that divides the strength [-]"
-        found.draw_curves(folder, "factor_displacement", labels, lowest=0.98 * a.start)
+def drawn(a: Namespace, found: CollapseRuns, folder: Path) -> Pictures:
+    """Mechanism, displacement over the factor, and convergence. Collective."""
+    labels = "Largest displacement [mm]", "Factor that divides the strength [-]"
+    return {
+        **found.mechanism_pictures(folder, slip_line(a, found.target.reference), "log-spiral, limit analysis"),
+        **found.curve_pictures(folder, "factor_displacement", labels, lowest=0.98 * a.start),
+    }
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -146,7 +148,6 @@ def main(arguments: list[str] | None = None) -> int:
     sizes = mesh_sizes(a)
     runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(limit), a.friction_angle, sizes, runs)
-    draw(a, found, folder)
 
     curve = found.finest_curve()
     summary = {
@@ -156,7 +157,7 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm)
+    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder))
     if comm.rank == 0:
         print(f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}\nresults in {folder}")
     return found.exit_code()

@@ -16,15 +16,16 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from common.animation import Frame, save_animation
+from common.animation import film_frames, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
+from common.figures import Pictures
 from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import PORE, Movie, fem_frame, has_pore_pressure
 from common.notes import notes_of
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
-from common.output_options import add_output_options, check_frames
+from common.output_options import add_output_options, add_picture_options, check_frames
 from common.page import Page
 from common.plots import (
     DISPLACEMENT,
@@ -38,10 +39,10 @@ from common.plots import (
     save_mesh,
     save_particles,
 )
-from common.progress import Progress, counted
+from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import add_scheme_options, check_scheme_options, run_scheme
+from common.schemes import add_pic, add_scheme_options, check_scheme_options, run_scheme
 from common.site_runs import add_site_option
 from common.site_slides import add_strength_factor, site_slide
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
@@ -75,15 +76,7 @@ def parser() -> ArgumentParser:
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
-    add_number(
-        p,
-        "--pic",
-        0.0,
-        "-",
-        "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
-        at_least=0,
-        at_most=1,
-    )
+    add_pic(p, 0.0)
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
     add_scheme_options(p)
@@ -92,8 +85,7 @@ def parser() -> ArgumentParser:
         p, "--frame-steps", None, "steps between further times at which particles are stored, not drawn (default: none)"
     )
     add_output_options(p, PARTICLE_FIELDS)
-    add_switch(p, "--pictures", True, "draw figures and film; without them the page has the player and the curves")
-    add_switch(p, "--film", True, "draw a film, the longest of the pictures to draw")
+    add_picture_options(p)
     add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
                above=1)  # fmt: skip
     add_checkpoint_options(p)
@@ -219,18 +211,18 @@ def slide(
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(a: Namespace, scene: Scene, frames: list[dict], history: History, folder: Path) -> None:
-    """Figures 2 to 6 of the paper and a film, from the stored frames; on the first rank."""
-    if not a.pictures:
-        return
+def drawn(a: Namespace, scene: Scene | None, frames: list[dict], history: History, folder: Path) -> Pictures:
+    """Figures 2 to 6 of the paper and a film, from the stored frames."""
+    if scene is None or not a.pictures:
+        return {}
     first, last = frames[0], frames[-1]
-    drawn = [
+    shown = [
         ("figure_3_displacement", "displacement", DISPLACEMENT),
         ("figure_4_shear_strain", "shear_strain", SHEAR_STRAIN),
         ("figure_5_vertical_stress", "vertical_stress", VERTICAL_STRESS),
     ]
     if PORE in last:
-        drawn.append(("figure_7_excess_pore_pressure", PORE, PORE_PRESSURE))
+        shown.append(("figure_7_excess_pore_pressure", PORE, PORE_PRESSURE))
     title = f"$t$ = {last['time']:.1f} s"
 
     def particles(name: str, key: str, quantity: Quantity) -> None:
@@ -239,19 +231,16 @@ def draw(a: Namespace, scene: Scene, frames: list[dict], history: History, folde
                        limits=limits, title=title)  # fmt: skip
 
     crest = history["crest_displacement_m"]
-    figures = [
-        lambda: save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"]),
-        *(partial(particles, *each) for each in drawn),
-        lambda: save_history(folder / "figure_6_crest.png", history["time_s"], {"crest": crest},
-                             "Displacement of the particle at the crest [m]", limits=(0, max(0.5, 1.05 * crest.max()))),
-    ]  # fmt: skip
-    for figure in counted("figures", figures):
-        figure()
+    pictures = {
+        "figure_2_mesh": lambda: save_mesh(folder / "figure_2_mesh.png", scene, first["position"], first["volume"]),
+        **{each[0]: partial(particles, *each) for each in shown},
+        "figure_6_crest": lambda: save_history(
+            folder / "figure_6_crest.png", history["time_s"], {"crest": crest}, "Displacement of the particle at the crest [m]",
+            limits=(0, max(0.5, 1.05 * crest.max()))),
+    }  # fmt: skip
     if a.film:
-        film = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
-        save_animation(
-            folder / "slide", scene, film, SHEAR_STRAIN, progress=lambda shown: counted("film, frames", shown)
-        )
+        pictures["film"] = lambda: save_animation(folder / "slide", scene, film_frames(frames), SHEAR_STRAIN)
+    return pictures
 
 
 def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
@@ -316,9 +305,7 @@ def main(arguments: list[str] | None = None) -> int:
         clock["slide"] = perf_counter()
         summary = summarised(case, start, loop, history, clock)
         frames, scene = watch.frames(), case.scene()
-        write_summary(
-            folder, a, summary, comm, page(case, frames, summary), lambda: draw(a, scene, frames, history, folder)
-        )
+        write_summary(folder, a, summary, comm, page(case, frames, summary), drawn(a, scene, frames, history, folder))
     if comm.rank == 0:
         tell(summary, folder)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)

@@ -10,12 +10,13 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import process_time
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.figures import save_figure
+from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.movie import Movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
@@ -37,7 +38,7 @@ from common.plots import (
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import run_scheme
+from common.schemes import add_pic, run_scheme
 from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import write_summary
 from common.watch import Watch
@@ -61,15 +62,7 @@ def parser() -> ArgumentParser:
     add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
-    add_number(
-        p,
-        "--pic",
-        0.0,
-        "-",
-        "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
-        at_least=0,
-        at_most=1,
-    )
+    add_pic(p, 0.0)
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 200.0, "s", "longest duration of a slide", above=0)
     add_number(
@@ -199,18 +192,18 @@ def save_crests(path: Path, runs: list[Run]) -> None:
         save_figure(figure, path)
 
 
-def draw(runs: list[Run], scene: Scene | None, folder: Path) -> None:
-    """All pictures, on the first rank."""
+def drawn(runs: list[Run], scene: Scene | None, folder: Path) -> Pictures:
+    """All pictures."""
     if scene is None:
-        return
-    pair = [runs[0], runs[1]]
-    for name, quantity in (
-        ("displacement", DISPLACEMENT),
-        ("shear_strain", SHEAR_STRAIN),
-        ("vertical_stress", VERTICAL_STRESS),
-    ):
-        save_pair(folder / f"{name}.png", scene, pair, name, quantity)
-    save_crests(folder / "crest.png", runs)
+        return {}
+    shown = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN, "vertical_stress": VERTICAL_STRESS}
+    return {
+        **{
+            name: partial(save_pair, folder / f"{name}.png", scene, runs[:2], name, quantity)
+            for name, quantity in shown.items()
+        },
+        "crest": lambda: save_crests(folder / "crest.png", runs),
+    }
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -232,10 +225,9 @@ def main(arguments: list[str] | None = None) -> int:
     reference = table["explicit"]["crest_displacement_m"]
     for row in table.values():
         row["over_explicit"] = row["crest_displacement_m"] / reference
-    draw(runs, scene, folder)
     names = dict(zip(table, runs))
     movies = [Movie(name, scene, run.frames) for name, run in names.items()] if scene else []
-    write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]))
+    write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]), drawn(runs, scene, folder))
     if comm.rank == 0:
         tell(table, folder)
     return 1 if any(run.stopped for run in runs) else 0

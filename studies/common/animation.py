@@ -7,7 +7,7 @@ import errno
 import itertools
 import shutil
 import subprocess
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from PIL import Image
 
 from .files import expendable
 from .plots import Quantity, Scene, colour_limits, disc_diameter, draw_bar, draw_scene, figure_with_bar, paper_style
+from .progress import counted
 
 
 @dataclass
@@ -43,6 +44,11 @@ class Frame:
         self.values = np.array(self.values, np.float32)
 
 
+def film_frames(frames: Sequence[Mapping[str, np.ndarray]]) -> list[Frame]:
+    """Stored frames of particles as those of a film that shows the accumulated shear strain."""
+    return [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
+
+
 FASTEST, SHORTEST = 25, 4.0
 """Frames per second of a film, at most, and how many seconds it lasts, at least"""
 
@@ -55,7 +61,6 @@ def save_animation(
     *,
     limits: tuple[float, float] | None = None,
     seconds: float = 10.0,
-    progress: Callable[[Sequence], Iterable] = iter,
 ) -> Path:
     """Draw a film with one colour scale over time; see `expendable` for a disk that is full.
 
@@ -64,7 +69,6 @@ def save_animation(
         frames: in the order shown, at least one.
         limits: of the colour scale; found from all frames if not given.
         seconds: how long the film lasts at most; of more than 25 frames per second some are left out.
-        progress: passes the frames on one by one, and may show how far it is.
 
     Returns:
         The file that was written.
@@ -77,7 +81,9 @@ def save_animation(
     has_ffmpeg = shutil.which("ffmpeg") is not None
     path = path.with_suffix(".mp4" if has_ffmpeg else ".gif")
     with expendable(path) as aside:
-        pictures = _pictures(scene, progress(shown), quantity, limits, [frame.position for frame in frames])
+        pictures = _pictures(
+            scene, counted("film, frames", shown), quantity, limits, [frame.position for frame in frames]
+        )
         (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures, rate)
     return path
 

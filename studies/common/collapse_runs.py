@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 import fenics_bridge as bridge
 
 from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from .figures import Pictures
 from .options import add_switch
-
 
 UNDECIDED = 3
 """Exit code of a study that found a lower bound, but no failure above it"""
@@ -129,8 +129,8 @@ class CollapseRuns:
         """Values and displacements [m] on the finest mesh: (k, 2)."""
         return next(iter(self._curves().values()))[-1]
 
-    def draw_curves(self, folder: Path, name: str, labels: tuple[str, str], lowest: float = 0.0) -> None:
-        """Value over displacement, and convergence; on the first rank.
+    def curve_pictures(self, folder: Path, name: str, labels: tuple[str, str], lowest: float = 0.0) -> Pictures:
+        """Value over displacement, and convergence.
 
         Args:
             name: of the first picture's file.
@@ -142,25 +142,31 @@ class CollapseRuns:
         drawn = {f"{size:g} m, {self._flow(angle)}": (1e3 * of_angle[k][:, 1], self._shown(of_angle[k][:, 0]))
                  for k, size in enumerate(self.sizes) for angle, of_angle in curves.items()}  # fmt: skip
         wide = 1e3 * bend([curve for of_angle in curves.values() for curve in of_angle])
-        save_curves(folder / f"{name}.png", drawn, labels, reference=reference, limits=((0, wide), (lowest, None)),
-                    per_colour=len(curves))  # fmt: skip
+        limits = ((0, wide), (lowest, None))
         values = {self._flow(angle): [self._shown(run.value) for run in runs] for angle, runs in self.runs.items()}
-        save_convergence(folder / "convergence.png", self.sizes, values, target.label, reference)
+        return {
+            name: partial(save_curves, folder / f"{name}.png", drawn, labels, reference=reference, limits=limits,
+                          per_colour=len(curves)),
+            "convergence": partial(save_convergence, folder / "convergence.png", self.sizes, values, target.label, reference),
+        }  # fmt: skip
 
-    def draw_mechanisms(self, folder: Path, line: Callable[[], np.ndarray | None], line_name: str, **options) -> None:
+    def mechanism_pictures(self, folder: Path, line: np.ndarray | None, line_name: str, **options) -> Pictures:
         """The last increment on the finest mesh with the slip line of limit analysis over it. Collective.
 
         Args:
-            line: gives the slip line, (k, 2) [m].
+            line: the slip line, (k, 2) [m].
             options: further ones of `save_mechanism`.
         """
+        pictures = {}
         for number, (angle, runs) in enumerate(self.runs.items()):
             field = gathered(runs[-1].mechanism)
             if field is not None:
                 name = "mechanism" if number == 0 else "mechanism_without_dilation"
                 bound = "" if runs[-1].failed else "Lower bound: "
                 title = f"{bound}{self.target.title.format(self._shown(runs[-1].value))}, {self._flow(angle)}"
-                save_mechanism(folder / f"{name}.png", field, title, line=line(), line_name=line_name, **options)
+                pictures[name] = partial(save_mechanism, folder / f"{name}.png", field, title, line=line,
+                                         line_name=line_name, **options)  # fmt: skip
+        return pictures
 
     def _value(self, run: bridge.Collapse) -> float:
         return run.value / self.target.unit

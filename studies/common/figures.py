@@ -2,20 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from .files import expendable
+from .files import NOT_WRITTEN, expendable
+from .progress import counted
+
+Pictures = Mapping[str, Callable[[], object]]
+"""How pictures are drawn, by the names of their files; on the first rank, and without anything collective"""
+
+
+def draw_pictures(pictures: Pictures) -> None:
+    """Draw pictures one by one, showing how far it is. One that fails costs only itself; the run takes note of the reason."""
+    for name, draw in counted("figures", list(pictures.items())):
+        try:
+            draw()
+        except Exception as error:  # whatever a drawing library fails with, the results are worth more
+            _note(name, error)
+            plt.close("all")
+
+
+def _note(name: str, error: Exception) -> None:
+    NOT_WRITTEN.append(f"cannot draw {name}: {type(error).__name__}: {error} ({_where(error)})")
+
+
+def _where(error: BaseException) -> str:
+    """The line of code that raised an error."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace is not None else "unknown"
 
 
 def save_figure(figure: Figure, path: Path, **look: object) -> None:
-    """Write a picture and close the figure; see `expendable`.
+    """Write a picture and close the figure. When that fails, the run takes note of the reason and goes on without it.
 
     Args:
         look: as of ``Figure.savefig``.
     """
-    with expendable(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], **look)  # type: ignore[arg-type]
-    plt.close(figure)
+    try:
+        with expendable(path) as aside:
+            figure.savefig(aside, format=path.suffix[1:], **look)  # type: ignore[arg-type]
+    except Exception as error:  # as in `draw_pictures`; also for studies that draw while they run
+        _note(path.name, error)
+    finally:
+        plt.close(figure)

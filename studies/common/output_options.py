@@ -10,6 +10,8 @@ from pathlib import Path
 
 import mpm_core as mpm
 
+from .options import add_switch
+
 FRAME_BYTES = 44
 """That a particle takes in memory in each frame for pictures: nine numbers in single precision, and its number"""
 
@@ -45,6 +47,12 @@ def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) ->
         metavar="N",
         help="level of compression of the files, 0 to 9 (default: 0)",
     )
+
+
+def add_picture_options(parser: argparse.ArgumentParser) -> None:
+    """Options ``--no-pictures`` and ``--no-film`` of a study that draws figures and a film."""
+    add_switch(parser, "--pictures", True, "draw figures and film; without them the page has the player and the curves")
+    add_switch(parser, "--film", True, "draw a film, the longest of the pictures to draw")
 
 
 def check_frames(model: mpm.Model, options: argparse.Namespace, folder: Path) -> None:

@@ -77,11 +77,16 @@ class Progress:
 
 def counted(title: str, items: Sequence[T]) -> Iterator[T]:
     """Passes items on one by one, with a bar on a terminal, elsewhere with one line; for the first rank."""
-    if not sys.stderr.isatty():
+    if items and not sys.stderr.isatty():
         print(f"{title}: {len(items)}", file=sys.stderr, flush=True)
     form = "{desc}: {percentage:3.0f}% |{bar}| {n}/{total} [{elapsed} < {remaining}]"
     yield from tqdm(
-        items, desc=title, bar_format=form, file=sys.stderr, dynamic_ncols=True, disable=not sys.stderr.isatty()
+        items,
+        desc=title,
+        bar_format=form,
+        file=sys.stderr,
+        dynamic_ncols=True,
+        disable=not (items and sys.stderr.isatty()),
     )
 
 

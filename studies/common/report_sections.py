@@ -40,12 +40,13 @@ def sections_html(sections: Sequence[Section]) -> str:
 
 
 def figures_html(figures: Mapping[Path, str]) -> str:
-    """Pictures with captions, as data in the page."""
+    """Pictures with captions, as data in the page; those that could not be drawn are left out."""
     shown = "".join(
         f'<figure><img alt="{html.escape(caption)}" '
         f'src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode("ascii")}">'
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         for path, caption in figures.items()
+        if path.exists()
     )
     return f'<div class="grid">{shown}</div>' if shown else ""
 

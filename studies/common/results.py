@@ -6,6 +6,7 @@ import errno
 import fcntl
 import itertools
 import json
+import logging
 import os
 import shutil
 import socket
@@ -60,7 +61,17 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
     folder, problem = comm.bcast((folder, problem))
     if problem is not None:
         raise OutputError(problem)
+    _keep_compiler_lines(folder)
     return folder
+
+
+def _keep_compiler_lines(folder: Path) -> None:
+    """What the C compiler says while forms are compiled goes to ``forms.log``, which is there only if it said something."""
+    logger = logging.getLogger("fenics_bridge.forms")
+    for handler in [handler for handler in logger.handlers if isinstance(handler, logging.FileHandler)]:
+        logger.removeHandler(handler)
+        handler.close()
+    logger.addHandler(logging.FileHandler(folder / "forms.log", delay=True, encoding="utf-8"))
 
 
 def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:

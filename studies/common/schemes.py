@@ -24,6 +24,13 @@ def add_scheme_options(parser: argparse.ArgumentParser) -> None:
                "one where implicit or quasi-static)", above=0)  # fmt: skip
 
 
+def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
+    """Option ``--pic``."""
+    add_number(parser, "--pic", default, "-",
+               "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
+               at_least=0, at_most=1)  # fmt: skip
+
+
 def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Fill in ``initial`` (default: fem, or zero where quasi-static), and end with an error where options do not fit."""
     if options.initial is None:

@@ -15,6 +15,7 @@ import fenics_bridge as bridge
 
 from .collapse_runs import UNDECIDED
 from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from .figures import Pictures
 from .results import open_results
 from .site_file import Site, cell_size_of, read_site
 from .slope_fem import finite_elements, step_line
@@ -54,11 +55,10 @@ def site_study(
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
              "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
-    _draw(folder, sizes, runs, label)
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    write_summary(folder, a, summary, comm)
+    write_summary(folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label))
     if comm.rank == 0:
         for row in rows:
             sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
@@ -67,16 +67,20 @@ def site_study(
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
-def _draw(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str) -> None:
+def _drawn(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str) -> Pictures:
     """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
     field = gathered(runs[-1].mechanism)
     if field is None:
-        return
-    save_mechanism(folder / "mechanism.png", field, f"{label.split(' [')[0]} {runs[-1].value:.3f}")
+        return {}
     names = ["site" if size is None else f"{size:g} m" for size in sizes]
     curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
     wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
-    save_curves(folder / "value_displacement.png", curves, ("Largest displacement [mm]", label),
-                limits=((0, wide), (lowest, None)))  # fmt: skip
-    if None not in sizes:
-        save_convergence(folder / "convergence.png", sizes, {"site": [run.value for run in runs]}, label, None)
+    values, title = {"site": [run.value for run in runs]}, f"{label.split(' [')[0]} {runs[-1].value:.3f}"
+    pictures: Pictures = {
+        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
+        "value_displacement": lambda: save_curves(
+            folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
+    }  # fmt: skip
+    if None in sizes:
+        return pictures
+    return {**pictures, "convergence": lambda: save_convergence(folder / "convergence.png", sizes, values, label, None)}

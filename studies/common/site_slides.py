@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -15,17 +16,18 @@ from mpm_core.output import ModelOutput
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .animation import Frame, save_animation
+from .animation import film_frames, save_animation
+from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .movie import Movie, particle_frame
 from .options import add_number
 from .page import Page
-from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_history, save_particles
+from .plots import DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, save_history, save_particles
 from .progress import Progress
 from .results import open_results
 from .scenes import scene_of
-from .site_file import Site, read_site
+from .site_file import read_site
 from .summary import write_summary
 
 comm = MPI.COMM_WORLD
@@ -97,22 +99,31 @@ def slide(a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt) ->
     return result, None
 
 
-def draw_slide(result: Slide, scene: Scene | None, folder: Path, film: bool = True) -> None:
-    """Displacement and strain in the end, the largest displacement over time, and a film if asked for; on the first rank."""
-    if scene is None:
-        return
+def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Path) -> Pictures:
+    """Displacement and strain in the end, the largest displacement over time, and a film.
+
+    Args:
+        a: options with pictures and film.
+    """
+    if scene is None or not a.pictures:
+        return {}
     last, history = result.frames[-1], result.history
-    for name, key, quantity in (
-        ("slide_displacement", "displacement", DISPLACEMENT),
-        ("slide_strain", "shear_strain", SHEAR_STRAIN),
-    ):
+    largest = history["largest_displacement_m"]
+
+    def particles(name: str, key: str, quantity: Quantity) -> None:
         save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
                        title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
-    save_history(folder / "largest_displacement.png", history["time_s"], {"largest": history["largest_displacement_m"]},
-                 "Largest displacement [m]", limits=(0, max(0.1, 1.05 * history["largest_displacement_m"].max())))  # fmt: skip
-    if film:
-        frames = [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in result.frames]
-        save_animation(folder / "slide", scene, frames, SHEAR_STRAIN)
+
+    pictures: dict[str, Callable] = {
+        "slide_displacement": lambda: particles("slide_displacement", "displacement", DISPLACEMENT),
+        "slide_strain": lambda: particles("slide_strain", "shear_strain", SHEAR_STRAIN),
+        "largest_displacement": lambda: save_history(
+            folder / "largest_displacement.png", history["time_s"], {"largest": largest}, "Largest displacement [m]",
+            limits=(0, max(0.1, 1.05 * largest.max()))),
+    }  # fmt: skip
+    if a.film:
+        pictures["film"] = lambda: save_animation(folder / "slide", scene, film_frames(result.frames), SHEAR_STRAIN)
+    return pictures
 
 
 def site_slide(a: Namespace) -> int:
@@ -147,10 +158,9 @@ def site_slide(a: Namespace) -> int:
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     scene = scene_of(model, sorted(site.laws))
-    if a.pictures:
-        draw_slide(result, scene, folder, a.film)
     movies = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
-    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS))
+    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS),
+                  slide_pictures(a, result, scene, folder))  # fmt: skip
     if comm.rank == 0:
         print(f"strength divided by {a.factor:g}: largest displacement {moved:.3f} m after "
               f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip

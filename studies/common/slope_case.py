@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.probes import nearest_particle
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from mpm_core.probes import nearest_particle
 
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene

@@ -18,7 +18,8 @@ from mpm_core.output import MeshOutput
 import fenics_bridge as bridge
 
 from .field_plots import Field, gathered
-from .plots import CURVES, Quantity, boundary_edges, colour_limits, paper_style
+from .figures import Pictures
+from .plots import CURVES, Quantity, boundary_edges, paper_style
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
@@ -108,21 +109,26 @@ def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequenc
         plt.close(figure)
 
 
-def draw_stages(stages: Sequence[bridge.Stage], rows: list[dict], pictures: list[StagePicture], folder: Path) -> None:
-    """The soil after each stage by displacement and by strain, and movements over the stages; on the first rank.
+def stage_pictures(
+    stages: Sequence[bridge.Stage], rows: list[dict], pictures: list[StagePicture], folder: Path
+) -> Pictures:
+    """The soil after each stage by displacement and by strain, and movements over the stages.
 
     Stages before displacements were reset, such as the one that makes the stresses in situ, are left out.
     """
     if not pictures:
-        return
+        return {}
     first = max((k for k, stage in enumerate(stages[: len(rows)]) if stage.reset_displacement), default=0)
     before = pictures[first - 1].strain if first else 0.0
     rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
-    save_stages(folder / "stages_displacement.png", pictures, MOVED)
-    save_stages(folder / "stages_strain.png", pictures, SHEAR)
     curves = {name: [1e3 * row[key] for row in rows] for key, name in
               (("heave_m", "largest heave"), ("settlement_m", "largest settlement"), ("sideways_m", "largest sideways"))}  # fmt: skip
-    save_over_stages(folder / "movements.png", [row["stage"] for row in rows], curves, "Displacement [mm]")
+    names = [row["stage"] for row in rows]
+    return {
+        "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),
+        "stages_strain": lambda: save_stages(folder / "stages_strain.png", pictures, SHEAR),
+        "movements": lambda: save_over_stages(folder / "movements.png", names, curves, "Displacement [mm]"),
+    }
 
 
 class StageFiles:

@@ -6,13 +6,14 @@ import json
 import platform
 import subprocess
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
+from .figures import Pictures, draw_pictures
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
@@ -61,7 +62,7 @@ def write_summary(
     results: Mapping[str, object],
     comm: MPI.Comm = MPI.COMM_WORLD,
     page: Page | None = None,
-    draw: Callable[[], None] | None = None,
+    pictures: Pictures | None = None,
 ) -> None:
     """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names; then pictures and page.
 
@@ -74,7 +75,7 @@ def write_summary(
         options: of the study, as parsed.
         results: numbers, texts, lists or mappings of these, NumPy's too, by name (names end in their unit: ``_m``).
         page: what the study adds to its page, such as moving particles.
-        draw: makes the figures; called on the first rank.
+        pictures: figures and films, drawn on the first rank when the summary is on the disk.
 
     Raises:
         OutputError: on all ranks, with path and reason, when ``summary.json`` cannot be written. A picture, a film or the page
@@ -83,7 +84,7 @@ def write_summary(
     problem = None
     if comm.rank == 0:
         try:
-            _write(folder, options, results, comm, page, draw)
+            _write(folder, options, results, comm, page, pictures or {})
         except OutputError as error:
             problem = str(error)
     problem = comm.bcast(problem)
@@ -93,7 +94,7 @@ def write_summary(
 
 def _write(
     folder: Path, options: Namespace, results: Mapping[str, object], comm: MPI.Comm, page: Page | None,
-    draw: Callable[[], None] | None,
+    pictures: Pictures,
 ) -> None:  # fmt: skip
     summary = {
         "parameters": vars(options),
@@ -107,8 +108,7 @@ def _write(
         summary["restarts"] = options.restarts
     give_room(folder)
     write_text(folder / "summary.json", json.dumps(summary, indent=2, default=_plain) + "\n")
-    if draw is not None:
-        draw()
+    draw_pictures(pictures)
     if isinstance(options, Options):
         told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in summary["versions"].items())
         more = {"restarts": options.restarts} if options.restarts else {}

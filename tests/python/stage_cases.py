@@ -8,31 +8,31 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 ROLLERS = [bridge.roller("left", (1, 0)), bridge.roller("right", (1, 0)), bridge.fixed("base")]
-PIT = """
-SetFactory("OpenCASCADE");
-DefineConstant[ cell_size = 1.0 ];
-Rectangle(1) = {0, 0, 0, 9, 6}; Rectangle(2) = {0, 4, 0, 3, 2}; Rectangle(3) = {0, 3, 0, 3, 1};
-Coherence;
-Physical Surface("pit 1") = {2}; Physical Surface("pit 2") = {3}; Physical Surface("ground") = {4};
-e = 0.01;
-Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, 9 + e, e, e}};
-Physical Curve("left") = {Curve In BoundingBox{-e, -e, -e, e, 6 + e, e}};
-Physical Curve("right") = {Curve In BoundingBox{9 - e, -e, -e, 9 + e, 6 + e, e}};
-Physical Curve("floor") = {Curve In BoundingBox{-e, 3 - e, -e, 3 + e, 3 + e, e}};
-Mesh.MeshSizeMax = cell_size;
-"""
-COLUMN = """
-SetFactory("OpenCASCADE");
-Rectangle(1) = {0, 0, 0, 1, 3}; Rectangle(2) = {0, 3, 0, 1, 1}; Rectangle(3) = {0, 4, 0, 1, 2};
-Coherence;
-Physical Surface("ground") = {1}; Physical Surface("layer 1") = {2}; Physical Surface("layer 2") = {3};
-e = 0.01;
-Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, 1 + e, e, e}};
-Physical Curve("left") = {Curve In BoundingBox{-e, -e, -e, e, 6 + e, e}};
-Physical Curve("right") = {Curve In BoundingBox{1 - e, -e, -e, 1 + e, 6 + e, e}};
-Physical Curve("surface") = {Curve In BoundingBox{-e, 3 - e, -e, 1 + e, 3 + e, e}};
-Mesh.MeshSizeMax = 0.5;
-"""
+
+
+def geometry(rectangles, soils, width, inner, cell_size):
+    """A .geo file of a site 6 m high: rectangles [m] with their soils, its sides by name, and one boundary inside by name.
+
+    inner: name, x and y of its ends [m]
+    """
+    sides = {"base": (0, 0, width, 0), "left": (0, 0, 0, 6), "right": (width, 0, width, 6), inner[0]: inner[1:]}
+    return "\n".join([
+        'SetFactory("OpenCASCADE");', f"DefineConstant[ cell_size = {cell_size} ];", "e = 0.01;",
+        *(f"Rectangle({k}) = {{{x}, {y}, 0, {w}, {h}}};" for k, (x, y, w, h) in enumerate(rectangles, 1)),
+        "Coherence;",
+        *(f'Physical Surface("{soil}") = {{{number}}};' for soil, number in soils.items()),
+        *(f'Physical Curve("{name}") = {{Curve In BoundingBox{{{x} - e, {y} - e, -e, {u} + e, {v} + e, e}}}};'
+          for name, (x, y, u, v) in sides.items()),
+        "Mesh.MeshSizeMax = cell_size;\n",
+    ])  # fmt: skip
+
+
+GEOMETRIES = {
+    "pit": geometry([(0, 0, 9, 6), (0, 4, 3, 2), (0, 3, 3, 1)], {"pit 1": 2, "pit 2": 3, "ground": 4}, 9,
+                    ("floor", 0, 3, 3, 3), 1.0),
+    "column": geometry([(0, 0, 1, 3), (0, 3, 1, 1), (0, 4, 1, 2)], {"ground": 1, "layer 1": 2, "layer 2": 3}, 1,
+                       ("surface", 0, 3, 1, 3), 0.5),
+}  # fmt: skip
 SOILS = {"pit": ("ground", "pit 1", "pit 2"), "column": ("ground", "layer 1", "layer 2")}
 YOUNG = {"ground": 20e6, "pit 1": 10e6, "pit 2": 5e6, "layer 1": 10e6, "layer 2": 5e6}
 WEIGHT = {"ground": 20e3, "pit 1": 18e3, "pit 2": 19e3, "layer 1": 18e3, "layer 2": 16e3}
@@ -43,7 +43,7 @@ def mesh_of(name, folder, comm=MPI.COMM_WORLD):
     """(domain, cell_tags, facet_tags) of the pit or the column."""
     path = folder / f"{name}.geo"
     if comm.rank == 0:
-        path.write_text({"pit": PIT, "column": COLUMN}[name])
+        path.write_text(GEOMETRIES[name])
     comm.barrier()
     return bridge.read_mesh(path, comm)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from core_cases import box
 from implicit_cases import LEFT, SLOPE_SOIL, floor, slope, tangent
-from mpm_core.implicit import Stepper
 
 import mpm_core as mpm
 from mpm_core import _core, linear
+from mpm_core.implicit import Stepper
 
 
 def krylov_iterations(h, law, nmd):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from implicit_cases import slope
-from mpm_core.implicit import Stepper
 
 import mpm_core as mpm
 from mpm_core import _core
+from mpm_core.implicit import Stepper
 
 KINDS = [
     mpm.RelaxationKind.RICHARDSON,

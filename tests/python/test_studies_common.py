@@ -15,6 +15,7 @@ import pytest
 from matplotlib.image import imread
 
 from studies.common import animation, interrupt, plots
+from studies.common.files import NOT_WRITTEN
 from studies.common.history import History
 from studies.common.interrupt import Interrupt
 from studies.common.options import add_choice, add_count, add_number, add_switch, check, study_parser
@@ -100,7 +101,7 @@ def test_history_is_on_disk_after_each_row(tmp_path):
 
 @pytest.mark.parametrize("number", interrupt.SIGNALS)
 def test_the_first_signal_sets_a_flag(number, capfd):
-    before = signal.getsignal(number)
+    outer = signal.signal(number, signal.SIG_DFL)  # SIGHUP is ignored where the tests themselves run under nohup
     with Interrupt() as interrupted:
         assert not interrupted.requested() and interrupted.exit_code == 0
         os.kill(os.getpid(), number)
@@ -111,7 +112,7 @@ def test_the_first_signal_sets_a_flag(number, capfd):
             signal.SIGUSR1,
         ):  # what a scheduler sends to several processes, and each hands on
             os.kill(os.getpid(), same)
-    assert signal.getsignal(number) == before
+    assert signal.signal(number, outer) == signal.SIG_DFL
     assert interrupted.exit_code == 128 + number
     assert "ending after this step" in capfd.readouterr().err
 
@@ -231,6 +232,25 @@ def test_pictures_are_drawn(tmp_path):
     plots.save_particles(tmp_path / "u.png", scene(), POSITION, VOLUME, np.arange(3.0), plots.DISPLACEMENT, title="now")
     plots.save_history(tmp_path / "h.png", np.arange(3.0), {"a": np.arange(3.0), "b": np.ones(3)}, "Value [m]")
     assert all(has_colour(tmp_path / name) for name in ("mesh.png", "u.png", "h.png"))
+
+
+def test_a_picture_that_fails_costs_only_itself(tmp_path, capsys):
+    options = study_parser("An example.").parse_args([])
+    drawn = []
+
+    def fail():
+        drawn.append(json.loads((tmp_path / "summary.json").read_text())["answer"])
+        raise RuntimeError("no ink")
+
+    pictures = {"first": fail, "second": lambda: drawn.append("second")}
+    NOT_WRITTEN.clear()
+    write_summary(tmp_path, options, {"answer": 42}, pictures=pictures)
+    assert drawn == [42, "second"]
+    (reason,) = json.loads((tmp_path / "summary.json").read_text())["not_written"]
+    line = fail.__code__.co_firstlineno + 2
+    assert reason == f"cannot draw first: RuntimeError: no ink (test_studies_common.py:{line})"
+    assert "figures: 2" in capsys.readouterr().err
+    NOT_WRITTEN.clear()
 
 
 @pytest.mark.parametrize("has_ffmpeg", [True, False])

@@ -1,5 +1,6 @@
 """The slope stopped and started again: what was written stays, and the end is the same."""
 
+import contextlib
 import csv
 import json
 import os
@@ -85,34 +86,34 @@ def test_a_restart_on_two_ranks(tmp_path):
         np.testing.assert_allclose(one[name], other[name], rtol=0, atol=2e-7 * np.abs(one[name]).max())
 
 
+def rows_are_there(folder):
+    path = folder / "history.csv"
+    return path.exists() and path.read_text().count("\n") > 2
+
+
+@contextlib.contextmanager
+def sliding(folder):
+    """A run without end, once it slides; it is killed if it is still there."""
+    command = [sys.executable, STUDIES / "slope.py", "--output", folder, *SMALL, "--time", "1e4", "--frames", "100000"]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not rows_are_there(folder) and child.poll() is None:
+        time.sleep(0.05)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.communicate(timeout=60)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_an_interrupted_slope_leaves_a_checkpoint(tmp_path, number):
-    command = [
-        sys.executable,
-        str(STUDIES / "slope.py"),
-        "--output",
-        str(tmp_path),
-        *SMALL,
-        "--time",
-        "1e4",
-        "--frames",
-        "100000",
-    ]
-    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "history.csv").exists() and child.poll() is None:
-        time.sleep(0.05)
-    time.sleep(0.3)
-    child.send_signal(number)
-    out, err = child.communicate(timeout=60)
+    with sliding(tmp_path) as child:
+        child.send_signal(number)
+        _, err = child.communicate(timeout=60)
     assert child.returncode == 128 + number, err
     assert "--restart" in err and (tmp_path / "checkpoint.h5").exists() and (tmp_path / "summary.json").exists()
     result = slope(tmp_path, "--restart", str(tmp_path / "checkpoint.h5"), "--time", "1e-3")
     assert result.returncode == 2 and "a time not before the present" in result.stderr
-
-
-def rows_are_there(folder):
-    path = folder / "history.csv"
-    return path.exists() and path.read_text().count("\n") > 2
 
 
 def stopped_with_a_checkpoint(folder):
@@ -268,22 +269,8 @@ def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
 
 
 def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
-    command = [
-        sys.executable,
-        str(STUDIES / "slope.py"),
-        "--output",
-        str(tmp_path),
-        *SMALL,
-        "--time",
-        "1e4",
-        "--frames",
-        "100000",
-    ]
-    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while not rows_are_there(tmp_path) and child.poll() is None:
-        time.sleep(0.05)
-    child.kill()
-    child.wait()
+    with sliding(tmp_path) as child:
+        child.kill()
     assert "time = 10000.0" in (tmp_path / "parameters.toml").read_text()
     result = slope(tmp_path)
     assert result.returncode == 2 and "holds the results of an earlier run" in result.stderr
@@ -292,25 +279,10 @@ def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
 
 
 def test_a_second_run_in_the_folder_is_refused_while_the_first_goes_on(tmp_path):
-    command = [
-        sys.executable,
-        str(STUDIES / "slope.py"),
-        "--output",
-        str(tmp_path),
-        *SMALL,
-        "--time",
-        "1e4",
-        "--frames",
-        "100000",
-    ]
-    first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while not rows_are_there(tmp_path) and first.poll() is None:
-        time.sleep(0.05)
-    second = slope(tmp_path, "--overwrite", ranks=2)
+    with sliding(tmp_path) as first:
+        second = slope(tmp_path, "--overwrite", ranks=2)
+        assert first.poll() is None
     assert second.returncode == 2 and f"another run writes to {tmp_path}: process {first.pid}" in second.stderr
-    assert first.poll() is None
-    first.kill()
-    first.wait()
 
 
 # --- history ---------------------------------------------------------------------------------------------------------

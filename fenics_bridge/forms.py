@@ -1,0 +1,37 @@
+"""What FFCx and its C compiler say while forms are compiled: one line for the user, the rest to a logger."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from pathlib import Path
+
+LOGGER = logging.getLogger("fenics_bridge.forms")
+"""Gets the compiler's lines, at level DEBUG; add a handler to keep them"""
+LOGGER.setLevel(logging.DEBUG)
+LOGGER.propagate = False
+LOGGER.addHandler(logging.NullHandler())
+
+
+class _CompilerLines(logging.Filter):
+    """Takes what distutils, by which FFCx calls the compiler, writes to the root logger; there are several lines for a form."""
+
+    said = False
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if "distutils" not in record.pathname or record.levelno > logging.INFO:
+            return True
+        if not self.said:
+            self.said = True
+            cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fenics"
+            print(f"compiling forms of finite elements; later runs find them in {cache}", file=sys.stderr, flush=True)
+        LOGGER.debug(record.getMessage())
+        return False
+
+
+def redirect_compiler_lines() -> None:
+    """From now on the compiler's lines go to `LOGGER`. Calls after the first change nothing."""
+    root = logging.getLogger()
+    if not any(isinstance(each, _CompilerLines) for each in root.filters):
+        root.addFilter(_CompilerLines())
