@@ -75,13 +75,15 @@ void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double d
 
 /// Work done in the step. Forces act at the step's start, so their displacement is the mean
 /// of the one before and the one after: the energy balance of the leap-frog scheme.
+/// @param strained  the stresses have been updated (USF): they are half a step behind the velocities, not ahead
 template <int D>
-void tally(Model<D>& model, double damping, double dt)
+void tally(Model<D>& model, double damping, double dt, bool strained)
 {
   const PhaseTimer timer(model.phase_seconds, Phase::momentum);
   const Workspace<D>& work = model.work;
   const Vector<D> gravity = current_gravity(model);
   model.last.dt = dt;
+  double ahead = 0;
   Totals sums; // beside the model's: a sum kept in a register need not wait for memory
   for (Index i : work.soil.nodes)
   {
@@ -97,6 +99,7 @@ void tally(Model<D>& model, double damping, double dt)
       const double drag = local_damping(damping, residual, node.mass * start[a], dt);
       sums.external_work += external * u;
       sums.internal_work += node.internal[a] * u;
+      ahead += node.internal[a] * dt * work.velocity[i][a];
       sums.damping_work += drag * u;
       sums.support_work += (node.mass * work.acceleration[i][a] - residual + drag) * u;
     }
@@ -105,6 +108,8 @@ void tally(Model<D>& model, double damping, double dt)
   model.totals.internal_work += sums.internal_work;
   model.totals.damping_work += sums.damping_work;
   model.totals.support_work += sums.support_work;
+  if (strained)
+    model.energy.ahead = -0.5 * ahead;
 }
 } // namespace
 
@@ -129,7 +134,7 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
   }
   solve_momentum(model, options.damping, dt);
   find_end_velocity(model, options, dt); // (19)
-  tally(model, options.damping, dt);
+  tally(model, options.damping, dt, first);
   if (options.mixed_discretisation && !first)
     average_strains(model, dt);
   if (dual && !first)

@@ -131,6 +131,35 @@ void check_conservation(const Model<D>& model, const Diagnostics& local)
 }
 } // namespace
 
+namespace
+{
+/// What is taken at particles and nodes, of this rank.
+template <int D>
+void take_energies(const Model<D>& model, Diagnostics& d)
+{
+  const EnergyBook& book = model.energy;
+  const ParticleEnergy energy = particle_energy(model);
+  d.kinetic_energy = energy.kinetic;
+  d.stored_energy = energy.stored;
+  d.stress_work = book.stress_work;
+  d.plastic_work = book.stress_work - energy.stored - book.outflow_stored - book.plastic_start;
+  d.pic_loss = book.pic_loss;
+  d.unexplained_energy = energy_balance(model, energy.kinetic) - book.balance_start;
+  for (Index i : model.work.soil.nodes)
+    if (model.exchange.owned[i])
+      d.nodal_kinetic_energy += 0.5 * model.work.nodes[i].mass * dot<D>(model.work.velocity[i], model.work.velocity[i]);
+}
+
+/// The works and energies since the balance began, of which the largest says what an unexplained one amounts to.
+template <int D>
+std::array<double, 5> energy_scales(const Model<D>& model, double kinetic, double stored)
+{
+  const EnergyBook& book = model.energy;
+  return {std::isnan(stored) ? 0 : stored, model.totals.external_work + model.totals.support_work - book.external_start,
+          book.stress_work - book.stress_start, kinetic, book.kinetic_start};
+}
+} // namespace
+
 template <int D>
 Diagnostics diagnostics(const Model<D>& model)
 {
@@ -143,7 +172,6 @@ Diagnostics diagnostics(const Model<D>& model)
     d.mass += particles.mass[p];
     for (int i = 0; i < D; ++i)
       d.momentum[i] += particles.mass[p] * v[i];
-    d.kinetic_energy += 0.5 * particles.mass[p] * dot<D>(v, v);
   }
   if (!model.work.trouble)
     check_conservation(model, d);
@@ -151,6 +179,9 @@ Diagnostics diagnostics(const Model<D>& model)
   d.internal_work = model.totals.internal_work;
   d.damping_work = model.totals.damping_work;
   d.support_work = model.totals.support_work;
+  take_energies(model, d);
+  auto scales = energy_scales(model, d.kinetic_energy, d.stored_energy);
+  MPI_Allreduce(MPI_IN_PLACE, scales.data(), static_cast<int>(scales.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   d.outflow_particles = static_cast<double>(model.totals.outflow_particles);
   d.outflow_mass = model.totals.outflow_mass;
   d.particle_steps = static_cast<double>(model.totals.particle_steps);
@@ -160,6 +191,8 @@ Diagnostics diagnostics(const Model<D>& model)
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   std::copy_n(sums.begin(), sums.size(), &d.particles);
   d.plastic_share = d.particles > 0 ? d.plastic_share / d.particles : 0;
+  for (double scale : scales)
+    d.energy_scale = std::max(d.energy_scale, std::abs(scale));
   d.unbalanced_ratio = out_of_balance<D>(model, current_gravity(model));
   return d;
 }

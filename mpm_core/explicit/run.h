@@ -43,6 +43,13 @@ struct Diagnostics
   double internal_work;
   double damping_work;
   double support_work;
+  double stress_work;   ///< of the particles' stresses on their strains
+  double stored_energy; ///< by elastic strain; NaN where a law does not say
+  double plastic_work;  ///< stress work less stored energy since the particles were last changed by anything but a step
+  double pic_loss;      ///< kinetic energy taken out by PIC
+  double nodal_kinetic_energy;
+  double unexplained_energy; ///< see model/energy.h; since the particles were last changed by anything but a step
+  double energy_scale;       ///< largest of the works and energies since then
   double outflow_particles;
   double outflow_mass;
   double particle_steps;

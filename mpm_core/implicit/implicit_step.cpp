@@ -226,10 +226,13 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
     return false;
   }
   tally(model, step);
+  model.energy.ahead = 0; // velocities and stresses are of one time
   settle_particles(model);
   model.time += step.dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
+  if (options.quasi_static) // without inertia, what the loads do beyond the stresses' work goes nowhere
+    start_energy_balance(model);
   // So that the out-of-balance ratio is that of the particles as they are now. Nodes that the soil has just left keep
   // the velocities of this step until the next one.
   const bool shrinks = std::exchange(work.soil_shrinks, false);

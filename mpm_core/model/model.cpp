@@ -130,6 +130,8 @@ void prepare(Model<D>& model)
   MPI_Allreduce(MPI_IN_PLACE, &work.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
   model.inventory = taken_inventory(model);
   work.ready = true;
+  if (model.energy.stale)
+    start_energy_balance(model);
 
   map_to_nodes(model); // what nodes are at the start may be looked at before a step
   find_start_velocity(model);

@@ -4,6 +4,7 @@
 
 #include "base/phases.h"
 #include "materials/laws/law.h"
+#include "model/energy.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
 #include "transfer/dual_domain.h"
@@ -131,6 +132,7 @@ struct Model
   double gravity_ramp = 0;                          ///< time over which gravity rises from zero [s]
   double time = 0;                                  ///< [s]
   Totals totals;
+  EnergyBook energy;
   PhaseSeconds phase_seconds{}; ///< of the explicit steps on this rank since the model was made
   Inventory inventory;          ///< when the particles were last changed by anything but a step
   LastStep last;

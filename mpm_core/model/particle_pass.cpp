@@ -3,6 +3,7 @@
 #include "materials/laws/substeps.h"
 #include "mesh/search.h"
 #include "model/batch_strain.h"
+#include "transfer/affine_field.h"
 
 #include <algorithm>
 #include <numeric>
@@ -33,11 +34,59 @@ void update_failed(Model<D>& model, const Batch& batch, const PointBatch<D>& poi
   note_trouble<D>(model, Trouble<D>::Kind::law_failed_in_parts, batch.first + report.failed.front(), increment);
 }
 
+/// Half of the work of a batch's stresses on the strains in the scratch, particle by particle.
+template <int D>
+double half_work(const Particles<D>& particles, const Batch& batch, const BatchScratch<D>& scratch)
+{
+  double sum = 0;
+  for (Index p = batch.first; p < batch.last; ++p)
+    for (int k : stress_component<D>)
+      sum += particles.volume[p] * particles.stress[k][p] * scratch.strain[k][p - batch.first];
+  return 0.5 * sum;
+}
+
+/// Half of the work of a sum of stresses, V sigma, on the strain of a run of the batch.
+template <int D>
+double half_work(const std::array<double, n_symmetric<D>>& stress, const BatchScratch<D>& scratch, std::size_t run)
+{
+  const auto& increment = scratch.cells[run / lanes].increment;
+  double sum = 0;
+  for (std::size_t k = 0; k < n_symmetric<D>; ++k)
+    sum += stress[k] * increment[stress_component<D>[k]][run % lanes];
+  return 0.5 * sum;
+}
+
+/// Kinetic energy that PIC takes out of the particles of a run: their own velocities v go towards those of the nodes,
+/// v + s (w - v), which costs m s d . (v - s d / 2) with d = v - w.
+template <int D>
+double pic_loss(const Model<D>& model, const Run& run, double share)
+{
+  const Workspace<D>& work = model.work;
+  const auto start = [&](Index i) -> const Vector<D>& { return work.start_velocity[i]; };
+  const AffineField<D> field = affine_field<D>(model.mesh, run.cell, start);
+  const Vector<D>& centre = model.mesh.shapes[run.cell].centre;
+  const Particles<D>& particles = model.particles;
+  double sum = 0;
+  for (Index p = run.first; p < run.last; ++p)
+    for (int a = 0; a < D; ++a)
+    {
+      double w = field.value[a];
+      for (int b = 0; b < D; ++b)
+        w += field.gradient[a][b] * (particles.position[b][p] - centre[b]);
+      const double v = particles.velocity[a][p], change = share * (v - w);
+      sum += particles.mass[p] * change * (v - 0.5 * change);
+    }
+  return sum;
+}
+
 template <int D>
 void update_stress(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
   Particles<D>& particles = model.particles;
   strain_batch(model, options, batch, scratch);
+  const bool dual = model.integration == Integration::dual_domain;
+  if (dual)
+    model.energy.stress_work += half_work(particles, batch, scratch);
 
   PointBatch<D> points;
   points.size = batch.last - batch.first;
@@ -54,6 +103,8 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
   model.last.plastic += report.plastic;
   if (!report.failed.empty())
     update_failed(model, batch, points, report.failed);
+  if (dual)
+    model.energy.ahead += half_work(particles, batch, scratch);
 }
 
 /// The new cell of a particle that is no longer in its old one; `none` when it is not to be gathered.
@@ -112,14 +163,14 @@ void follow_strays(Model<D>& model, const Run& run)
 /// summed over particles, run by run, and tractions, which are rare.
 template <int D>
 void update_moments(Model<D>& model, const PassOptions& options, const Run& run, const CellMotion<D>& motion,
-                    double volumetric)
+                    const BatchScratch<D>& scratch, std::size_t in_batch)
 {
   CellMoments<D>& moments = model.work.moments[run.cell];
   if (run.first_in_cell && options.move)
     move<D>(moments, motion);
   if (run.first_in_cell && options.stress)
   {
-    moments.volume *= 1 + volumetric;
+    moments.volume *= 1 + scratch.cells[in_batch / lanes].volumetric[in_batch % lanes];
     moments.stress = {};
   }
   if (options.stress)
@@ -127,7 +178,21 @@ void update_moments(Model<D>& model, const PassOptions& options, const Run& run,
     const auto sum = stress_sum<D>(model.particles, run.first, run.last);
     for (int k = 0; k < n_symmetric<D>; ++k)
       moments.stress[k] += sum[k];
+    model.energy.ahead += half_work<D>(sum, scratch, in_batch);
   }
+}
+
+/// Gathers the particles of a run once more, so that round-off in the moments does not add up.
+template <int D>
+void gather_anew(Model<D>& model, const PassOptions& options, const Run& run, const BatchScratch<D>& scratch,
+                 std::size_t in_batch)
+{
+  CellMoments<D>& moments = model.work.moments[run.cell];
+  if (run.first_in_cell)
+    moments = {};
+  gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], moments);
+  if (options.stress && model.integration != Integration::dual_domain)
+    model.energy.ahead += half_work<D>(stress_sum<D>(model.particles, run.first, run.last), scratch, in_batch);
 }
 
 /// Gathers particles that came into cells of this rank, from its own cells or from other ranks.
@@ -153,23 +218,24 @@ void particle_pass(Model<D>& model, const PassOptions& options)
   Workspace<D>& work = model.work;
   // The particles of a dual domain grow each in its own way, so that their volumes do not follow from the cell's
   // strain.
-  const bool anew = model.integration == Integration::dual_domain || model.totals.steps % gathering_interval == 0;
-  if (anew || !work.tractions.empty())
+  const bool dual = model.integration == Integration::dual_domain;
+  const bool anew = dual || model.totals.steps % gathering_interval == 0;
+  if (!work.tractions.empty())
     for (Index c : work.soil.cells)
-    {
-      if (anew)
-        work.moments[c] = {};
-      if (!work.tractions.empty())
-        work.tractions[c] = {};
-    }
+      work.tractions[c] = {};
   if (options.stress)
+  {
     model.last.plastic = 0;
+    model.energy.ahead = 0;
+  }
   BatchScratch<D> scratch{};
 
   for (std::size_t r = 0; r < work.runs.size();)
   {
     const Batch batch = next_batch(work.runs, r);
     find_motions(model, options, batch, scratch);
+    for (r = batch.first_run; options.move && options.pic_share > 0 && r < batch.last_run; ++r)
+      model.energy.pic_loss += pic_loss(model, work.runs[r], options.pic_share);
     if (options.move)
       for (r = batch.first_run; r < batch.last_run; ++r)
       {
@@ -183,15 +249,19 @@ void particle_pass(Model<D>& model, const PassOptions& options)
     {
       const Run& run = work.runs[r];
       const std::size_t i = r - batch.first_run;
+      if (run.first_in_cell && options.stress && !dual)
+        model.energy.stress_work += half_work<D>(work.moments[run.cell].stress, scratch, i);
       if (anew)
-        gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.moments[run.cell]);
+        gather_anew<D>(model, options, run, scratch, i);
       else
-        update_moments<D>(model, options, run, scratch.motion[i], scratch.cells[i / lanes].volumetric[i % lanes]);
+        update_moments<D>(model, options, run, scratch.motion[i], scratch, i);
       gather_tractions<D>(model, run.first, run.last, run.cell);
       if (run.scattered)
         follow_strays<D>(model, run);
     }
   }
+  if (options.stress)
+    model.energy.stress_work += model.energy.ahead;
   if (work.strayed.empty())
     return;
   gather_entered<D>(model, work.strayed);
@@ -208,7 +278,12 @@ void settle_particles(Model<D>& model)
   Workspace<D>& work = model.work;
   const bool gone = !work.leavers.empty() || !work.outflow.empty();
   for (Index p : work.outflow)
+  {
+    const ParticleEnergy energy = particle_energy(model, p);
     model.totals.outflow_mass += model.particles.mass[p];
+    model.energy.outflow_kinetic += energy.kinetic;
+    model.energy.outflow_stored += energy.stored;
+  }
   model.totals.outflow_particles += static_cast<std::int64_t>(work.outflow.size());
   const Index arrived =
       migrate<D>(work.owned_cells, model.exchange, {work.leavers, work.outflow, work.far_partners}, model.particles);

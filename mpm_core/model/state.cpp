@@ -2,6 +2,7 @@
 
 #include "model/mapping.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -34,6 +35,16 @@ void for_each_number(M& model, F&& f)
   f("internal_work", Kind::sum, model.totals.internal_work);
   f("damping_work", Kind::sum, model.totals.damping_work);
   f("support_work", Kind::sum, model.totals.support_work);
+  f("energy_stress_work", Kind::sum, model.energy.stress_work);
+  f("energy_stress_work_ahead", Kind::sum, model.energy.ahead);
+  f("energy_pic_loss", Kind::sum, model.energy.pic_loss);
+  f("energy_outflow_kinetic", Kind::sum, model.energy.outflow_kinetic);
+  f("energy_outflow_stored", Kind::sum, model.energy.outflow_stored);
+  f("energy_start_balance", Kind::sum, model.energy.balance_start);
+  f("energy_start_kinetic", Kind::sum, model.energy.kinetic_start);
+  f("energy_start_plastic_work", Kind::sum, model.energy.plastic_start);
+  f("energy_start_external_work", Kind::sum, model.energy.external_start);
+  f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   f("sorts", Kind::own, model.totals.sorts);
   f("strays", Kind::own, model.work.strays);
@@ -80,7 +91,18 @@ void set_number(Model<D>& model, const Table& table, double value)
                       number = static_cast<std::remove_cvref_t<decltype(number)>>(value);
                   });
 }
+
+/// Files of before the energy balance do not have its numbers.
+template <int D>
+void begin_balance_where_unknown(Model<D>& model, const std::vector<Table>& ranks)
+{
+  if (std::none_of(ranks.begin(), ranks.end(), [](const Table& table) { return is_of_energy(table.name); }))
+    start_energy_balance(model);
+  model.energy.stale = false;
+}
 } // namespace
+
+bool is_of_energy(std::string_view name) { return name.starts_with("energy_"); }
 
 template <int D>
 std::vector<Table> rank_state(const Model<D>& model)
@@ -118,6 +140,7 @@ void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<T
 {
   model.particles = particles;
   model.totals = {};
+  model.energy = {};
   model.work.ready = false;
   model.work.trouble.reset();
   prepare(model); // makes room, and sorts; the order comes back below
@@ -131,6 +154,7 @@ void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<T
       take<D>(model, table, model.work.tractions);
   for (const Table& table : ranks)
     set_number(model, table, table.values.front());
+  begin_balance_where_unknown(model, ranks);
   map_to_nodes(model); // so that nodal sums are there before the first step
 }
 
@@ -139,6 +163,7 @@ void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<
 {
   model.particles = std::move(particles);
   model.totals = {};
+  model.energy = {};
   model.work.ready = false;
   model.work.trouble.reset();
   prepare(model);
@@ -157,6 +182,7 @@ void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<
                       number = static_cast<std::remove_cvref_t<decltype(number)>>(value);
                     }
                   });
+  begin_balance_where_unknown(model, ranks);
   map_to_nodes(model);
 }
 

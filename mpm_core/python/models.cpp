@@ -42,7 +42,10 @@ py::dict as_dict(const Diagnostics& d)
   return py::dict("particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
                   "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
                   "external_work"_a = d.external_work, "internal_work"_a = d.internal_work,
-                  "damping_work"_a = d.damping_work, "support_work"_a = d.support_work,
+                  "damping_work"_a = d.damping_work, "support_work"_a = d.support_work, "stress_work"_a = d.stress_work,
+                  "stored_energy"_a = d.stored_energy, "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss,
+                  "nodal_kinetic_energy"_a = d.nodal_kinetic_energy, "unexplained_energy"_a = d.unexplained_energy,
+                  "energy_scale"_a = d.energy_scale,
                   "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
                   "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
                   "plastic_share"_a = d.plastic_share, "unbalanced_ratio"_a = d.unbalanced_ratio);
@@ -124,7 +127,7 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def("seed_cells",
            [](M& model, std::optional<Index> tag, int per_cell, Index material, double density, GlobalIndex first_id)
            {
-             model.work.ready = false;
+             changed(model);
              return seed_cells<D>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
            })
       .def("seed_points",
@@ -133,7 +136,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              check_array<double>("points", points, {-1, D});
              check_array<double>("volumes", volumes, {points.shape(0)});
-             model.work.ready = false;
+             changed(model);
              return seed_points<D>(model.mesh, values<double>(points), values<double>(volumes), {material, density},
                                    first_id, model.particles);
            })
@@ -217,7 +220,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              check_array<Index>("rows", rows, {-1}); // sorted, without repetition, of particles that are there
              remove<D>(model.particles, values<Index>(rows));
-             model.work.ready = false;
+             changed(model);
            })
       .def("set_materials",
            [](M& model, const py::array& numbers)
@@ -225,7 +228,7 @@ void bind_model(py::module_& m, const std::string& suffix)
              check_array<Index>("material", numbers, {static_cast<py::ssize_t>(model.particles.material.size())});
              const auto in = values<Index>(numbers);
              model.particles.material.assign(in.begin(), in.end());
-             model.work.ready = false;
+             changed(model);
            })
       .def("nodal",
            [](const M& model, const std::string& name) { return copied_field<double>(nodal_field(model, name)); })

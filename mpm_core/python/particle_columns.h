@@ -183,6 +183,15 @@ py::dict single_precision(const Model<D>& model, const std::vector<std::string>&
   return copies;
 }
 
+/// Notes that the particles are no longer as a step left them: sums are to be gathered, and the energy balance begins
+/// anew.
+template <int D>
+void changed(Model<D>& model)
+{
+  model.work.ready = false;
+  model.energy.stale = true;
+}
+
 /// @throws InputError for a field that cannot be set, or another shape
 template <int D>
 void set_column(Model<D>& model, const std::string& name, const py::array& array)
@@ -212,7 +221,7 @@ void set_column(Model<D>& model, const std::string& name, const py::array& array
   with_field(particles, name, set_field);
   if (!is_set)
     throw InputError("particle field is '" + name + "', which cannot be set");
-  model.work.ready = false;
+  changed(model);
 }
 
 /// An entry of a schedule of fields, for Python.

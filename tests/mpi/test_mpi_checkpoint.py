@@ -72,7 +72,16 @@ def test_another_number_of_ranks_goes_on_up_to_round_off(comm, shared_path, owne
     model.restore(shared_path / "alone.h5")
     later, restarted = slide(model)
     assert_same(restarted, never_stopped)
-    for name in ("particles", "mass", "external_work", "internal_work", "steps", "particle_steps"):
+    for name in (
+        "particles",
+        "mass",
+        "external_work",
+        "internal_work",
+        "stress_work",
+        "unexplained_energy",
+        "steps",
+        "particle_steps",
+    ):
         assert getattr(later[-1], name) == pytest.approx(getattr(reports[-1], name), rel=1e-9)
 
 

@@ -27,6 +27,7 @@ from ._core import law_types
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
 from .element import ElementTest
+from .energy import EnergyWarning
 from .ghost import GhostPenalty
 from .law_arguments import explain_arguments
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
@@ -46,6 +47,7 @@ __all__ = [
     "ConeMatch",
     "DruckerPrager",
     "ElementTest",
+    "EnergyWarning",
     "GhostPenalty",
     "Hencky",
     "ImplicitReport",

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .checks import positive, within
+from .energy import EnergyWatch
 from .partition import keep_balance
 from .report import Report
 
@@ -102,12 +103,20 @@ def run_explicit(
     watch: Callable[[], bool] | None,
     rebalance: float,
     every_steps: int | None,
+    energy_limit: float | None,
 ) -> Iterator[Report]:
     """Step to each of the times, with a report there, and after every so many steps."""
     # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+
+    def report() -> Report:
+        now = model.report()
+        energy.look(now)
+        return now
+
     for until in times:
         run.until = until
         while model.time < until:
@@ -116,7 +125,7 @@ def run_explicit(
             model._core.run_explicit(options, run)
             ends = watch is not None and watch()
             if ends or (model.time < until and is_report_due(model, every_steps)):
-                yield model.report()
+                yield report()
             if ends:
                 return
-        yield model.report()
+        yield report()

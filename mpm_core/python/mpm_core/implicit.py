@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import within
+from .energy import EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
@@ -147,6 +148,7 @@ def run_implicit(
     every_steps: int | None,
     watch: Callable[[], bool] | None,
     rebalance: float,
+    energy_limit: float | None,
 ) -> Iterator[ImplicitReport]:
     """Step until each of the times; reports then, and after every so many steps."""
     stepper = Stepper(model, solver, options, dt)
@@ -154,6 +156,13 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+
+    def report() -> ImplicitReport:
+        now = stepper.report()
+        energy.look(now)
+        return now
+
     for until in times:
         close = 1e-9 * abs(until)
         while until - model.time > close:
@@ -164,10 +173,10 @@ def run_implicit(
                 model._core.time = until
             ends = watch is not None and watch()
             if ends or (model.time < until and is_report_due(model, every_steps)):
-                yield stepper.report()
+                yield report()
             if ends:
                 return
-        yield stepper.report()
+        yield report()
 
 
 def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:

@@ -11,6 +11,7 @@ from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .collective import collectively
+from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
     report_times,
@@ -136,6 +137,7 @@ class Model(Body):
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         allow_unstable: bool = False,
         rebalance: float | None = None,
+        energy_limit: float | None = 0.2,
     ) -> Reports[Report]:
         """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
 
@@ -158,12 +160,14 @@ class Model(Body):
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: most particles on a rank over their mean, above 1, from which on the mesh is cut anew (see the method
                 ``rebalance``); looked at every 32 steps. By default the mesh stays as it was cut.
+            energy_limit: `Report.unexplained_share`, of the energy at work, at which the run ends with an error; None for none.
+                Above 0.01 there is an `EnergyWarning`.
 
         Raises:
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
-            RunError: a particle left the mesh, a value is not finite, a law failed; with the place.
+            RunError: a particle left the mesh, a value is not finite, a law failed; with the place. Energy does not add up.
         """
-        options, run, times, threshold, steps = collectively(
+        options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
                 explicit_options(damping, nmd, integration, stress_update),
@@ -171,11 +175,12 @@ class Model(Body):
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),
                 steps_between(every_steps),
+                checked_energy_limit(energy_limit),
             ),
         )
         require_particles(self)
         warn_if_nothing_acts(self)
-        return Reports(run_explicit(self, options, run, times, watch, threshold, steps), "explicit")
+        return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit")
 
     def implicit(
         self,
@@ -195,6 +200,7 @@ class Model(Body):
         ghost: GhostPenalty | None = None,
         small_displacements: bool = False,
         rebalance: float | None = None,
+        energy_limit: float | None = None,
     ) -> Reports[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper): backward Euler, with steps far beyond the critical one.
 
@@ -221,13 +227,14 @@ class Model(Body):
                 ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
                 symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; looked at before each step.
+            energy_limit: see ``explicit``; by default none. What the scheme takes out counts as unexplained.
 
         Raises:
             InputError: an argument out of its range.
             RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
                 particles are as after the last step that converged.
         """
-        options, longest, times, steps, threshold = collectively(
+        options, longest, times, steps, threshold, limit = collectively(
             self.comm,
             lambda: (
                 implicit_options(damping, pic, nmd, integration, quasi_static, ghost, small_displacements),
@@ -235,12 +242,14 @@ class Model(Body):
                 report_times(self, until, every, since),
                 steps_between(1 if every is None and every_steps is None else every_steps),
                 rebalance_threshold(rebalance),
+                checked_energy_limit(energy_limit),
             ),
         )
         require_particles(self)
         warn_if_nothing_acts(self)
         reports = run_implicit(
-            self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold
+            self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
+            energy_limit=limit,
         )  # fmt: skip
         return Reports(reports, "implicit")
 

@@ -237,10 +237,14 @@ class TotalsProbe:
         """Numbers by name; see `Report`."""
         report, dim = self.model.report(), self.model.mesh.dim
         momentum = dict(zip(_components("momentum", "N.s", AXES[:dim]), report.momentum, strict=True))
-        energies = ("kinetic_energy", "external_work", "internal_work", "damping_work", "support_work")
+        energies = (
+            "kinetic_energy", "nodal_kinetic_energy", "external_work", "internal_work", "stress_work", "stored_energy",
+            "plastic_work", "damping_work", "support_work", "pic_loss", "unexplained_energy",
+        )  # fmt: skip
         return {
             "time_s": report.time, "steps": report.steps, "dt_s": report.dt, "particles": report.particles,
             "mass_kg": report.mass, **momentum, **{f"{name}_J": getattr(report, name) for name in energies},
+            "unexplained_share": report.unexplained_share,
             "unbalanced_ratio": report.unbalanced_ratio, "plastic_share": report.plastic_share,
         }  # fmt: skip
 

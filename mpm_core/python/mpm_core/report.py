@@ -21,14 +21,31 @@ class Report:
     momentum: tuple[float, ...]
     """[kg m/s]"""
     kinetic_energy: float
+    """Of the particles"""
     external_work: float
     """Work of gravity and tractions since the model was made"""
     internal_work: float
-    """Work of the stresses"""
+    """Work of the nodal forces of the stresses"""
     damping_work: float
     """Energy taken out by local damping"""
     support_work: float
     """Work of prescribed velocities"""
+    stress_work: float
+    """Work of the particles' stresses on their strains: what is stored, and what plastic flow takes"""
+    stored_energy: float
+    """Energy of the elastic strains as they are; NaN with a law that does not say what it stores (Python, UMAT)"""
+    plastic_work: float
+    """`stress_work` less what has been stored, since the particles were last changed by anything but a step"""
+    pic_loss: float
+    """Kinetic energy taken out by PIC"""
+    nodal_kinetic_energy: float
+    """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
+    unexplained_energy: float
+    """External and support work, less damping work, PIC loss, stress work and the gain of kinetic energy: what the
+    discretisation makes (negative) or takes (positive), since the particles were last changed by anything but a step
+    with inertia"""
+    energy_scale: float
+    """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy then and now"""
     plastic_share: float
     """Share of the particles that yielded in the last step"""
     unbalanced_ratio: float
@@ -38,6 +55,11 @@ class Report:
     outflow_mass: float
     particle_steps: int
     """Sum over steps of the number of particles"""
+
+    @property
+    def unexplained_share(self) -> float:
+        """`unexplained_energy` over `energy_scale`; 0 where nothing has moved."""
+        return self.unexplained_energy / self.energy_scale if self.energy_scale > 0 else 0.0
 
     def is_quasi_static(self, tolerance: float = 1e-3) -> bool:
         """Whether the soil is at rest: the out-of-balance ratio and kinetic energy over external work are not above a tolerance.

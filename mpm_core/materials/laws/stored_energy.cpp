@@ -1,0 +1,103 @@
+#include "materials/laws/stored_energy.h"
+
+#include "materials/tools/elasticity.h"
+
+#include <cmath>
+#include <limits>
+
+namespace mpm
+{
+namespace
+{
+/// Mean of the normal components, and the square of the deviatoric stress s : s.
+struct Invariants
+{
+  double mean, deviator_squared;
+};
+
+template <int D>
+Invariants invariants(const SymTensor<D>& stress)
+{
+  const double mean = (stress[0] + stress[1] + stress[2]) / 3;
+  double squared = 0;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    squared += k < 3 ? (stress[k] - mean) * (stress[k] - mean) : 2 * stress[k] * stress[k];
+  return {mean, squared};
+}
+
+/// Laws with constant moduli
+template <int D, class L>
+requires requires(L law) { law.young + law.poisson; }
+double energy(const L& law, const SymTensor<D>& stress, const double*)
+{
+  const auto [mean, squared] = invariants<D>(stress);
+  const double shear = law.young / (2 * (1 + law.poisson)), bulk = law.young / (3 * (1 - 2 * law.poisson));
+  return mean * mean / (2 * bulk) + squared / (4 * shear);
+}
+
+template <int D>
+double energy(const SofteningMohrCoulomb& law, const SymTensor<D>& stress, const double* state)
+{
+  return energy<D>(law.peak, stress, state);
+}
+
+template <int D>
+double energy(const CamClay& law, const SymTensor<D>& stress, const double* state)
+{
+  const auto [mean, squared] = invariants<D>(stress);
+  const double pressure = law.attraction - mean, volume = (1 + law.void_ratio) * std::exp(state[2]);
+  const double bulk = volume * pressure / law.swelling;
+  const double shear = 1.5 * bulk * (1 - 2 * law.poisson) / (1 + law.poisson);
+  const double tension = law.attraction > 0 ? law.attraction * std::log(pressure / law.attraction) : 0;
+  return (pressure - law.attraction - tension) * law.swelling / volume + squared / (4 * shear);
+}
+
+template <int D>
+double energy(const ExternalLaw&, const SymTensor<D>&, const double*)
+{
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+template <int D>
+double energy(const Umat&, const SymTensor<D>&, const double*)
+{
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+template <int D, class... L>
+double energy(const std::variant<L...>& law, const SymTensor<D>& stress, const double* state);
+
+template <int D>
+double energy(const Hencky& law, SymTensor<D> stress, const double* state)
+{
+  const double ratio = std::exp(state[n_state(law) - 1]);
+  for (double& component : stress)
+    component *= ratio;
+  return energy<D>(law.law, stress, state) / ratio;
+}
+
+template <int D>
+double energy(const Undrained& law, SymTensor<D> stress, const double* state)
+{
+  const double pressure = state[n_state(law) - 1];
+  for (std::size_t k = 0; k < 3; ++k)
+    stress[k] += pressure;
+  return energy<D>(law.skeleton, stress, state) + 0.5 * pressure * pressure * law.porosity / law.water_modulus;
+}
+
+template <int D, class... L>
+double energy(const std::variant<L...>& law, const SymTensor<D>& stress, const double* state)
+{
+  return std::visit([&](const auto& l) { return energy<D>(l, stress, state); }, law);
+}
+} // namespace
+
+template <int D>
+double stored_energy(const Law& law, const SymTensor<D>& stress, const double* state)
+{
+  return energy<D>(law, stress, state);
+}
+
+template double stored_energy<2>(const Law&, const SymTensor<2>&, const double*);
+template double stored_energy<3>(const Law&, const SymTensor<3>&, const double*);
+} // namespace mpm

@@ -1,0 +1,66 @@
+#include "model/energy.h"
+
+#include "materials/laws/stored_energy.h"
+#include "model/model.h"
+
+namespace mpm
+{
+template <int D>
+ParticleEnergy particle_energy(const Model<D>& model, Index p)
+{
+  const Particles<D>& particles = model.particles;
+  const Vector<D> v = at<D>(particles.velocity, p);
+  SymTensor<D> stress;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    stress[k] = particles.stress[k][p];
+  std::array<double, max_states> state{};
+  for (std::size_t k = 0; k < particles.state.size(); ++k)
+    state[k] = particles.state[k][p];
+  return {0.5 * particles.mass[p] * dot<D>(v, v),
+          particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
+}
+
+template <int D>
+ParticleEnergy particle_energy(const Model<D>& model)
+{
+  ParticleEnergy sum{0, 0};
+  for (Index p = 0; p < model.particles.size(); ++p)
+  {
+    const ParticleEnergy energy = particle_energy(model, p);
+    sum.kinetic += energy.kinetic;
+    sum.stored += energy.stored;
+  }
+  return sum;
+}
+
+template <int D>
+double energy_balance(const Model<D>& model, double kinetic)
+{
+  const Totals& totals = model.totals;
+  const EnergyBook& book = model.energy;
+  return totals.external_work + totals.support_work - totals.damping_work - (book.stress_work - book.ahead) -
+         book.pic_loss - kinetic - book.outflow_kinetic;
+}
+
+template <int D>
+void start_energy_balance(Model<D>& model)
+{
+  EnergyBook& book = model.energy;
+  const ParticleEnergy energy = particle_energy(model);
+  book.ahead = 0;
+  book.kinetic_start = energy.kinetic;
+  book.balance_start = energy_balance(model, energy.kinetic);
+  book.plastic_start = book.stress_work - energy.stored - book.outflow_stored;
+  book.external_start = model.totals.external_work + model.totals.support_work;
+  book.stress_start = book.stress_work;
+  book.stale = false;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template ParticleEnergy particle_energy(const Model<D>&, Index);                                                     \
+  template ParticleEnergy particle_energy(const Model<D>&);                                                            \
+  template double energy_balance(const Model<D>&, double);                                                             \
+  template void start_energy_balance(Model<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+} // namespace mpm

@@ -1,0 +1,57 @@
+#pragma once
+/// @file
+/// Energy at the particles: what the works of a run must add up to.
+///
+/// The balance of nodal works says nothing of the stresses: it is an identity. So the work of the stresses is taken at
+/// the particles, V sigma : d epsilon by the trapezoidal rule, and compared with what changed their kinetic energy:
+///
+///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_pic = what nobody asked for.
+///
+/// The difference comes from particles that cross cells, from averages and integration over cells, whose forces are not
+/// those of the particles' stresses, and from the time step.
+
+#include "base/types.h"
+
+namespace mpm
+{
+/// Sums over this rank [J].
+struct EnergyBook
+{
+  double stress_work = 0;     ///< of the particles' stresses on their strains since the model was made
+  double ahead = 0;           ///< part of it that belongs to the half step by which stresses are ahead of velocities
+  double pic_loss = 0;        ///< kinetic energy that PIC has taken out
+  double outflow_kinetic = 0; ///< of particles that flowed out
+  double outflow_stored = 0;
+  double balance_start = 0;  ///< see `energy_balance`, when the particles were last changed by anything but a step
+  double kinetic_start = 0;  ///< likewise
+  double plastic_start = 0;  ///< likewise, stress_work less stored energy
+  double external_start = 0; ///< likewise, external and support work
+  double stress_start = 0;   ///< likewise, stress_work
+  bool stale = true;         ///< the particles have been changed since
+};
+
+template <int D>
+struct Model;
+
+/// Energies over this rank's particles [J].
+struct ParticleEnergy
+{
+  double kinetic;
+  double stored; ///< by elastic strain; NaN where a law does not say
+};
+
+template <int D>
+ParticleEnergy particle_energy(const Model<D>& model);
+
+/// Energies of one particle.
+template <int D>
+ParticleEnergy particle_energy(const Model<D>& model, Index p);
+
+/// Works that came in less those that went out or are stored, at the particles; constant in an exact motion [J].
+template <int D>
+double energy_balance(const Model<D>& model, double kinetic);
+
+/// Begins the balance anew with the particles as they are.
+template <int D>
+void start_energy_balance(Model<D>& model);
+} // namespace mpm

@@ -1,0 +1,70 @@
+"""Looking at the energy balance of a run: a warning where it does not add up, and an error where it is far off."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+from ._core import InputError, RunError
+from .report import Report
+
+WARN_ABOVE = 0.01
+"""Part of the energy at work that may be unaccounted for without a warning"""
+
+
+class EnergyWarning(RuntimeWarning):
+    """The energy of a run does not add up; see docs/energy.md."""
+
+
+@dataclass
+class EnergyWatch:
+    """Looks at the reports of a run.
+
+    Args:
+        limit: `Report.unexplained_share` at which the run ends with an error; None for none.
+        speaks: whether this rank gives the warning.
+    """
+
+    limit: float | None
+    speaks: bool
+    warned: float = WARN_ABOVE
+
+    def look(self, report: Report) -> None:
+        """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold.
+
+        Raises:
+            RunError: it has passed the limit.
+        """
+        share = abs(report.unexplained_share)
+        if self.limit is not None and share > self.limit:
+            raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {_ADVICE}")
+        if share > self.warned:
+            self.warned = 10 * share
+            if self.speaks:
+                warnings.warn(f"{_said(report)}; {_ADVICE}", EnergyWarning, stacklevel=4)
+
+
+_ADVICE = (
+    "particles that cross cells, averaged strains and too long steps do this: docs/energy.md says what each choice of "
+    "scheme costs"
+)
+
+
+def _said(report: Report) -> str:
+    part = 100 * report.unexplained_share
+    verb = "was lost" if part > 0 else "came from nothing"
+    return (
+        f"at t = {report.time:.6g} s {abs(part):.3g} % of the energy at work {verb}: "
+        f"{abs(report.unexplained_energy):.4g} J of {report.energy_scale:.4g} J"
+    )
+
+
+def energy_limit(limit: float | None) -> float | None:
+    """A limit that a caller gives.
+
+    Raises:
+        InputError: it is neither None nor a number above 0.01.
+    """
+    if limit is not None and not limit > WARN_ABOVE:
+        raise InputError(f"energy_limit is {limit}, expected None or a number above {WARN_ABOVE}")
+    return limit

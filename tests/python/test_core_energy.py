@@ -1,0 +1,137 @@
+"""Energy at the particles: what is stored, what plastic flow, PIC and damping take, and what is left unexplained."""
+
+import warnings
+
+import numpy as np
+import pytest
+from core_cases import DIMS, box, run, strain_energy
+
+import mpm_core as mpm
+
+ELASTIC = mpm.LinearElastic(young=200e3, poisson=0.3)
+DENSITY = 2000.0
+MUSL, USF = {}, {"stress_update": mpm.StressUpdate.FIRST}
+MIXED, DUAL = {"integration": mpm.Integration.MIXED}, {"integration": mpm.Integration.DUAL_DOMAIN}
+
+
+def vibrating_block(dim, law=ELASTIC, speed=1e-3):
+    model = mpm.Model(box([4] * dim), law)
+    model.seed(density=DENSITY, per_cell={2: 6, 3: 10}[dim])
+    model.particles.set("velocity", speed * np.sin(np.pi * (model.particles.position - 0.5)))
+    return model
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize(
+    "scheme, error", [(MUSL, 0.005), (USF, 0.005), (MIXED, 0.005), (DUAL, 0.02)], ids=["MUSL", "USF", "mixed", "dual"]
+)
+def test_an_elastic_block_keeps_its_energy_and_it_is_all_accounted_for(dim, scheme, error):
+    # The nodal stresses of dual domains are means with particles as weights, so that their forces are not quite the transpose of
+    # the strains.
+    model = vibrating_block(dim)
+    energy = model.report().kinetic_energy
+    stored = []
+    for report in model.explicit(0.2, dt=0.02 * model.critical_time_step(), every=0.02, **scheme):
+        assert report.stored_energy == pytest.approx(strain_energy(model, 200e3, 0.3), rel=1e-9)
+        assert abs(report.plastic_work) < 0.02 * energy  # an elastic law has none, but for half a step
+        assert abs(report.unexplained_share) < error
+        stored.append(report.stored_energy / energy)
+    assert max(stored) > 0.5  # it goes to and fro
+
+
+@pytest.mark.parametrize("hencky", [False, True])
+@pytest.mark.parametrize("undrained", [False, True])
+def test_stored_energy_is_the_work_of_an_elastic_strain(hencky, undrained):
+    law = mpm.Hencky(ELASTIC) if hencky else ELASTIC
+    law = mpm.Undrained(law, water_modulus=1e5, porosity=0.4) if undrained else law
+    model = vibrating_block(2, law)
+    report = run(model, 0.03, dt=0.02 * model.critical_time_step())
+    assert report.stored_energy > 0.2 * report.kinetic_energy
+    assert report.stored_energy == pytest.approx(report.stress_work, rel=0.01)
+
+
+def test_plastic_work_of_confined_compression():
+    # Tresca under uniaxial strain e: sigma_1 - sigma_3 = 2 G e up to 2 c, so from e_y = c / G on. Then all deviatoric strain
+    # is plastic, with s : de_p = 2 c (2/3) de. What is stored: K e^2 / 2, and q^2 / (6 G) with q = 2 c.
+    young, poisson, cohesion = 200e3, 0.3, 500.0
+    shear, bulk = young / 2 / (1 + poisson), young / 3 / (1 - 2 * poisson)
+    law = mpm.MohrCoulomb(young=young, poisson=poisson, cohesion=cohesion, friction_angle=0.0)
+    model = mpm.Model(box([4, 4]), law)
+    model.seed(density=DENSITY, per_cell=6)
+    model.roller(1, normal=(1, 0))
+    model.roller(2, normal=(1, 0))
+    model.roller(3, normal=(0, 1))
+    rate = 0.02
+    model.prescribe(4, (0.0, -rate))
+    y = model.particles.position[:, 1]
+    model.particles.set("velocity", np.column_stack([0 * y, -rate * y]))
+    strain = 0.02
+    report = run(model, strain / rate, dt=0.05 * model.critical_time_step())
+    plastic = 4 / 3 * cohesion * (strain - cohesion / shear)
+    stored = 0.5 * bulk * strain**2 + (2 * cohesion) ** 2 / (6 * shear)
+    assert report.plastic_work == pytest.approx(plastic, rel=0.03)
+    assert report.stored_energy == pytest.approx(stored, rel=0.04)
+    assert report.support_work == pytest.approx(plastic + stored, rel=0.04)
+    assert abs(report.unexplained_share) < 0.01
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_pic_loss_is_what_kinetic_energy_loses_without_forces(dim):
+    soft = mpm.LinearElastic(young=1e-9, poisson=0.0)
+    body = (np.full(dim, 0.3), np.full(dim, 0.7))
+    model = mpm.Model(box([6] * dim, body=body), soft)
+    model.seed(density=DENSITY, per_cell=4, cell_tag=1)
+    model.particles.set("velocity", np.random.default_rng(1).uniform(-0.1, 0.1, model.particles.position.shape))
+    start = model.report()
+    dt = 1e-9 * model.critical_time_step()
+    report = run(model, 20 * dt, dt=dt, pic=1 - 1e-12)
+    assert report.pic_loss == pytest.approx(start.kinetic_energy - report.kinetic_energy, rel=1e-6)
+    assert report.pic_loss > 1e-9 * start.kinetic_energy
+    assert abs(report.unexplained_energy) < 1e-6 * report.pic_loss
+
+
+def test_damping_takes_all_in_the_end():
+    model = vibrating_block(2)
+    energy = model.report().kinetic_energy
+    report = run(model, 2.0, damping=0.7, dt=0.1 * model.critical_time_step())
+    assert report.kinetic_energy + report.stored_energy < 1e-3 * energy
+    assert report.damping_work == pytest.approx(energy, rel=0.01)
+
+
+def test_a_free_fall_balances_exactly():
+    model = mpm.Model(box([6, 6], body=(np.array([0.3, 0.5]), np.array([0.7, 0.9]))), ELASTIC)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.set_gravity((0.0, -1.0))
+    report = run(model, 0.5)
+    assert report.kinetic_energy == pytest.approx(report.mass * 0.5 * 0.5**2, rel=1e-9)
+    assert abs(report.unexplained_share) < 1e-9 and report.stored_energy < 1e-9 * report.kinetic_energy
+
+
+def stirred():
+    """A soft block whose particles are thrown about, so that they cross many cells."""
+    model = mpm.Model(box([8, 8], body=(np.full(2, 0.3), np.full(2, 0.7))), mpm.LinearElastic(young=100e3, poisson=0.3))
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.particles.set("velocity", np.random.default_rng(1).uniform(-2, 2, model.particles.position.shape))
+    return model
+
+
+def test_energy_that_does_not_add_up_is_said_and_stops_a_run():
+    model = stirred()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", mpm.EnergyWarning)
+        with pytest.raises(mpm.EnergyWarning, match="% of the energy at work"):
+            model.explicit(0.2, every=0.01, energy_limit=None).last()
+    share = abs(model.report().unexplained_share)
+    assert share > 0.01
+    limit = max(0.0101, share / 2)
+    with pytest.raises(mpm.RunError, match="energy_limit"):
+        stirred().explicit(0.2, every=0.01, energy_limit=limit).last()
+    with pytest.raises(mpm.InputError, match="energy_limit is 0.0"):
+        model.explicit(1.0, energy_limit=0.0)
+
+
+def test_the_balance_begins_anew_when_particles_are_changed():
+    model = vibrating_block(2)
+    run(model, 0.02)
+    model.particles.set("velocity", 10 * model.particles.velocity)
+    assert model.report().unexplained_energy == pytest.approx(0, abs=1e-12 * model.report().kinetic_energy)
