@@ -32,7 +32,7 @@ template <int D>
 void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
 {
   const Workspace<D>& work = model.work;
-  const double inertia = step.options.quasi_static ? 0 : 1 / step.dt;
+  const double inertia = step.options.quasi_static ? 0 : 1 / step.stage.dt;
   for (const GhostFacet<D>& facet : step.ghosts)
   {
     const Vector<D> jump = jump_over(facet,
@@ -41,8 +41,9 @@ void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
                                        Vector<D> value;
                                        for (int a = 0; a < D; ++a)
                                          value[a] =
-                                             facet.stiffness * step.dt * work.velocity[i][a] +
-                                             facet.mass * inertia * (work.velocity[i][a] - work.start_velocity[i][a]);
+                                             facet.stiffness * step.dt * (work.velocity[i][a] - work.start_velocity[i][a]) +
+                                             facet.mass * inertia *
+                                                 (end_velocity(model, step, i, a) - step.stage.start[i][a]);
                                        return value;
                                      });
     for (int k = 0; k < D + 2; ++k)
@@ -73,7 +74,39 @@ void find_forces(Model<D>& model, ImplicitStep<D>& step)
     model.work.nodes[i].internal = step.forces[i].internal;
 }
 
-/// Work done in the step: forces act at its end, over its whole displacement. That of the ghost penalty counts as
+/// Forces on a node, means over the stages so far, by their weights.
+template <int D>
+MeanForces<D> mean_forces(const Model<D>& model, const ImplicitStep<D>& step, Index node)
+{
+  MeanForces<D> mean = step.stage.before.empty() ? MeanForces<D>{} : step.stage.before[node];
+  const double weight = step.stage.weight;
+  for (int a = 0; a < D; ++a)
+  {
+    mean.external[a] += weight * step.external[node][a];
+    mean.internal[a] += weight * step.forces[node].internal[a];
+    mean.ghost[a] += weight * step.forces[node].ghost[a];
+    mean.inertia[a] += weight * inertia_force(model, step, node, a).force;
+  }
+  return mean;
+}
+
+/// f_ext at the end of the stage.
+template <int D>
+void find_external(const Model<D>& model, ImplicitStep<D>& step)
+{
+  const Workspace<D>& work = model.work;
+  const Vector<D> gravity = gravity_at(model, model.time + step.dt);
+  const double share = step.options.load_share;
+  step.external.resize(work.nodes.size());
+  for (std::size_t i = 0; i < work.nodes.size(); ++i)
+    for (int a = 0; a < D; ++a)
+    {
+      const double load = work.nodes[i].traction[a] + work.nodes[i].mass * gravity[a];
+      step.external[i][a] = share == 1 ? load : work.nodes[i].internal[a] + share * (load - work.nodes[i].internal[a]);
+    }
+}
+
+/// Work done in the step: forces act at its end, or at the ends of its stages, over its whole displacement. That of the ghost penalty counts as
 /// damping.
 template <int D>
 void tally(Model<D>& model, const ImplicitStep<D>& step)
@@ -88,12 +121,12 @@ void tally(Model<D>& model, const ImplicitStep<D>& step)
     for (int a = 0; a < D; ++a)
     {
       const double u = step.dt * work.velocity[i][a];
-      const double unbalanced = step.external[i][a] - work.nodes[i].internal[a];
+      const MeanForces<D> mean = mean_forces(model, step, static_cast<Index>(i));
+      const double unbalanced = mean.external[a] - mean.internal[a];
       const double inertia = work.nodes[i].mass * work.acceleration[i][a];
-      const double damped_inertia = inertia_force(model, step, static_cast<Index>(i), a).force;
-      const double reaction = damped_inertia + step.forces[i].ghost[a] - unbalanced;
-      totals.external_work += step.external[i][a] * u;
-      totals.internal_work += work.nodes[i].internal[a] * u;
+      const double reaction = mean.inertia[a] + mean.ghost[a] - unbalanced;
+      totals.external_work += mean.external[a] * u;
+      totals.internal_work += mean.internal[a] * u;
       totals.support_work += reaction * u;
       totals.damping_work += (unbalanced + reaction - inertia) * u;
     }
@@ -102,13 +135,40 @@ void tally(Model<D>& model, const ImplicitStep<D>& step)
 } // namespace
 
 template <int D>
+Inertia stage_inertia(const Model<D>& model, const ImplicitStep<D>& step, Index node, double start, double end)
+{
+  const double x = step.frequency[node] * step.length;
+  const double resolved = step.options.second_order ? left_by_second_order(x) : left_by_backward_euler(x);
+  Inertia inertia = damped_inertia(model.work.nodes[node].mass, start, end, step.stage.dt, step.options.damping,
+                                   step.frequency[node], resolved);
+  inertia.derivative /= step.stage.weight;
+  return inertia;
+}
+
+template <int D>
 Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component)
 {
   if (step.options.quasi_static)
     return {0, 0};
-  const Workspace<D>& work = model.work;
-  return damped_inertia(work.nodes[node].mass, work.start_velocity[node][component], work.velocity[node][component],
-                        step.dt, step.options.damping, step.frequency[node]);
+  return stage_inertia(model, step, node, step.stage.start[node][component],
+                       end_velocity(model, step, node, component));
+}
+
+template <int D>
+double displacement_error(const Model<D>& model, const ImplicitStep<D>& step)
+{
+  std::array<double, 2> sums{}; // mass, and mass times the squares
+  for (std::size_t i = 0; i < step.stage.carried.size(); ++i)
+    for (int a = 0; a < D && model.exchange.owned[i]; ++a)
+    {
+      const double mass = model.work.nodes[i].mass / D;
+      const double first = step.stage.carried[i][a] / (1 - stage_fraction);
+      const double error = step.stage.dt * (end_velocity(model, step, static_cast<Index>(i), a) - first);
+      sums[0] += mass;
+      sums[1] += D * mass * error * error;
+    }
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  return sums[0] > 0 ? std::sqrt(sums[1] / sums[0]) : 0;
 }
 
 template <int D>
@@ -125,7 +185,8 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   prepare(model);
   Workspace<D>& work = model.work;
   step.options = options;
-  step.dt = dt;
+  step.length = dt;
+  step.dt = options.second_order ? stage_fraction * dt : dt;
   model.integration = options.integration;
   map_to_nodes(model); // (11), (15)
   find_start_velocity(model);
@@ -141,18 +202,40 @@ void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& o
   step.halos_ready = true;
   update(step.halos.nodes, work.start_velocity);
   step.ghosts = find_ghost_facets(model, step.halos, options.ghost);
+  step.stage = {step.dt, 1, work.start_velocity, {}, {}};
   work.velocity = work.start_velocity;
   impose_supports(model, step);
 
-  const Vector<D> gravity = gravity_at(model, model.time + dt);
   step.forces.assign(work.nodes.size(), {});
-  step.external.resize(work.nodes.size());
+  find_external(model, step);
+}
+
+template <int D>
+void start_second_stage(Model<D>& model, ImplicitStep<D>& step)
+{
+  Workspace<D>& work = model.work;
+  const double g = stage_fraction;
+  Stage<D> second{g * step.length, g, work.start_velocity, work.velocity, {}};
+  second.before.resize(work.nodes.size());
   for (std::size_t i = 0; i < work.nodes.size(); ++i)
+  {
+    const MeanForces<D> first = mean_forces(model, step, static_cast<Index>(i));
     for (int a = 0; a < D; ++a)
     {
-      const double load = work.nodes[i].traction[a] + work.nodes[i].mass * gravity[a];
-      step.external[i][a] = work.nodes[i].internal[a] + options.load_share * (load - work.nodes[i].internal[a]);
+      const double gained = work.velocity[i][a] - work.start_velocity[i][a];
+      second.start[i][a] += (1 - g) / g * gained;
+      second.carried[i][a] *= 1 - g;
+      work.velocity[i][a] += (1 - g) * gained; // as if the acceleration went on, v2 = v0 + (v1 - v0) / g
+      second.before[i].external[a] = (1 - g) * first.external[a];
+      second.before[i].internal[a] = (1 - g) * first.internal[a];
+      second.before[i].ghost[a] = (1 - g) * first.ghost[a];
+      second.before[i].inertia[a] = (1 - g) * first.inertia[a];
     }
+  }
+  step.stage = std::move(second);
+  step.dt = step.length;
+  find_external(model, step);
+  impose_supports(model, step);
 }
 
 template <int D>
@@ -204,7 +287,10 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   const ImplicitOptions& options = step.options;
   for (std::size_t i = 0; i < work.velocity.size(); ++i)
     for (int a = 0; a < D; ++a)
-      work.acceleration[i][a] = options.quasi_static ? 0 : (work.velocity[i][a] - work.start_velocity[i][a]) / step.dt;
+      work.acceleration[i][a] =
+          options.quasi_static
+              ? 0
+              : (end_velocity(model, step, static_cast<Index>(i), a) - work.start_velocity[i][a]) / step.length;
   if (options.mixed_discretisation)
     average_strains(model, step.dt);
   const Particles<D> start = model.particles;
@@ -245,7 +331,10 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
 
 #define INSTANTIATE(D)                                                                                                 \
   template Inertia inertia_force(const Model<D>&, const ImplicitStep<D>&, Index, int);                                 \
+  template Inertia stage_inertia(const Model<D>&, const ImplicitStep<D>&, Index, double, double);                      \
+  template double displacement_error(const Model<D>&, const ImplicitStep<D>&);                                         \
   template void impose_supports(Model<D>&, const ImplicitStep<D>&);                                                    \
+  template void start_second_stage(Model<D>&, ImplicitStep<D>&);                                                       \
   template void start_step(Model<D>&, ImplicitStep<D>&, const ImplicitOptions&, double);                               \
   template TrialReport find_residual(Model<D>&, ImplicitStep<D>&, bool);                                               \
   template bool finish_step(Model<D>&, const ImplicitStep<D>&);

@@ -1,8 +1,21 @@
 #pragma once
 /// @file
-/// The implicit scheme: a step of backward Euler under way, its residual, and its end.
+/// The implicit scheme: a step under way, its residual, and its end.
 ///
-///     r(v1) = f_ext - f_int(u) - D - M (v1 - v0) / dt,   u = dt v1
+/// Backward Euler solves
+///
+///     r(v1) = f_ext - f_int(u) - D - M (v1 - v0) / dt = 0,   u = dt v1.
+///
+/// The scheme of second order is the diagonally implicit Runge-Kutta method of two stages with g = 1 - 1/sqrt(2) (Alexander
+/// 1977, SIAM J. Numer. Anal. 14, 1006-1021, theorem 5), each stage like a step of backward Euler of length g dt:
+///
+///     M (v1 - v0) / (g dt) = f(u1),                        u1 = g dt v1
+///     M (v2 - v0 - (1 - g)/g (v1 - v0)) / (g dt) = f(u2),  u2 = (1 - g) dt v1 + g dt v2,
+///
+/// with f = f_ext - f_int - D; the step ends with u2 and v2. It is L-stable: oscillations that the step does not resolve
+/// go, while of the energy of one of angular frequency w a step leaves (1 + 2 z) / (1 + z)^2, z = (g w dt)^2, that is
+/// 1 - z^2 where it is resolved (backward Euler: 1 / (1 + (w dt)^2)). Stresses go from the step's start over the whole
+/// increment in both stages.
 ///
 /// Stresses go from the step's start over the whole increment u; gradients and volumes are those of the start, so that
 /// the first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite
@@ -22,6 +35,7 @@ struct ImplicitOptions
   bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
   Integration integration = Integration::particles; ///< by particles or mixed
   GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass
+  bool second_order = false;                        ///< two stages instead of backward Euler; with inertia only
   bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
   bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
   double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
@@ -58,12 +72,33 @@ struct TrialForces
   Vector<D> ghost;    ///< of the ghost penalty
 };
 
-/// A step under way. The iterate v1 is `work.velocity` of the model, f_int is in `work.nodes` too.
+/// Forces on a node, means over the stages of a step [N].
+template <int D>
+struct MeanForces
+{
+  Vector<D> external, internal, ghost, inertia;
+};
+
+/// What a stage has of the ones before it. The iterate v is the mean velocity over the step so far, u / dt; that of the
+/// stage's end is (v - carried) / weight.
+template <int D>
+struct Stage
+{
+  double dt;                             ///< of the stage, over which inertia acts [s]
+  double weight = 1;                     ///< of its forces in the step
+  std::vector<Vector<D>> start;          ///< velocity from which it begins
+  std::vector<Vector<D>> carried;        ///< empty where there was no stage before
+  std::vector<MeanForces<D>> before;     ///< forces of the stages before, weighted; likewise
+};
+
+/// A step under way. The iterate is `work.velocity` of the model, f_int is in `work.nodes` too.
 template <int D>
 struct ImplicitStep
 {
   ImplicitOptions options;
-  double dt = 0;                                          ///< [s]
+  double length = 0;                                      ///< of the whole step [s]
+  double dt = 0;                                          ///< from the step's start to the end of the stage [s]
+  Stage<D> stage;
   std::vector<Vector<D>> external;                        ///< f_ext at the step's end
   std::vector<Vector<D>> residual;                        ///< zero along supported directions
   std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
@@ -86,9 +121,34 @@ struct ImplicitStep
 template <int D>
 void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt);
 
-/// Inertia force of one component of a node, damping in it, for the iterate; none in a quasi-static step.
+/// Begins the second stage of a step of second order, after the first one has been solved.
+/// @pre `find_residual` was called for the solution of the first stage
+template <int D>
+void start_second_stage(Model<D>& model, ImplicitStep<D>& step);
+
+/// Velocity at the end of the stage for the iterate.
+template <int D>
+inline double end_velocity(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component)
+{
+  const Stage<D>& stage = step.stage;
+  const double carried = stage.carried.empty() ? 0 : stage.carried[node][component];
+  return (model.work.velocity[node][component] - carried) / stage.weight;
+}
+
+/// Inertia force of one component of a node, damping in it, and its derivative by the iterate; none in a quasi-static
+/// step.
 template <int D>
 Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component);
+
+/// The same for given velocities at start and end of the stage.
+template <int D>
+Inertia stage_inertia(const Model<D>& model, const ImplicitStep<D>& step, Index node, double start, double end);
+
+/// What a solved step of second order differs by from one of first order, u2 - dt v1 = g dt (v2 - v1): root mean square
+/// over the mass [m]. An estimate of the error of the displacement of a step that errs on the safe side.
+/// @note Collective
+template <int D>
+double displacement_error(const Model<D>& model, const ImplicitStep<D>& step);
 
 /// Makes the iterate satisfy the supports.
 template <int D>

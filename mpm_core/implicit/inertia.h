@@ -22,8 +22,9 @@
 ///
 /// while |v| is not above rms(v'): a viscous drag, which is what makes a damped explicit slide creep.
 ///
-/// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation. That share of D is taken as
-/// resolved, and the rest as not.
+/// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation, one of second order
+/// (1 + 2 z) / (1 + z)^2 with z = (g omega dt)^2 (see implicit_step.h). That share of D is taken as resolved, and the rest
+/// as not.
 
 #include "model/model.h"
 
@@ -33,6 +34,9 @@
 
 namespace mpm
 {
+/// g: length of each stage of a step of second order, over that of the step.
+inline constexpr double stage_fraction = 1 - 0.5 * std::numbers::sqrt2;
+
 /// Inertia force of one component, with what local damping adds to it, and its derivative by v1.
 struct Inertia
 {
@@ -41,14 +45,25 @@ struct Inertia
 };
 
 /// @param frequency  omega of the node [rad/s]
-inline Inertia damped_inertia(double mass, double v0, double v1, double dt, double alpha, double frequency)
+/// @param resolved   energy of an oscillation that the step leaves, over that at its start
+inline Inertia damped_inertia(double mass, double v0, double v1, double dt, double alpha, double frequency,
+                              double resolved)
 {
-  const double resolved = 1 / (1 + frequency * frequency * dt * dt);
   const double drag = alpha * (1 - resolved) * 2 * std::numbers::inv_pi * frequency * mass;
   alpha *= resolved;
   const double w = std::clamp(v1, std::min(0.0, v0), std::max(0.0, v0));
   const double slowed = mass / dt / (1 + alpha), sped = mass / dt / (1 - alpha);
   return {slowed * (w - v0) + sped * (v1 - w) + drag * v1, (v1 == w && v1 != v0 ? slowed : sped) + drag};
+}
+
+/// Energy of an oscillation that a step of backward Euler leaves, over that at its start; x = omega dt.
+inline double left_by_backward_euler(double x) { return 1 / (1 + x * x); }
+
+/// The same of a step of second order.
+inline double left_by_second_order(double x)
+{
+  const double z = stage_fraction * stage_fraction * x * x;
+  return (1 + 2 * z) / ((1 + z) * (1 + z));
 }
 
 /// omega of each node [rad/s]: that of its oscillation in shear against its neighbours, sqrt(sum_p V_p G |grad N|^2 /

@@ -63,7 +63,7 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
     for (int k = 0; k <= D; ++k)
       rows[model.mesh.cells[c][k]] +=
           step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
-  const double inertia = step.options.quasi_static ? 0 : 1 / step.dt;
+  const double inertia = step.options.quasi_static ? 0 : 1 / (step.stage.weight * step.stage.dt);
   for (const GhostFacet<D>& facet : step.ghosts)
   {
     double sum = 0;
@@ -77,8 +77,7 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] += step.options.quasi_static
                    ? 0
-                   : damped_inertia(model.work.nodes[i].mass, 0, 0, step.dt, step.options.damping, step.frequency[i])
-                         .derivative;
+                   : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
   return rows;
 }
 

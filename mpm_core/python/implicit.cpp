@@ -80,6 +80,11 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
               mean_stress_entries(i.model, i.step, i.system, i.mean_stress, i.mean_stress_by_strain);
           },
           Release())
+      .def(
+          "start_second_stage", [](I& i) { start_second_stage(i.model, i.step); }, Release())
+      .def(
+          "displacement_error", [](const I& i) { return displacement_error(i.model, i.step); }, Release())
+      .def_property_readonly("dt", [](const I& i) { return i.step.dt; })
       .def("start_relaxation",
            [](I& i, RelaxationKind kind)
            {
@@ -153,6 +158,7 @@ void bind_implicit(py::module_& m)
       .def_readwrite("ghost", &ImplicitOptions::ghost)
       .def_readwrite("hold_positions", &ImplicitOptions::hold_positions)
       .def_readwrite("load_share", &ImplicitOptions::load_share)
+      .def_readwrite("second_order", &ImplicitOptions::second_order)
       .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);
   bind_implicit_step<2>(m, "2");
   bind_implicit_step<3>(m, "3");

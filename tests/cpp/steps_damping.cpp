@@ -24,7 +24,7 @@ TEST(LocalDamping, IsThatOfTheImplicitScheme)
   {
     const double alpha = 0.99 * std::abs(number(random)), velocity = number(random), residual = 40 * number(random);
     const double next = next_velocity(alpha, residual, velocity);
-    EXPECT_NEAR(mpm::damped_inertia(mass, velocity, next, dt, alpha, 0).force, residual, 1e-12 * 40);
+    EXPECT_NEAR(mpm::damped_inertia(mass, velocity, next, dt, alpha, 0, 1).force, residual, 1e-12 * 40);
   }
 }
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from ._core import InputError, Integration, RunError
-from .checks import within
+from .checks import positive, within
 from .energy import EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
@@ -39,6 +39,7 @@ def implicit_options(
     quasi_static: bool,
     ghost: GhostPenalty | None,
     small_displacements: bool = False,
+    second_order: bool = False,
 ) -> Any:
     """The core's options of the scheme; see `Model.implicit`."""
     options = _core.ImplicitOptions()
@@ -49,12 +50,24 @@ def implicit_options(
         raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")
     options.integration = integration
     options.quasi_static = bool(quasi_static)
+    if second_order and quasi_static:
+        raise InputError("second_order is True, expected False where quasi_static is True: there is no inertia")
+    options.second_order = bool(second_order)
     options.ghost = (ghost or GhostPenalty()).options()
     if small_displacements and not quasi_static:
         raise InputError("small_displacements is True, expected False unless quasi_static is True")
     options.hold_positions = bool(small_displacements)
     options.average_stress = bool(small_displacements and nmd)
     return options
+
+
+def checked_accuracy(accuracy: float | None, second_order: bool) -> float | None:
+    """See `Model.implicit`."""
+    if accuracy is None:
+        return None
+    if not second_order:
+        raise InputError(f"accuracy is {accuracy} m, expected None unless second_order is True")
+    return positive("accuracy", accuracy, "m")
 
 
 @dataclass
@@ -79,9 +92,11 @@ class Stepper:
         solver: how to solve a step, such as ``Newton()``.
         options: the core's options of the scheme.
         dt: longest step [s].
+        accuracy: displacement [m] by which a step of second order may be wrong; None for any.
     """
 
-    def __init__(self, model: Model, solver: Any, options: Any, dt: float) -> None:
+    def __init__(self, model: Model, solver: Any, options: Any, dt: float, accuracy: float | None = None) -> None:
+        self._accuracy, self._growth = accuracy, 2.0
         self._model, self._core = model, model._core
         self._options, self._method = options, solver
         self.begin_anew()
@@ -116,15 +131,35 @@ class Stepper:
                     f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}"
                 )
         if self.last.easy:
-            self.control.length = min(self.control.longest, 2 * self.control.length)
+            self.control.length = min(self.control.longest, self._growth * self.control.length)
 
     def attempt(self, dt: float) -> str:
         """Try one step; the particles change only when it succeeds. Returns why it did not, or nothing."""
         self._changed |= self._step.start(self._options, dt)
-        self.last = self._solver.solve(self._step, dt, self._changed)
+        self._solve()
+        if self._options.second_order and self.last.converged:
+            first = self.last
+            self._step.start_second_stage()
+            self._solve()
+            self.last.easy = self.last.easy and first.easy
+            reason = self._too_coarse() if self.last.converged else ""
+            if reason:
+                return reason
+        return self._step.finish() if self.last.converged else self.last.reason
+
+    def _solve(self) -> None:
+        """One stage."""
+        self.last = self._solver.solve(self._step, self._step.dt, self._changed)
         self._changed = False
         self.control.iterations += self.last.iterations
-        return self._step.finish() if self.last.converged else self.last.reason
+
+    def _too_coarse(self) -> str:
+        """Why the step is to be shorter, or nothing; and what the next one may grow by."""
+        if self._accuracy is None:
+            return ""
+        error = self._step.displacement_error()
+        self._growth = float(np.clip(0.9 * np.sqrt(self._accuracy / max(error, 1e-300)), 0.5, 2.0))
+        return f"an error of {error:.3g} m in displacement" if error > 2 * self._accuracy else ""
 
     def report(self) -> ImplicitReport:
         """Where the run stands; counts begin anew."""
@@ -149,9 +184,10 @@ def run_implicit(
     watch: Callable[[], bool] | None,
     rebalance: float,
     energy_limit: float | None,
+    accuracy: float | None,
 ) -> Iterator[ImplicitReport]:
     """Step until each of the times; reports then, and after every so many steps."""
-    stepper = Stepper(model, solver, options, dt)
+    stepper = Stepper(model, solver, options, dt, accuracy)
     resumed, model._resumed = model._resumed, None
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
