@@ -60,8 +60,8 @@ COLUMNS = [
     "unbalanced_ratio", "plastic_share", "dt_s",
 ]  # fmt: skip
 MAY_CHANGE = {
-    "time", "dt", "damping", "pic", "nmd", "solver", "frames", "frame-steps", "rebalance", "checkpoint-every", "fields", "float64",
-    "compression", "pictures", "film",
+    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "frames", "frame-steps", "rebalance",
+    "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
 
@@ -105,6 +105,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
             p, options.initial in (None, "zero"), lambda: f"--initial is {options.initial}, expected zero with --paper"
         )
         check(p, options.dt in (None, 1e-4), lambda: f"--dt is {options.dt:g}, expected 1e-4 s with --paper")
+        check(
+            p,
+            options.integration == "particles",
+            lambda: f"--integration is {options.integration}, expected particles with --paper",
+        )
         options.initial, options.dt = "zero", 1e-4
     check_scheme_options(p, options)
     check_restart(p, options, MAY_CHANGE)

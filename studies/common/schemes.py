@@ -7,19 +7,28 @@ from collections.abc import Callable, Iterator
 
 import mpm_core as mpm
 
-from .options import add_choice, add_number, check
+from .options import add_choice, add_number, add_switch, check
 
 SCHEMES = ("explicit", "implicit", "quasi-static")
 SOLVERS = ("newton", "relaxation")
+INTEGRATIONS = {
+    "particles": mpm.Integration.PARTICLES,
+    "mixed": mpm.Integration.MIXED,
+    "dual-domain": mpm.Integration.DUAL_DOMAIN,
+}
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
 
 
 def add_scheme_options(parser: argparse.ArgumentParser) -> None:
-    """Options ``--scheme``, ``--solver`` and ``--dt``."""
+    """Options ``--scheme``, ``--solver``, ``--second-order``, ``--integration`` and ``--dt``."""
     add_choice(parser, "--scheme", "explicit", SCHEMES,
                "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
+    add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
+    add_choice(
+        parser, "--integration", "particles", tuple(INTEGRATIONS), "how the stresses of a cell become nodal forces"
+    )
     add_number(parser, "--dt", None, "s", "longest time step (default: half of the critical one; 20 times the critical "
                "one where implicit or quasi-static)", above=0)  # fmt: skip
 
@@ -38,6 +47,10 @@ def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Name
     check(parser, options.scheme != "quasi-static" or options.initial == "zero",
           lambda: f"--initial is {options.initial}, expected zero with --scheme quasi-static, which raises the unit weight "
                   "from zero")  # fmt: skip
+    check(parser, not options.second_order or options.scheme == "implicit",
+          lambda: f"--second-order is given, expected --scheme implicit with it, not {options.scheme}")  # fmt: skip
+    check(parser, options.integration != "dual-domain" or options.scheme == "explicit",
+          lambda: f"--integration is dual-domain, expected particles or mixed with --scheme {options.scheme}")  # fmt: skip
 
 
 def solver_named(name: str) -> mpm.Newton | mpm.Relaxation:
@@ -84,9 +97,15 @@ def run_scheme(
         "damping": a.damping,
         "pic": a.pic,
         "nmd": a.nmd,
+        "integration": INTEGRATIONS[a.integration],
     }
     if a.scheme == "explicit":
         return model.explicit(a.time, dt=dt, **common)
     return model.implicit(
-        a.time, dt=dt, solver=solver_named(a.solver), quasi_static=a.scheme == "quasi-static", **common
+        a.time,
+        dt=dt,
+        solver=solver_named(a.solver),
+        quasi_static=a.scheme == "quasi-static",
+        second_order=a.second_order,
+        **common,
     )
