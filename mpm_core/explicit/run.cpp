@@ -33,7 +33,9 @@ std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble)
   switch (trouble.kind)
   {
   case Trouble<D>::Kind::left_mesh:
-    out << "left the background mesh; extend the mesh there or name the facets as outflow";
+    out << "left the background mesh; where the soil is to stay, support it there (model.fix, model.roller), else "
+           "extend the mesh "
+           "or name the facets as outflow";
     break;
   case Trouble<D>::Kind::not_finite:
     out << "has a position that is not a number; the step may be too large for the stiffness";

@@ -130,7 +130,8 @@ template <int D>
 void add_ghost_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
                        const GhostFacet<D>& facet, Writer& writer)
 {
-  const double factor = facet.stiffness + (step.options.quasi_static ? 0 : facet.mass / (step.stage.weight * step.stage.dt * step.dt));
+  const double factor =
+      facet.stiffness + (step.options.quasi_static ? 0 : facet.mass / (step.stage.weight * step.stage.dt * step.dt));
   for (int k = 0; k < D + 2; ++k)
     for (int l = 0; l < D + 2; ++l)
     {

@@ -7,10 +7,11 @@
 ///
 ///     f_i = sum_F |F| [dN_i/dn] ( gamma_K G h [du/dn] + gamma_M rho h^3 [da/dn] ),   [.] the jump over F,
 ///
-/// of the step's displacement u and acceleration a = (v1 - v0)/dt (Burman 2010; Sticko & Kreiss 2016 for the mass;
-/// Coombs 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly filled cells have it, so a
-/// body whose cells are filled is not touched. A cell that has no filled neighbour is tied to a gradient of zero
-/// instead.
+/// of the step's displacement u and acceleration a = (v1 - v0)/dt; with inertia u counts beyond what the velocity of
+/// the step's start would give, dt (v - v0), so that a steady motion is not braked step by step (Burman 2010; Sticko &
+/// Kreiss 2016 for the mass; Coombs 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly
+/// filled cells have it, so a body whose cells are filled is not touched. A cell that has no filled neighbour is tied
+/// to a gradient of zero instead.
 
 #include "model/model.h"
 #include "parallel/halo.h"

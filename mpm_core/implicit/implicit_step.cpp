@@ -35,17 +35,16 @@ void add_ghost_forces(Model<D>& model, ImplicitStep<D>& step)
   const double inertia = step.options.quasi_static ? 0 : 1 / step.stage.dt;
   for (const GhostFacet<D>& facet : step.ghosts)
   {
-    const Vector<D> jump = jump_over(facet,
-                                     [&](Index i)
-                                     {
-                                       Vector<D> value;
-                                       for (int a = 0; a < D; ++a)
-                                         value[a] =
-                                             facet.stiffness * step.dt * (work.velocity[i][a] - work.start_velocity[i][a]) +
-                                             facet.mass * inertia *
-                                                 (end_velocity(model, step, i, a) - step.stage.start[i][a]);
-                                       return value;
-                                     });
+    const Vector<D> jump =
+        jump_over(facet,
+                  [&](Index i)
+                  {
+                    Vector<D> value;
+                    for (int a = 0; a < D; ++a)
+                      value[a] = facet.stiffness * step.dt * (work.velocity[i][a] - work.start_velocity[i][a]) +
+                                 facet.mass * inertia * (end_velocity(model, step, i, a) - step.stage.start[i][a]);
+                    return value;
+                  });
     for (int k = 0; k < D + 2; ++k)
       for (int a = 0; a < D; ++a)
         step.forces[facet.nodes[k]].ghost[a] += facet.share[k] * facet.jump[k] * jump[a];
@@ -106,8 +105,8 @@ void find_external(const Model<D>& model, ImplicitStep<D>& step)
     }
 }
 
-/// Work done in the step: forces act at its end, or at the ends of its stages, over its whole displacement. That of the ghost penalty counts as
-/// damping.
+/// Work done in the step: forces act at its end, or at the ends of its stages, over its whole displacement. That of the
+/// ghost penalty counts as damping.
 template <int D>
 void tally(Model<D>& model, const ImplicitStep<D>& step)
 {

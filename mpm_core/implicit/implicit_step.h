@@ -6,16 +6,17 @@
 ///
 ///     r(v1) = f_ext - f_int(u) - D - M (v1 - v0) / dt = 0,   u = dt v1.
 ///
-/// The scheme of second order is the diagonally implicit Runge-Kutta method of two stages with g = 1 - 1/sqrt(2) (Alexander
-/// 1977, SIAM J. Numer. Anal. 14, 1006-1021, theorem 5), each stage like a step of backward Euler of length g dt:
+/// The scheme of second order is the diagonally implicit Runge-Kutta method of two stages with g = 1 - 1/sqrt(2)
+/// (Alexander 1977, SIAM J. Numer. Anal. 14, 1006-1021, theorem 5), each stage like a step of backward Euler of length
+/// g dt:
 ///
 ///     M (v1 - v0) / (g dt) = f(u1),                        u1 = g dt v1
 ///     M (v2 - v0 - (1 - g)/g (v1 - v0)) / (g dt) = f(u2),  u2 = (1 - g) dt v1 + g dt v2,
 ///
-/// with f = f_ext - f_int - D; the step ends with u2 and v2. It is L-stable: oscillations that the step does not resolve
-/// go, while of the energy of one of angular frequency w a step leaves (1 + 2 z) / (1 + z)^2, z = (g w dt)^2, that is
-/// 1 - z^2 where it is resolved (backward Euler: 1 / (1 + (w dt)^2)). Stresses go from the step's start over the whole
-/// increment in both stages.
+/// with f = f_ext - f_int - D; the step ends with u2 and v2. It is L-stable: oscillations that the step does not
+/// resolve go, while of the energy of one of angular frequency w a step leaves (1 + 2 z) / (1 + z)^2, z = (g w dt)^2,
+/// that is 1 - z^2 where it is resolved (backward Euler: 1 / (1 + (w dt)^2)). Stresses go from the step's start over
+/// the whole increment in both stages.
 ///
 /// Stresses go from the step's start over the whole increment u; gradients and volumes are those of the start, so that
 /// the first quasi-static step of a linear elastic body whose cells are filled is the solution of linear finite
@@ -84,11 +85,11 @@ struct MeanForces
 template <int D>
 struct Stage
 {
-  double dt;                             ///< of the stage, over which inertia acts [s]
-  double weight = 1;                     ///< of its forces in the step
-  std::vector<Vector<D>> start;          ///< velocity from which it begins
-  std::vector<Vector<D>> carried;        ///< empty where there was no stage before
-  std::vector<MeanForces<D>> before;     ///< forces of the stages before, weighted; likewise
+  double dt;                         ///< of the stage, over which inertia acts [s]
+  double weight = 1;                 ///< of its forces in the step
+  std::vector<Vector<D>> start;      ///< velocity from which it begins
+  std::vector<Vector<D>> carried;    ///< empty where there was no stage before
+  std::vector<MeanForces<D>> before; ///< forces of the stages before, weighted; likewise
 };
 
 /// A step under way. The iterate is `work.velocity` of the model, f_int is in `work.nodes` too.
@@ -96,8 +97,8 @@ template <int D>
 struct ImplicitStep
 {
   ImplicitOptions options;
-  double length = 0;                                      ///< of the whole step [s]
-  double dt = 0;                                          ///< from the step's start to the end of the stage [s]
+  double length = 0; ///< of the whole step [s]
+  double dt = 0;     ///< from the step's start to the end of the stage [s]
   Stage<D> stage;
   std::vector<Vector<D>> external;                        ///< f_ext at the step's end
   std::vector<Vector<D>> residual;                        ///< zero along supported directions

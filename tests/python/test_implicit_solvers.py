@@ -25,7 +25,7 @@ def solved_step(solver, *, nmd=False, quasi_static=False):
     brought to equilibrium at once."""
     model = slope(0.2, weight=20e3 if quasi_static else 80e3)
     if not quasi_static:
-        list(model.implicit(3 * DT, dt=DT, damping=0.75))
+        list(model.implicit(2 * DT, dt=DT, damping=0.75))
     options = _core.ImplicitOptions()
     options.damping, options.mixed_discretisation, options.quasi_static = 0.75, nmd, quasi_static
     stepper = Stepper(model, solver, options, DT)

@@ -38,6 +38,7 @@ from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .space import Space, parts, space
 
 for _law in law_types:
     explain_arguments(_law)
@@ -67,6 +68,7 @@ __all__ = [
     "RunError",
     "Softening",
     "SofteningMohrCoulomb",
+    "Space",
     "StressUpdate",
     "Umat",
     "Undrained",
@@ -74,6 +76,8 @@ __all__ = [
     "checkpoint_description",
     "log_preconsolidation",
     "matched_drucker_prager",
+    "parts",
+    "space",
     "tresca",
     "von_mises",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from .checks import positive, within
 from .energy import EnergyWatch
 from .partition import keep_balance
 from .report import Report
+from .space import SpaceWatch
 
 if TYPE_CHECKING:
     from .model import Model
@@ -47,20 +47,6 @@ def require_particles(model: Model) -> None:
     """Raises InputError where no rank has any. Collective."""
     if model.comm.allreduce(len(model.particles)) == 0:
         raise InputError("the model has no particles, seed some first")
-
-
-def warn_if_nothing_acts(model: Model) -> None:
-    """Warns where nothing can set the particles in motion: most often gravity has been forgotten. Collective."""
-    p = model.particles
-    acts = bool(np.any(model.gravity)) or bool(model._prescribed)
-    acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
-    if not model.comm.allreduce(int(acts)) and model.comm.rank == 0:
-        warnings.warn(
-            "nothing acts on the particles: gravity is zero, and so are tractions, prescribed velocities, and the particles' own "
-            "velocities and stresses; gravity is given by model.set_gravity",
-            RuntimeWarning,
-            stacklevel=3,
-        )
 
 
 def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:
@@ -110,7 +96,7 @@ def run_explicit(
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+    energy, body = EnergyWatch(energy_limit, model.comm.rank == 0), SpaceWatch(model)
 
     def report() -> Report:
         now = model.report()
@@ -128,4 +114,6 @@ def run_explicit(
                 yield report()
             if ends:
                 return
+        if until == times[-1]:
+            body.look()
         yield report()

@@ -19,7 +19,6 @@ from .explicit import (
     run_explicit,
     run_options,
     steps_between,
-    warn_if_nothing_acts,
 )
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, implicit_options, run_implicit, settle
@@ -29,6 +28,7 @@ from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .setup_warnings import warn_of_setup
 
 
 class Model(Body):
@@ -179,7 +179,7 @@ class Model(Body):
             ),
         )
         require_particles(self)
-        warn_if_nothing_acts(self)
+        warn_of_setup(self, nmd)
         return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit")
 
     def implicit(
@@ -243,7 +243,9 @@ class Model(Body):
         options, longest, times, steps, threshold, limit, wanted = collectively(
             self.comm,
             lambda: (
-                implicit_options(damping, pic, nmd, integration, quasi_static, ghost, small_displacements, second_order),
+                implicit_options(
+                    damping, pic, nmd, integration, quasi_static, ghost, small_displacements, second_order
+                ),
                 positive("dt", dt, "s"),
                 report_times(self, until, every, since),
                 steps_between(1 if every is None and every_steps is None else every_steps),
@@ -253,7 +255,7 @@ class Model(Body):
             ),
         )
         require_particles(self)
-        warn_if_nothing_acts(self)
+        warn_of_setup(self, nmd)
         reports = run_implicit(
             self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
             energy_limit=limit, accuracy=wanted,

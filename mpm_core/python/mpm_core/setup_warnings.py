@@ -1,0 +1,82 @@
+"""What a model says before its first step when something has most likely been forgotten, or is of the wrong size."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from mpi4py import MPI
+
+if TYPE_CHECKING:
+    from .model import Model
+
+UNIT_WEIGHTS = (1e3, 200e3)
+"""[N/m3] between which the unit weight of a soil is thought to lie; peat is at 10 kN/m3, published slopes go up to 80"""
+
+NEARLY_INCOMPRESSIBLE = 0.45
+"""Poisson's ratio from which on linear cells lock"""
+
+
+def warn_of_setup(model: Model, nmd: bool) -> None:
+    """Warn of what is likely to be an oversight. Collective."""
+    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), _locks(model, nmd)) if text]
+    if model.comm.rank == 0:
+        for text in found:
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def _nothing_acts(model: Model) -> str:
+    p = model.particles
+    acts = bool(np.any(model.gravity)) or bool(model._prescribed)
+    acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
+    if model.comm.allreduce(int(acts)):
+        return ""
+    return (
+        "nothing acts on the particles: gravity is zero, and so are tractions, prescribed velocities, and the particles' own "
+        "velocities and stresses; gravity is given by model.set_gravity"
+    )
+
+
+def _nothing_holds(model: Model) -> str:
+    if model._wishes or not np.any(model.gravity):
+        return ""
+    return "nothing holds the particles, which fall freely: there is gravity and no boundary condition (model.fix, model.roller)"
+
+
+def _weight(model: Model) -> str:
+    p, gravity = model.particles, float(np.linalg.norm(model.gravity))
+    densities = p.mass / p.volume
+    low = model.comm.allreduce(float(densities.min(initial=np.inf)), MPI.MIN) * gravity
+    high = model.comm.allreduce(float(densities.max(initial=0.0)), MPI.MAX) * gravity
+    odd = low if low < UNIT_WEIGHTS[0] else high
+    if gravity == 0 or (low >= UNIT_WEIGHTS[0] and high <= UNIT_WEIGHTS[1]):
+        return ""
+    return (
+        f"the unit weight of particles is {odd:.4g} N/m3, density times gravity, expected from {UNIT_WEIGHTS[0]:g} to "
+        f"{UNIT_WEIGHTS[1]:g} N/m3 for a soil: densities are in kg/m3, 2000 for most soils"
+    )
+
+
+def _locks(model: Model, nmd: bool) -> str:
+    reasons = sorted({reason for law in model.laws for reason in _reasons_to_lock(law)}) if not nmd else []
+    if not reasons:
+        return ""
+    return (
+        f"linear cells lock in soil that keeps its volume ({', '.join(reasons)}): it is too stiff and too strong, the more so the "
+        "coarser the mesh; nmd=True averages volumetric strains against that (docs/locking.md)"
+    )
+
+
+def _reasons_to_lock(law: Any) -> Iterator[str]:
+    """Why a law keeps the volume of the soil, itself or the one that it wraps."""
+    for inner in ("skeleton", "law", "peak"):
+        if hasattr(law, inner):
+            yield from _reasons_to_lock(getattr(law, inner))
+    if hasattr(law, "water_modulus"):
+        yield "undrained"
+    if getattr(law, "poisson", 0.0) > NEARLY_INCOMPRESSIBLE:
+        yield f"Poisson's ratio {law.poisson:g}"
+    if getattr(law, "friction_angle", 1.0) == 0:
+        yield "friction angle 0"

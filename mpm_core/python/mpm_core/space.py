@@ -1,0 +1,112 @@
+"""The space that the soil takes, and whether it hangs together: what a run loses without anything else showing it."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .model import Model
+
+LEAST_FILLED = 0.85
+"""Filled volume over that of the particles below which a run warns"""
+
+LEAST_PART = 0.01
+"""Fraction of the mass from which on a piece of the body counts as a part"""
+
+
+class Space(NamedTuple):
+    """Volumes, in plane strain areas times one metre [m3].
+
+    particles: sum of the particles' volumes
+    filled: what they fill: in each cell the less of their volume and its own
+    """
+
+    particles: float
+    filled: float
+
+
+def space(model: Model) -> Space:
+    """Volume of the particles, and what of the mesh it fills. Where particles crowd, the soil takes less space than it has.
+
+    Note:
+        Collective.
+    """
+    p, mesh = model.particles, model.mesh
+    held = np.bincount(p.cell, p.volume, minlength=mesh.owned_cells)
+    filled = np.minimum(held[: mesh.owned_cells], mesh.cell_volumes[: mesh.owned_cells])
+    sums = model.comm.allreduce(np.array([p.volume.sum(), filled.sum()]))
+    return Space(float(sums[0]), float(sums[1]))
+
+
+def parts(model: Model) -> NDArray[np.float64]:
+    """Masses [kg] of the pieces that the body consists of, the heaviest first, on all ranks.
+
+    Particles belong together when their cells share a node, for then they act on each other. A body in tension whose
+    particles have moved apart by more than a cell is in pieces (numerical fracture), whatever its law says.
+
+    Note:
+        Collective; gathers the filled cells on one rank.
+    """
+    p, mesh = model.particles, model.mesh
+    mass = np.bincount(p.cell, p.mass, minlength=mesh.owned_cells)[: mesh.owned_cells]
+    cells = np.flatnonzero(mass)
+    gathered = model.comm.gather((mesh.global_nodes[mesh.cells[cells]], mass[cells]))
+    found = None
+    if gathered is not None:
+        nodes, masses = (np.concatenate(each) for each in zip(*gathered, strict=True))
+        found = _piece_masses(nodes, masses)
+    return model.comm.bcast(found)
+
+
+def _piece_masses(cells: NDArray, masses: NDArray) -> NDArray[np.float64]:
+    """Masses of the sets of cells that nodes connect."""
+    numbers, nodes = np.unique(cells, return_inverse=True)
+    nodes = nodes.reshape(cells.shape)
+    label = np.arange(len(numbers))
+    while True:
+        least = label[nodes].min(axis=1)
+        before = label.copy()
+        for k in range(nodes.shape[1]):
+            np.minimum.at(label, nodes[:, k], least)
+        label = label[label]  # a node takes the label of the one it is named after: pieces grow by leaps
+        if np.array_equal(label, before):
+            break
+    weights = np.bincount(label[nodes[:, 0]], masses)
+    return np.sort(weights[weights > 0])[::-1]
+
+
+class SpaceWatch:
+    """Compares a body at the end of a run with the one at its start."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._parts = self._count()
+
+    def _count(self) -> int:
+        masses = parts(self._model)
+        return int(np.sum(masses >= LEAST_PART * masses.sum()))
+
+    def look(self) -> None:
+        """Warn where the body has fallen apart, or has lost space. Collective."""
+        now, volumes = self._count(), space(self._model)
+        if self._model.comm.rank != 0:
+            return
+        if now > self._parts:
+            warnings.warn(
+                f"the body is in {now} parts at t = {self._model.time:.6g} s and was in {self._parts}: particles have moved apart "
+                "by more than a cell, so that no force acts between them. Unless the soil is to break, take more particles per "
+                "cell or larger cells",
+                RuntimeWarning,
+                stacklevel=5,
+            )
+        if volumes.filled < LEAST_FILLED * volumes.particles:
+            warnings.warn(
+                f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
+                f"{self._model.time:.6g} s: they crowd in some cells, and space is lost. integration=MIXED keeps more of it",
+                RuntimeWarning,
+                stacklevel=5,
+            )

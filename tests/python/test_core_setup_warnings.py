@@ -1,0 +1,60 @@
+"""What a model warns of before its first step."""
+
+import re
+import warnings
+
+import pytest
+from core_cases import box, rollers
+
+import mpm_core as mpm
+
+SOIL = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0)
+
+
+def model_of(law=SOIL, density=2000.0, held=True, gravity=9.81):
+    model = mpm.Model(box([2, 2]), law)
+    model.seed(density=density, per_cell=3)
+    if held:
+        rollers(model)
+    model.set_gravity((0.0, -gravity))
+    return model
+
+
+def said(model, **options):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model.explicit(1e-4, dt=1e-4, energy_limit=None, **options).last()
+    return [str(each.message) for each in caught if "energy" not in str(each.message)]
+
+
+def test_a_sound_model_says_nothing():
+    assert said(model_of()) == []
+
+
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        ({"held": False}, "nothing holds the particles"),
+        ({"density": 80 / 9.81}, "unit weight of particles is 80 N/m3"),
+        ({"density": 80e6 / 9.81}, "unit weight of particles is 8e.07 N/m3"),
+        ({"gravity": 0.0}, "nothing acts on the particles"),
+    ],
+)
+def test_what_has_been_forgotten_or_is_of_the_wrong_size_is_said(options, text):
+    (one,) = said(model_of(**options))
+    assert re.search(text, one)
+
+
+@pytest.mark.parametrize(
+    "law, reason",
+    [
+        (mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=0.0), "friction angle 0"),
+        (mpm.LinearElastic(young=1e6, poisson=0.49), "Poisson's ratio 0.49"),
+        (mpm.Undrained(SOIL, water_modulus=1e8, porosity=0.4), "undrained"),
+        (mpm.Hencky(mpm.LinearElastic(young=1e6, poisson=0.48)), "Poisson's ratio 0.48"),
+    ],
+)
+def test_laws_that_lock_are_named_unless_strains_are_averaged(law, reason):
+    (one,) = said(model_of(law))
+    assert reason in one and "nmd=True" in one
+    assert said(model_of(law), nmd=True) == []
