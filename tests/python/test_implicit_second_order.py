@@ -77,7 +77,7 @@ def test_the_accuracy_wanted_is_reached_by_shorter_steps():
         errors.append(abs(top(model) - exact))
         steps.append(model.steps)
     assert errors[0] > errors[1] and steps[0] < steps[1]
-    # The estimate is that of first order: a step's error falls with the square of its length, ten times smaller steps by the root.
+    # The estimate is that of first order: an error ten times smaller takes steps shorter by the root of ten.
     assert steps[1] / steps[0] == pytest.approx(np.sqrt(10), rel=0.35)
     assert errors[1] < 10 * 4e-9
 

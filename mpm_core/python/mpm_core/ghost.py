@@ -24,7 +24,8 @@ class GhostPenalty:
     """
 
     stiffness: float = 0.1
-    """gamma_K, relative to the shear modulus [-]; acts on the step's displacement, with inertia on what changes of velocity add to it"""
+    """gamma_K, relative to the shear modulus [-]; acts on the step's displacement,
+    with inertia on what changes of velocity add to it"""
     mass: float = 0.1
     """gamma_M, relative to the density [-]; acts on the acceleration"""
     filled: float = 0.5

@@ -230,7 +230,7 @@ class Model(Body):
                 symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; looked at before each step.
             energy_limit: see ``explicit``; by default none. What the scheme takes out counts as unexplained.
-            second_order: two stages to a step instead of backward Euler, the paper's: of second order in time, and with hardly any
+            second_order: two stages to a step instead of backward Euler, the paper's: of second order in time, with hardly any
                 loss of energy in motion that the steps resolve (Alexander 1977). A step costs twice as much.
             accuracy: for steps of second order, the displacement [m] by which a step may be wrong, root mean square over the
                 mass: steps are shortened, and grow, up to ``dt``, by an estimate of it. By default all are ``dt`` long.

@@ -64,7 +64,7 @@ def _locks(model: Model, nmd: bool) -> str:
     if not reasons:
         return ""
     return (
-        f"linear cells lock in soil that keeps its volume ({', '.join(reasons)}): it is too stiff and too strong, the more so the "
+        f"linear cells lock in soil that keeps its volume ({', '.join(reasons)}): it is too stiff and too strong, more so the "
         "coarser the mesh; nmd=True averages volumetric strains against that (docs/locking.md)"
     )
 

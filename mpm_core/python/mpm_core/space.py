@@ -97,7 +97,7 @@ class SpaceWatch:
             return
         if now > self._parts:
             warnings.warn(
-                f"the body is in {now} parts at t = {self._model.time:.6g} s and was in {self._parts}: particles have moved apart "
+                f"the body is in {now} parts at t = {self._model.time:.6g} s, and was in {self._parts}: particles moved apart "
                 "by more than a cell, so that no force acts between them. Unless the soil is to break, take more particles per "
                 "cell or larger cells",
                 RuntimeWarning,
