@@ -38,7 +38,7 @@ from common.plots import (
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import add_pic, run_scheme
+from common.schemes import add_discretisation, add_pic, run_scheme
 from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import write_summary
 from common.watch import Watch
@@ -63,6 +63,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_pic(p, 0.0)
+    add_discretisation(p)
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 200.0, "s", "longest duration of a slide", above=0)
     add_number(

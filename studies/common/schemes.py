@@ -25,10 +25,7 @@ def add_scheme_options(parser: argparse.ArgumentParser) -> None:
     add_choice(parser, "--scheme", "explicit", SCHEMES,
                "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
-    add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
-    add_choice(
-        parser, "--integration", "particles", tuple(INTEGRATIONS), "how the stresses of a cell become nodal forces"
-    )
+    add_discretisation(parser)
     add_number(parser, "--dt", None, "s", "longest time step (default: half of the critical one; 20 times the critical "
                "one where implicit or quasi-static)", above=0)  # fmt: skip
 
@@ -38,6 +35,14 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
     add_number(parser, "--pic", default, "-",
                "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
                at_least=0, at_most=1)  # fmt: skip
+
+
+def add_discretisation(parser: argparse.ArgumentParser) -> None:
+    """Options ``--second-order`` and ``--integration``."""
+    add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
+    add_choice(
+        parser, "--integration", "particles", tuple(INTEGRATIONS), "how the stresses of a cell become nodal forces"
+    )
 
 
 def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
@@ -106,6 +111,6 @@ def run_scheme(
         dt=dt,
         solver=solver_named(a.solver),
         quasi_static=a.scheme == "quasi-static",
-        second_order=a.second_order,
+        second_order=a.second_order and a.scheme == "implicit",
         **common,
     )
