@@ -11,6 +11,10 @@ NOT_WRITTEN: list[str] = []
 """Pictures and films that this run could not write, each with the reason; ``run_study`` prints them at the end."""
 
 
+PROGRAM = os.environ.get("TALUS_PROGRAM", "studies/run")
+"""The command that runs studies, as messages name it"""
+
+
 class OutputError(RuntimeError):
     """The results cannot be written; the message names the path and the reason."""
 

@@ -24,6 +24,7 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
+from .files import PROGRAM
 from .notes import checkpoint_notes
 from .parameters import Parameter, ParameterError, checked_values, described, read_parameters
 
@@ -107,7 +108,7 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
         description: the study's docstring; shown as it is.
     """
     parser = _Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
-    parser.prog = f"studies/run {Path(parser.prog).stem}"
+    parser.prog = f"{PROGRAM} {Path(parser.prog).stem}"
     parser.add_argument(
         "--output", type=Path, default=None, metavar="DIR",
         help="folder for the results; one that holds results is refused (default: results/NAME, or where that holds a run "

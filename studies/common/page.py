@@ -19,6 +19,11 @@ from .report_sections import Section
 STARTED = time.time()
 """Files that are older do not belong to this run."""
 MOST_FACTS = 6
+TITLES = {
+    "history": "History of the run", "totals": "Totals of all particles", "crest": "Particle at the crest",
+    "section_crest": "Force across the vertical section under the crest",
+}  # fmt: skip
+"""Of curves, by the names of their files"""
 NOT_FACTS = ("steps", "cells", "soil_cells", "failed")
 
 
@@ -102,7 +107,9 @@ def _histories(folder: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
             columns = dict(zip(rows[0], values.T))
             # Over the first column that changes.
             moving = [name for name, column in columns.items() if column.min() < column.max()]
-            yield _caption(path), {name: columns[name] for name in dict.fromkeys([*moving[:1], *columns])}
+            yield TITLES.get(path.stem, _caption(path)), {
+                name: columns[name] for name in dict.fromkeys([*moving[:1], *columns])
+            }
 
 
 def _sorted_out(results: Mapping[str, object]) -> tuple[dict, list[Section], dict]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import tomllib
 
-from .files import write_text
+from .files import PROGRAM, write_text
 
 NOT_PARAMETERS = ("help", "output", "overwrite", "parameters_file", "restart", "allow_code")
 """Options that say where things are, or what a run may do, not what is computed; they do not belong into a file of parameters."""
@@ -93,7 +93,7 @@ def write_parameters(
     Raises:
         OutputError: with path and reason.
     """
-    lines = [f"# To repeat this run: studies/run {study} --parameters {path.name}"]
+    lines = [f"# To repeat this run: {PROGRAM} {study} --parameters {path.name}"]
     for restart in restarts:
         changed = f"; changed then: {restart['changed']}" if restart["changed"] else ""
         lines.append(f"# Restarted from a checkpoint at {restart['time_s']:.9g} s{changed}")

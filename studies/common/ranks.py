@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from .files import NOT_WRITTEN
+from .files import NOT_WRITTEN, PROGRAM
 
 
 def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
@@ -74,14 +74,14 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     try:
         code = main()
         for reason in NOT_WRITTEN:
-            print(f"studies/run {name}: {reason}", file=sys.stderr)
+            print(f"{PROGRAM} {name}: {reason}", file=sys.stderr)
         sys.exit(code or (1 if NOT_WRITTEN else 0))
     except expected as error:
         if comm.rank == 0:
-            print(f"studies/run {name}: {error}", file=sys.stderr)
+            print(f"{PROGRAM} {name}: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
-        print(f"\nstudies/run {name}: interrupted", file=sys.stderr)
+        print(f"\n{PROGRAM} {name}: interrupted", file=sys.stderr)
         if comm.size > 1:
             comm.Abort(128 + signal.SIGINT)
         sys.exit(128 + signal.SIGINT)

@@ -30,7 +30,12 @@ UNITS = {
     "_degrees": "degrees",
 }  # fmt: skip
 """Of a quantity, by the end of its name."""
-SPECIAL = {"dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s")}
+SPECIAL = {
+    "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"), "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
+    "runout_m": ("Run-out", "m"), "kinetic_energy_J_per_m": ("Kinetic energy of the particles", "J/m"),
+    "nodal_kinetic_energy_J_per_m": ("Kinetic energy of the nodes", "J/m"), "plastic_share": ("Fraction of particles that yield", "-"),
+    "unbalanced_ratio": ("Out-of-balance ratio", "-"),
+}  # fmt: skip
 
 
 @dataclass
@@ -130,7 +135,7 @@ def _data(report: Report) -> dict:
         "movies": [packed(movie) for movie in movies],
         "slider": report.slider,
         "quantities": {k: {"name": q.name, "unit": q.unit, "colours": q.colours} for k, q in quantities.items()},
-        "first": next(iter(quantities), None),
+        "first": _first(movies, limits),
         "limits": limits,
         "extent": [np.min([c[0] for c in corners], 0).tolist(), np.max([c[1] for c in corners], 0).tolist()]
         if corners
@@ -140,6 +145,22 @@ def _data(report: Report) -> dict:
         },
         "curves": [_curves(title, table) for title, table in report.curves.items() if _drawable(table)],
     }
+
+
+def _first(movies: Sequence[Movie], limits: Mapping[str, tuple[float, float]]) -> str | None:
+    """The quantity shown first: one that varies in all panels, so that none is of one colour; otherwise the first there is."""
+
+    def varies(movie: Movie, key: str) -> bool:
+        if key not in movie.quantities:
+            return False
+        low, high = limits[key]
+        values = [
+            np.clip(movie.quantities[key].scale * frame[key], low, high) for frame in movie.frames if len(frame[key])
+        ]
+        span = max((v.max() for v in values), default=low) - min((v.min() for v in values), default=low)
+        return bool(span > 0.05 * (high - low))
+
+    return next((key for key in limits if all(varies(movie, key) for movie in movies)), next(iter(limits), None))
 
 
 def _values(movies: Sequence[Movie], key: str) -> list[np.ndarray]:
@@ -160,14 +181,18 @@ def _drawable(table: Mapping[str, np.ndarray]) -> bool:
 
 
 def _curves(title: str, table: Mapping[str, np.ndarray]) -> dict:
-    """A table as JSON; NaN becomes null."""
-    columns = []
-    for column, values in table.items():
+    """A table as JSON; NaN becomes null. What does not change is given as text, and not drawn."""
+    columns, constant = [], []
+    for number, (column, values) in enumerate(table.items()):
         name, unit = name_and_unit(column)
         numbers = [float(v) if np.isfinite(v) else None for v in values]
-        columns.append({"name": name, "unit": unit, "values": numbers})
+        if number > 0 and len(set(numbers)) == 1:
+            constant.append(f"{name} {shown(numbers[0])}{'' if unit == '-' else f' {unit}'}")
+        else:
+            columns.append({"name": name, "unit": unit, "values": numbers})
     first, *others = columns
-    return {"title": title, "isTime": next(iter(table)) == "time_s", "along": first, "curves": others}
+    text = f"Constant: {', '.join(constant)}." if constant else ""
+    return {"title": title, "isTime": next(iter(table)) == "time_s", "along": first, "curves": others, "constant": text}
 
 
 # --- what stands on the page as it is --------------------------------------------------------------------------------
@@ -195,7 +220,7 @@ def _value(value: object, unit: str) -> str:
     text = shown(value)
     # Only what is short may keep a column from becoming narrow.
     kind = "number" if len(text) < 18 else "long"
-    return f'<td class="{kind}">{html.escape(text)}</td><td>{"" if unit == "-" else html.escape(unit)}</td>'
+    return f'<td class="{kind}">{html.escape(text)}</td><td>{"" if unit == "-" else f"[{html.escape(unit)}]"}</td>'
 
 
 def shown(value: object) -> str:

@@ -23,6 +23,8 @@ from .options import Options
 from .parameters import write_parameters
 
 ROOT = Path(__file__).parents[2]
+IN_SOURCES = (ROOT / "CMakeLists.txt").exists()
+"""Whether the studies are those of the source tree, not of an installed package"""
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""
 ROOM = 1 << 16
@@ -36,7 +38,7 @@ _locks: dict[Path, TextIO] = {}
 def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: bool = False) -> Path:
     """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it.
 
-    Without ``--output`` it is ``results/NAME`` of the repository, or where that holds a run, ``results/NAME-2`` and so on. A
+    Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that holds a run, ``results/NAME-2`` and so on. A
     folder named by ``--output`` that holds results is refused, unless ``--overwrite`` says that they may go. A run that goes
     on from a checkpoint writes to the run's folder, where the checkpoint lies, unless ``--output`` names another.
 
@@ -126,7 +128,7 @@ def _opened(options: Options, adds: bool) -> Path:
         if goes_on:
             _set_aside(folder)
         return folder.resolve()
-    first = ROOT / "results" / options.study
+    first = _home() / options.study
     for folder in _numbered(first):
         obstacle = _taken(folder, adds, options.overwrite)
         if obstacle is None:
@@ -136,6 +138,13 @@ def _opened(options: Options, adds: bool) -> Path:
         if options.overwrite or adds:
             raise OutputError(obstacle)
     raise AssertionError("there is always another number")
+
+
+def _home() -> Path:
+    """Where the results of all studies lie: as ``TALUS_RESULTS`` says, otherwise in the source tree, or where there is none here."""
+    if "TALUS_RESULTS" in os.environ:
+        return Path(os.environ["TALUS_RESULTS"])
+    return (ROOT if IN_SOURCES else Path.cwd()) / "results"
 
 
 def _numbered(first: Path) -> Iterator[Path]:

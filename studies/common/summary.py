@@ -17,7 +17,7 @@ from .figures import Pictures, draw_pictures
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
-from .results import ROOT, give_room, note_what_was_written
+from .results import IN_SOURCES, ROOT, give_room, note_what_was_written
 
 
 def versions() -> dict[str, str]:
@@ -49,6 +49,8 @@ def versions() -> dict[str, str]:
 
 def git_revision() -> str:
     """Commit of the sources, with ``-changed`` when files differ from it; ``unknown`` outside a clone."""
+    if not IN_SOURCES:
+        return "installed"
     command = ["git", "-C", str(ROOT), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=-changed"]
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()

@@ -15,6 +15,7 @@ function drawCurves(table, host, player) {
   const section = document.createElement("section");
   section.innerHTML = '<h2></h2><div class="grid"></div>';
   section.querySelector("h2").textContent = table.title;
+  if (table.constant) section.append(Object.assign(document.createElement("p"), { className: "constant", textContent: table.constant }));
   host.append(section);
   const follows = player && table.isTime;
   const choose = follows ? (time) => { player.pause(); player.show(player.times[player.nearest(time)]); } : (x) => show(x);

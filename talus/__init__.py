@@ -1,0 +1,1 @@
+"""The command ``talus``: runs studies, lists them, begins new ones, and says what is installed."""

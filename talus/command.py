@@ -1,0 +1,87 @@
+"""What is said on the command line after ``talus``."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from talus import find
+from talus.about import about
+from talus.begin import begin
+from talus.completion import SHELLS, completion
+from talus.launch import run
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands."""
+    p = argparse.ArgumentParser(prog="talus", description="Slopes from rest to large deformation, by FEM and MPM.")
+    commands = p.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser(
+        "run", help="run a study; `talus run --help` says how"
+    )  # its words go to `run_study` as they are
+    commands.add_parser("list", help="list the studies there are, yours too")
+    new = commands.add_parser("new", help="begin a study of your own: a commented script, and a geometry for gmsh")
+    new.add_argument("name", help="of the study: NAME.py and NAME.geo are written to the present folder")
+    commands.add_parser("info", help="versions, solvers, and ranks that this machine has")
+    shell = commands.add_parser(
+        "completion", help="print what makes a shell complete the names of commands and studies"
+    )
+    shell.add_argument("shell", choices=SHELLS)
+    return p
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do what the command line says; returns the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    runs = words[:1] == ["run"]
+    a = parser().parse_args(words[:1] if runs else words)
+    try:
+        if runs:
+            return run_study(words[1:])
+        if a.command == "list":
+            print(listed())
+        elif a.command == "new":
+            print(begin(a.name, Path.cwd()))
+        elif a.command == "info":
+            print(about())
+        else:
+            print(completion(a.shell))
+    except (OSError, ValueError) as error:
+        print(f"talus {a.command}: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def run_study(words: list[str]) -> int:
+    """``talus run``: its own options come before the study's name, and all after it are the study's.
+
+    Raises:
+        ValueError: no study, or none of that name, or no number of ranks; says what was expected.
+    """
+    ranks = None
+    if words[:1] in (["-h"], ["--help"]):
+        print("usage: talus run [--ranks N] STUDY [options of the study]\n\n"
+              f"`talus run STUDY --help` lists the options of a study. Studies:\n{listed()}")  # fmt: skip
+        return 0
+    if words[:1] == ["--ranks"]:
+        text = words[1] if len(words) > 1 else ""
+        if not text.isdecimal() or int(text) < 1:
+            raise ValueError(f"--ranks is '{text}', expected a whole number from 1 on")
+        ranks, words = int(text), words[2:]
+    if not words:
+        raise ValueError(f"no study is named, expected one of these:\n{listed()}")
+    script = find.study_path(words[0])
+    if script is None:
+        raise ValueError(f"there is no study '{words[0]}', expected one of these, or the path of a script:\n{listed()}")
+    if importlib.util.find_spec("dolfinx") is None:
+        raise ValueError(f"{sys.executable} cannot import dolfinx, which studies need; see docs/guide/installation.md")
+    return run(script, words[1:], ranks)
+
+
+def listed() -> str:
+    """A line for each study; those of the user come first."""
+    found = sorted(find.studies().items(), key=lambda item: item[1].is_relative_to(find.SHIPPED))
+    return "\n".join(f"  {name:<16} {find.purpose(path)}" for name, path in found)

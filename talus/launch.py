@@ -1,0 +1,82 @@
+"""Starting a study on one rank or on several, so that signals end it cleanly."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import FrameType
+
+from talus.find import PACKAGE, SHIPPED
+
+
+def environment() -> dict[str, str]:
+    """What a study finds in its environment: the shared part of the studies, one thread for a rank, where results go."""
+    paths = [str(SHIPPED), str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {
+        "OMP_NUM_THREADS": "1",
+        "TALUS_RESULTS": str(Path.cwd() / "results"),
+        **os.environ,
+        "TALUS_PROGRAM": "talus run",
+        "PYTHONPATH": os.pathsep.join(paths),
+    }
+
+
+def run(script: Path, words: list[str], ranks: int | None) -> int:
+    """Run a study; returns its exit code.
+
+    Args:
+        ranks: None to replace this process by the study, as under mpirun.
+    """
+    command = [sys.executable, str(script), *words]
+    if ranks is None:
+        sys.stdout.flush()
+        os.execve(sys.executable, command, environment())
+    return _watched([*launcher(ranks), *command], environment())
+
+
+def launcher(ranks: int) -> list[str]:
+    """The words that start a command on so many ranks.
+
+    Raises:
+        FileNotFoundError: there is no mpirun.
+    """
+    if shutil.which("mpirun") is None:
+        raise FileNotFoundError("mpirun is not on the path")
+    words = ["mpirun", "-n", str(ranks)]
+    version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True, check=False).stdout
+    if "Open MPI" not in version:
+        return words
+    if os.getuid() == 0:
+        words.append("--allow-run-as-root")
+    # Open MPI counts cores, not hardware threads; where these are fewer than ranks it must be allowed.
+    return [*words, "--oversubscribe"]
+
+
+def _watched(command: list[str], variables: dict[str, str]) -> int:
+    """Run mpirun in a process group of its own, and hand signals on to it as SIGUSR1, which it hands on to its ranks.
+
+    By itself mpirun kills its ranks a second after Ctrl-C or SIGTERM. The second of these ends it. When this process is killed,
+    the system sends SIGUSR1 where `setpriv` is there.
+    """
+    if shutil.which("setpriv"):
+        command = ["setpriv", "--pdeathsig", "USR1", *command]
+    child = subprocess.Popen(command, stdin=subprocess.DEVNULL, env=variables, start_new_session=True)
+    asked = False
+
+    def hand_on(number: int, _: FrameType | None) -> None:
+        nonlocal asked
+        ends = asked and number in (signal.SIGINT, signal.SIGTERM)
+        asked = asked or number in (signal.SIGINT, signal.SIGTERM)
+        with contextlib.suppress(ProcessLookupError):
+            child.send_signal(signal.SIGTERM if ends else signal.SIGUSR1)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN or number != signal.SIGHUP:  # nohup keeps the last one away
+            signal.signal(number, hand_on)
+    code = child.wait()
+    return code if code >= 0 else 128 - code
