@@ -1,0 +1,89 @@
+"""Boundary conditions of the pore water, by facet tag; where none is given the boundary is impervious.
+
+Values may be numbers or, for flows in time, functions of the time [s] or tables ((time, value), ...) that are joined by
+straight lines; before the first and after the last time their end values hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+Value = float | Callable | tuple
+
+
+@dataclass(frozen=True)
+class Head:
+    """The total head, pressure head plus elevation, is prescribed: level [m], the elevation to which water would rise."""
+
+    facet_tag: int | str
+    level: Value
+
+
+@dataclass(frozen=True)
+class Reservoir:
+    """Water stands against the boundary up to a level [m]; above it the boundary is a seepage face."""
+
+    facet_tag: int | str
+    level: Value
+
+
+@dataclass(frozen=True)
+class SeepageFace:
+    """Water may leave, at atmospheric pressure, but not enter: p <= 0, outflow >= 0, and one of them is zero."""
+
+    facet_tag: int | str
+
+
+@dataclass(frozen=True)
+class Flux:
+    """Water enters at a rate [m/s] normal to the boundary; negative where it leaves."""
+
+    facet_tag: int | str
+    rate: Value
+
+
+@dataclass(frozen=True)
+class Rain:
+    """Rain of a rate [m/s] on the horizontal enters until water ponds; what the soil cannot take runs off.
+
+    ponding: pressure head [m] above which water runs off
+    """
+
+    facet_tag: int | str
+    rate: Value
+    ponding: float = 0.0
+
+
+WaterBoundary = Head | Reservoir | SeepageFace | Flux | Rain
+
+
+def value_at(value, time):
+    """A number, function or table of a boundary condition at a time [s]."""
+    if callable(value):
+        return float(value(time))
+    if isinstance(value, (tuple, list)):
+        times, values = np.transpose(np.asarray(value, dtype=float))
+        return float(np.interp(time, times, values))
+    return float(value)
+
+
+def mistake_in(condition):
+    """What is wrong with the values of a boundary condition; None for nothing."""
+    for name in ("level", "rate", "ponding"):
+        value = getattr(condition, name, 0.0)
+        if callable(value):
+            continue
+        numbers = np.asarray(value, dtype=float)
+        if not np.all(np.isfinite(numbers)):
+            return f"{name} is {value!r}, expected finite numbers"
+        table = numbers.ndim > 0
+        if table and (numbers.ndim != 2 or numbers.shape[1] != 2 or np.any(np.diff(numbers[:, 0]) <= 0)):
+            return f"{name} is {value!r}, expected a number, a function of time or a table ((time, value), ...) of rising times"
+        if name == "ponding" and value < 0:
+            return f"ponding is {value!r} m, expected 0 or more"
+        if isinstance(condition, Rain) and name == "rate" and np.any((numbers[:, 1] if table else numbers) < 0):
+            return f"rate is {value!r} m/s, expected 0 or more: rain does not leave the soil"
+    return None

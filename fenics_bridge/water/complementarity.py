@@ -1,0 +1,99 @@
+"""Nonlinear problems with upper bounds, solved by PETSc's semismooth Newton method for variational inequalities."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.fem import petsc
+from mpm_core.petsc import defaults, direct_options
+from petsc4py import PETSc
+
+from fenics_bridge.fem.fields import assembled
+
+RELATIVE, MOST_ITERATIONS = 1e-12, 30
+"""Tolerance of the residual, over the largest one of the problem's solution so far, and Newton's iterations at most."""
+
+
+class BoundedProblem:
+    """Find u <= upper with F(u) = 0 where u is below its bound, F(u) <= 0 where it is at it, and u given where it is fixed.
+
+    F is a nonlinear form of the unknown function and one test function; `residual` is F without the fixed values and bounds,
+    summed over ranks: the reactions there.
+    """
+
+    def __init__(self, form, tangents, unknown, options_prefix):
+        """form: UFL; tangents: UFL bilinear forms, the exact one first, then those to fall back on; unknown: Function."""
+        self.unknown, self._space = unknown, unknown.function_space
+        self._form, self._tangents = fem.form(form), [fem.form(tangent) for tangent in tangents]
+        self._n = self._space.dofmap.index_map.size_local
+        self._vector = assembled(self._form, self._space)
+        self._matrix = petsc.create_matrix(self._tangents[0])
+        self._matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self._prefix = options_prefix
+        self.iterations = 0
+
+    def solve(self, fixed, values, upper, scale):
+        """Solve from the unknown's present values. Returns why that failed, in words; nothing when it did not. Collective.
+
+        fixed: (m,) bool and values: (m,), of the dofs of this rank; upper: (m,), infinite where there is no bound
+        scale: size of the entries of F below which, times `RELATIVE`, the problem is solved
+        """
+        self._fixed, self._values, self._scale = fixed[: self._n], values, scale
+        start = self.unknown.x.array.copy()
+        failure = None
+        for tangent in self._tangents:
+            self.unknown.x.array[:] = np.where(fixed, values, np.minimum(start, upper))
+            self._tangent = tangent
+            failure = self._attempt(upper)
+            if not failure:
+                return None
+        self.unknown.x.array[:] = start
+        return failure
+
+    def residual(self):
+        """F of the unknown as it is, (m,) on the dofs of this rank, ghosts included. Collective."""
+        return assembled(self._form, self._space, into=self._vector).array
+
+    def _attempt(self, upper):
+        comm = self._space.mesh.comm
+        snes = PETSc.SNES().create(comm)
+        snes.setOptionsPrefix(self._prefix)
+        snes.setType("vinewtonrsls")
+        right = self._matrix.createVecLeft()
+        snes.setFunction(self._function, right)
+        snes.setJacobian(self._jacobian, self._matrix)
+        snes.setTolerances(rtol=0.0, atol=RELATIVE * self._scale, stol=0.0, max_it=MOST_ITERATIONS)
+        low, high = right.duplicate(), right.duplicate()
+        low.set(PETSc.NINFINITY)
+        high.array[:] = np.where(np.isfinite(upper[: self._n]) & ~self._fixed, upper[: self._n], PETSc.INFINITY)
+        snes.setVariableBounds(low, high)
+        solution = right.duplicate()
+        solution.array[:] = self.unknown.x.array[: self._n]
+        linear = direct_options(comm.size, alone=False)
+        options = {"snes_linesearch_type": "basic", **linear}
+        with defaults(self._prefix, options):
+            snes.setFromOptions()
+            snes.solve(None, solution)
+        reason, self.iterations = snes.getConvergedReason(), snes.getIterationNumber()
+        norm = snes.getFunctionNorm()
+        self._set(solution)
+        snes.destroy()
+        if reason > 0 and np.isfinite(norm):
+            return None
+        return f"Newton's method ended after {self.iterations} iterations with a residual of {norm:.3g} (PETSc's reason {reason})"
+
+    def _set(self, x):
+        self.unknown.x.array[: self._n] = x.array_r[: self._n]
+        self.unknown.x.scatter_forward()
+
+    def _function(self, snes, x, f):
+        self._set(x)
+        f.array[:] = np.where(self._fixed, x.array_r - self._values[: self._n], self.residual()[: self._n])
+
+    def _jacobian(self, snes, x, jacobian, preconditioner):
+        self._matrix.zeroEntries()
+        petsc.assemble_matrix(self._matrix, self._tangent)
+        self._matrix.assemble()
+        first = self._matrix.getOwnershipRange()[0]
+        self._matrix.zeroRows(first + np.flatnonzero(self._fixed).astype(np.int32), 1.0)
+        return PETSc.Mat.Structure.SAME_NONZERO_PATTERN

@@ -1,0 +1,44 @@
+"""Seepage on several ranks is that on one."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+from fenics_bridge import water
+
+WEIGHT = 9810.0
+
+
+def dam(comm):
+    domain, _, facet_tags = bridge.box_mesh(comm, (16.0, 10.0), (32, 20))
+    soil = water.PorousSoil(1e-5, compressibility=1e-7, retention=water.VanGenuchten(3e-4, 2.0, residual=0.05))
+    return water.Seepage(domain, soil, facet_tags, [water.Reservoir(1, 10.0), water.Reservoir(2, 2.0)])
+
+
+def test_a_dam_and_its_drawdown_do_not_depend_on_the_number_of_ranks():
+    points = np.array([[4.0, 3.0], [8.0, 7.0], [15.9, 2.2]])
+    results = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        flow = dam(comm)
+        flow.solve()
+        steady = flow.inflow(1)
+        flow.boundary[0] = water.Reservoir(1, ((0.0, 10.0), (1e4, 6.0)))
+        for _ in range(3):
+            assert flow.advance(2e3)
+        heads = bridge.evaluate_at(points, p=flow.pressure_head)["p"][:, 0]
+        results.append([steady / 1e-5, flow.inflow(1) / 1e-5, flow.inflow(2) / 1e-5, flow.stored_water(), *heads])
+    assert results[1] == pytest.approx(results[0], rel=1e-8, abs=1e-8)
+
+
+def test_rain_on_a_slope_does_not_depend_on_the_number_of_ranks():
+    inflows = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(comm, cell_size=0.1))
+        soil = water.PorousSoil(1e-6, retention=water.VanGenuchten(1e-3, 2.0))
+        boundary = [water.Head(bridge.LEFT, 0.2), water.SeepageFace(bridge.SLOPE), water.Rain(bridge.CREST, 2e-7)]
+        flow = water.Seepage(domain, soil, facet_tags, boundary)
+        flow.solve()
+        inflows.append([1e6 * flow.inflow(tag) for tag in (bridge.LEFT, bridge.SLOPE, bridge.CREST)])
+        assert sum(inflows[-1]) == pytest.approx(0.0, abs=1e-9)
+    assert inflows[1] == pytest.approx(inflows[0], rel=1e-8)
