@@ -24,10 +24,13 @@ class Progress:
         title: of what is running.
         until: simulated time at the end, s.
         pause: wall time between two lines where there is no terminal, s.
+        unit: in which simulated times are given and shown.
     """
 
-    def __init__(self, title: str, until: float, comm: MPI.Comm = MPI.COMM_WORLD, pause: float = 10.0) -> None:
-        self._title = title
+    def __init__(
+        self, title: str, until: float, comm: MPI.Comm = MPI.COMM_WORLD, pause: float = 10.0, unit: str = "s"
+    ) -> None:
+        self._title, self._unit = title, unit
         self._until = until
         self._shown = comm.rank == 0
         self._pause = pause
@@ -35,7 +38,7 @@ class Progress:
         self._bar = None
         self._last = ""
         if self._shown and sys.stderr.isatty():
-            form = "{desc}: {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} s [{elapsed} < {remaining}{postfix}]"
+            form = f"{{desc}}: {{percentage:3.0f}}% |{{bar}}| {{n:.4g}}/{{total:.4g}} {unit} [{{elapsed}} < {{remaining}}{{postfix}}]"
             self._bar = tqdm(total=until, desc=title, bar_format=form, file=sys.stderr, dynamic_ncols=True, leave=True)
 
     def show(self, time: float, steps: int, **quantities: str) -> None:
@@ -55,7 +58,9 @@ class Progress:
             self._bar.set_postfix_str(", ".join(facts))
             return
         left = elapsed * (self._until - time) / time if time > 0 else float("nan")
-        self._last = f"{self._title}: {time:.4g} of {self._until:.4g} s, {_duration(left)} left, {', '.join(facts)}"
+        self._last = (
+            f"{self._title}: {time:.4g} of {self._until:.4g} {self._unit}, {_duration(left)} left, {', '.join(facts)}"
+        )
         if clock.monotonic() - self._last_line >= self._pause:
             self._print_last()
 

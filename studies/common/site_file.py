@@ -171,6 +171,15 @@ def _at_height(value: Any, height: float) -> Any:
 
 
 def _table(path: Path) -> dict:
+    return read_toml(path, KEYS, needed=("mesh", "soils"))
+
+
+def read_toml(path: Path, keys: Sequence[str], needed: Sequence[str]) -> dict:
+    """A TOML file as a table.
+
+    Raises:
+        InputError: it cannot be read, is not TOML, has a key that is not among `keys` or lacks one that is needed.
+    """
     try:
         with open(path, "rb") as file:
             table = tomllib.load(file)
@@ -179,9 +188,9 @@ def _table(path: Path) -> dict:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise mpm.InputError(f"the site {path} is not TOML: {error}") from None
     for key in table:
-        if key not in KEYS:
-            raise mpm.InputError(f"{path}: unknown key {key!r}, expected some of {', '.join(KEYS)}")
-    for key in ("mesh", "soils"):
+        if key not in keys:
+            raise mpm.InputError(f"{path}: unknown key {key!r}, expected some of {', '.join(keys)}")
+    for key in needed:
         if key not in table:
             raise mpm.InputError(f"{path}: has no {key!r}")
     return table

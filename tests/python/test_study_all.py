@@ -31,6 +31,7 @@ SMALL = {
     "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
     "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
     "scaling": "--side-2d 4 --side-3d 2 --steps 2",
+    "seepage": "--cell-size 2 --days 20 --frames 2",
     "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "slope_schemes": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 " "--longer-steps 1",
     "verification": "--quick --cases column",

@@ -1,0 +1,92 @@
+"""Pictures of seepage: total head in colour with its contours, flow lines, and the water table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.tri import LinearTriInterpolator, Triangulation
+
+import fenics_bridge as bridge
+from fenics_bridge import water
+
+from .field_plots import Field, gathered
+from .figures import save_figure
+from .plots import ROUND_TICKS, Quantity, paper_style
+
+HEAD = Quantity("Total head", "m", colours="viridis")
+TABLE = "#1f6fd0"
+
+
+@dataclass
+class FlowPicture:
+    """A flow for pictures, on the first rank.
+
+    head: pressure head at the corners of all cells [m]; velocity: at the corners too, averaged over cells [m/s]
+    """
+
+    name: str
+    head: Field
+    velocity: np.ndarray
+
+    @property
+    def total(self) -> np.ndarray:
+        """Total head at the corners [m]."""
+        return self.head.values[:, 0] + self.head.points[:, 1]
+
+
+def flow_picture(flow: water.Seepage, name: str) -> FlowPicture | None:
+    """The flow as it is now; None but on the first rank. Collective."""
+    head, velocity = gathered(flow.pressure_head), gathered(bridge.nodal_average(flow.velocity()))
+    return None if head is None or velocity is None else FlowPicture(name, head, velocity.values)
+
+
+def save_flow(path: Path, pictures: Sequence[FlowPicture]) -> None:
+    """One panel for each flow, above one another, with one scale of the head."""
+    points = pictures[0].head.points
+    low, high = points.min(axis=0), points.max(axis=0)
+    every = np.concatenate([picture.total for picture in pictures])
+    ticks = ROUND_TICKS.tick_values(every.min(), every.max())
+    limits, aspect = (ticks[0], ticks[-1]), (high[1] - low[1]) / (high[0] - low[0])
+    levels = np.linspace(*limits, 21)
+    with paper_style():
+        figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.6 * aspect + 0.35) + 0.4), sharex=True,
+                                      squeeze=False, layout="constrained")  # fmt: skip
+        for axes, picture in zip(panels[:, 0], pictures):
+            triangles = Triangulation(*picture.head.points.T, picture.head.cells)
+            axes.tricontourf(triangles, picture.total, levels, cmap=HEAD.colours)
+            axes.tricontour(triangles, picture.total, levels[1:-1], colors="black", linewidths=0.35, alpha=0.6)
+            _flow_lines(axes, triangles, picture, low, high)
+            pressure_head = picture.head.values[:, 0]
+            if pressure_head.min() < 0 < pressure_head.max():
+                axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
+            axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
+            axes.set_title(picture.name, loc="left", pad=3)
+            axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
+        panels[-1, 0].set_xlabel("$x$ [m]")
+        bar = figure.colorbar(
+            ScalarMappable(Normalize(*limits), HEAD.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
+        )
+        bar.set_label(HEAD.label)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+
+
+def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, low: np.ndarray, high: np.ndarray) -> None:
+    """Flow lines through the saturated soil, where water moves at all."""
+    x, y = (np.linspace(a, b, n) for a, b, n in zip(low, high, (240, 120)))
+    grid = np.meshgrid(x, y)
+    u, v, p = (LinearTriInterpolator(triangles, values)(*grid)
+               for values in (*picture.velocity.T, picture.head.values[:, 0]))  # fmt: skip
+    speed = np.hypot(u, v)
+    fastest = speed.max()
+    if not fastest > 0:
+        return
+    still = speed.mask | (speed.filled(0) < 1e-4 * fastest) | (p.filled(-1) < 0)
+    axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color="white", linewidth=0.6, density=0.9,
+                    arrowsize=0.6)  # fmt: skip

@@ -1,0 +1,122 @@
+"""A site of seepage as a TOML file: mesh, hydraulic soils by name, and what the water does at the boundaries.
+
+Example of a file:
+
+    mesh = "dam.geo"                   # beside this file; or a .msh
+    cell_size = 0.6                    # and other constants of the .geo file under [constants]
+
+    [soils.core]                       # a physical group of the mesh
+    conductivity = 1e-8                # m/s; or [along x, along y]
+    porosity = 0.42
+    compressibility = 2e-7             # 1/Pa
+    van_genuchten = {alpha = 6e-5, n = 1.4, residual = 0.15, air_entry = 200.0}   # or gardner, free_surface, tabulated
+
+    [boundaries.upstream]              # one of head, reservoir [m], flux [m/s], rain [mm/day] or seepage_face = true
+    reservoir = [[0.0, 10.0], [15.0, 3.0]]      # a number, or a table of (days, value)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+from .site_file import read_toml
+
+DAY = 86400.0
+MM_PER_DAY = 1e-3 / DAY
+KEYS = ("mesh", "cell_size", "constants", "soils", "boundaries")
+CURVES = {"van_genuchten": water.VanGenuchten, "gardner": water.Gardner, "free_surface": water.FreeSurface,
+          "tabulated": water.Tabulated}  # fmt: skip
+SOIL_KEYS = ("conductivity", "porosity", "compressibility", *CURVES)
+CONDITIONS: dict[str, tuple[Callable, float]] = {
+    "head": (water.Head, 1.0),
+    "reservoir": (water.Reservoir, 1.0),
+    "flux": (water.Flux, 1.0),
+    "rain": (water.Rain, MM_PER_DAY),
+}
+"""Boundary condition by its key, and what one of its units is in SI."""
+
+
+@dataclass
+class WaterSite:
+    """A site of seepage as its file describes it, on its mesh.
+
+    soils: {name: PorousSoil}; boundary: of `fenics_bridge.water`; varies: whether any value changes in time
+    """
+
+    domain: Any
+    cell_tags: Any
+    facet_tags: Any
+    soils: dict[str, water.PorousSoil]
+    boundary: list
+    varies: bool
+
+    def seepage(self, degree: int) -> water.Seepage:
+        """The flow, at rest, in elements of a degree. Collective."""
+        return water.Seepage(
+            self.domain, self.soils, self.facet_tags, self.boundary, cell_tags=self.cell_tags, degree=degree
+        )
+
+
+def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> WaterSite:
+    """Read a site of seepage and make its mesh. Collective.
+
+    Args:
+        path: of the TOML file.
+        cell_size: [m], instead of the one in the file.
+
+    Raises:
+        InputError: on all ranks, with the file, the key and what was expected.
+    """
+    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries"))
+    constants = dict(table.get("constants", {}))
+    size = table.get("cell_size") if cell_size is None else cell_size
+    if size is not None:
+        constants["cell_size"] = size
+    domain, cell_tags, facet_tags = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    soils = {name: _soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
+    boundary = [_condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
+    varies = any(isinstance(getattr(c, key, None), tuple) for c in boundary for key in ("level", "rate"))
+    return WaterSite(domain, cell_tags, facet_tags, soils, boundary, varies)
+
+
+def _soil(given: dict, where: str) -> water.PorousSoil:
+    for key in given:
+        if key not in SOIL_KEYS:
+            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(SOIL_KEYS)}")
+    curves = [key for key in given if key in CURVES]
+    if len(curves) > 1 or "conductivity" not in given:
+        raise mpm.InputError(
+            f"{where}: has {', '.join(given) or 'nothing'}, expected conductivity and one retention curve at most"
+        )
+    try:
+        parameters = {key: value for key, value in given.items() if key not in CURVES}
+        if curves:
+            parameters["retention"] = CURVES[curves[0]](**given[curves[0]])
+        return water.PorousSoil(**parameters)
+    except (TypeError, mpm.InputError) as error:
+        raise mpm.InputError(f"{where}: {error}") from None
+
+
+def _condition(name: str, given: dict, where: str) -> Any:
+    if given == {"seepage_face": True}:
+        return water.SeepageFace(name)
+    if len(given) != 1 or next(iter(given)) not in CONDITIONS:
+        raise mpm.InputError(f"{where}: has {given}, expected one of {', '.join(CONDITIONS)} or seepage_face = true")
+    key, value = next(iter(given.items()))
+    make, unit = CONDITIONS[key]
+    if isinstance(value, list):
+        if not value or any(not isinstance(row, list) or len(row) != 2 for row in value):
+            raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
+        return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
+    return make(name, unit * float(value))

@@ -1,0 +1,176 @@
+"""Seepage through a dam, or any site of one's own: steady flow, then what happens as reservoirs and rain change.
+
+The site is a TOML file (`meshes/dam.toml` unless another is given): a mesh of gmsh, soils with conductivities and retention
+curves by the names of its physical groups, and what the water does at the boundaries. The water table is part of the solution.
+Where values at boundaries change in time, the flow is followed from the steady state of the beginning.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from common.field_plots import save_curves
+from common.files import OutputError
+from common.history import History
+from common.options import add_choice, add_count, add_number, study_parser
+from common.page import Page
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import ROOT, open_results
+from common.seepage_plots import FlowPicture, flow_picture, save_flow
+from common.summary import write_summary
+from common.water_site import DAY, WaterSite, read_water_site
+from mpi4py import MPI
+from mpm_core.output import MeshOutput
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+comm = MPI.COMM_WORLD
+FEW_ITERATIONS, SHORTEST = 7, 1e-6
+"""Newton's iterations up to which the next step is longer, and the shortest step over the whole time"""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "dam.toml", metavar="FILE",
+                   help="TOML file of mesh, soils and boundaries (default: meshes/dam.toml)")  # fmt: skip
+    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_choice(p, "--elements", "P1", ("P1", "P2"), "linear or quadratic triangles")
+    add_number(p, "--days", 60.0, "days", "time that is followed, where values at boundaries change", above=0)
+    add_count(p, "--frames", 6, "pictures of the flow in time")
+    return p
+
+
+# --- 2. The flow -----------------------------------------------------------------------------------------------------
+
+
+class Files:
+    """What is written as the flow goes on: frames for ParaView and the history of the inflows. A context manager."""
+
+    def __init__(self, flow: water.Seepage, names: list[str], folder: Path) -> None:
+        self._flow, self._names = flow, names
+        mesh = bridge.background_arrays(flow.domain)
+        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
+        self._n_cells = int(own.sum())
+        self._output = MeshOutput(folder / "seepage", comm, mesh["points"], mesh["cells"][own])
+        columns = ["time_days", *(f"inflow_{name}_m2_per_day" for name in names), "stored_water_m2"]
+        self.history = History(folder / "history.csv", columns, comm)
+
+    def row(self) -> None:
+        """Add the present inflows and stored water to the history. Collective."""
+        flow = self._flow
+        inflows = {f"inflow_{name}_m2_per_day": DAY * flow.inflow(name) for name in self._names}
+        self.history.add(time_days=flow.time / DAY, stored_water_m2=flow.stored_water(), **inflows)
+
+    def frame(self) -> None:
+        """Add pressure, head and velocity to the files for ParaView. Collective."""
+        flow = self._flow
+        head = bridge.evaluate_at(self._points, p=flow.pressure_head)["p"][:, 0]
+        velocity = flow.velocity().x.array.reshape(-1, flow.domain.geometry.dim)
+        per_cell = len(velocity) // max(len(bridge.original_cells(flow.domain)), 1) or 1
+        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self._points[:, -1]}
+        means = velocity[: per_cell * self._n_cells].reshape(self._n_cells, per_cell, -1).mean(axis=1)
+        self._output.write(flow.time, fields, {"velocity": means})
+
+    def __enter__(self) -> Files:
+        self.history.__enter__()
+        return self
+
+    def __exit__(self, *error) -> None:
+        self.history.__exit__(*error)
+        self._output.close()
+
+
+def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None]) -> str | None:
+    """The flow in time, with steps as long as Newton's method takes well. Returns why it ended early, if it did. Collective."""
+    end, dt = DAY * a.days, DAY * a.days / 200
+    frames = list(np.linspace(0.0, end, a.frames + 1)[1:])
+    with Progress("seepage", a.days, comm, unit="days") as progress:
+        for frame in frames:
+            while flow.time < frame * (1 - 1e-12):
+                step = min(dt, frame - flow.time)
+                if not flow.advance(step):
+                    dt = 0.4 * step
+                    if dt < SHORTEST * end:
+                        return f"steps of {step:.3g} s do not converge at {flow.time / DAY:.3g} days"
+                    continue
+                files.row()
+                progress.show(flow.time / DAY, len(files.history))
+                if flow.iterations <= FEW_ITERATIONS:
+                    dt = min(1.5 * max(dt, step), end / 50)
+            files.frame()
+            pictures.append(flow_picture(flow, f"After {flow.time / DAY:.3g} days"))
+    return None
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw(site: WaterSite, files: Files, pictures: list[FlowPicture | None], folder: Path) -> None:
+    """Head, flow lines and water table of each frame, and the inflows over time; on the first rank."""
+    shown = [picture for picture in pictures if picture is not None]
+    save_flow(folder / "seepage_steady.png", shown[:1])
+    if len(shown) > 1:
+        save_flow(folder / "seepage_in_time.png", shown)
+        history = files.history
+        curves = {
+            c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary
+        }
+        save_curves(
+            folder / "inflow.png", curves, ("Time [days]", "Inflow [m$^2$/day]"), limits=((0, None), (None, None))
+        )
+
+
+CAPTIONS = {
+    "seepage_steady": "Steady flow: total head, flow lines, and the water table (blue)",
+    "seepage_in_time": "The flow in time: total head, flow lines, and the water table (blue)",
+    "inflow": "Water that enters at each boundary, per metre; negative where it leaves",
+}
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a: Namespace = parser().parse_args(arguments)
+    start = perf_counter()
+    folder = open_results(a, comm)
+    site = read_water_site(a.site, comm, a.cell_size)
+    flow = site.seepage(int(a.elements[1]))
+    names = [c.facet_tag for c in site.boundary]
+    flow.solve()
+    steady = {name: DAY * flow.inflow(name) for name in names}
+    pictures, stopped = [flow_picture(flow, "Steady flow at the beginning")], None
+    with Files(flow, names, folder) as files:
+        files.row()
+        files.frame()
+        if site.varies:
+            stopped = follow(a, flow, files, pictures)
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped,
+        **{f"steady_inflow_{name}_m2_per_day": value for name, value in steady.items()},
+        "last_time_days": flow.time / DAY, "stored_water_m2": flow.stored_water(),
+        "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
+    }  # fmt: skip
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), draw=lambda: draw(site, files, pictures, folder))
+    if comm.rank == 0:
+        for name, value in steady.items():
+            print(f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day")
+        if stopped:
+            print(f"ended early: {stopped}", file=sys.stderr)
+        print(f"results in {folder}")
+    return 1 if stopped else 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, OutputError)
