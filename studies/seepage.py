@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 from common.field_plots import save_curves
+from common.figures import Pictures
 from common.files import OutputError
 from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
@@ -116,19 +117,19 @@ def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowP
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def draw(site: WaterSite, files: Files, pictures: list[FlowPicture | None], folder: Path) -> None:
-    """Head, flow lines and water table of each frame, and the inflows over time; on the first rank."""
+def drawn(site: WaterSite, files: Files, pictures: list[FlowPicture | None], folder: Path) -> Pictures:
+    """Head, flow lines and water table of each frame, and the inflows over time."""
     shown = [picture for picture in pictures if picture is not None]
-    save_flow(folder / "seepage_steady.png", shown[:1])
-    if len(shown) > 1:
-        save_flow(folder / "seepage_in_time.png", shown)
-        history = files.history
-        curves = {
-            c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary
-        }
-        save_curves(
-            folder / "inflow.png", curves, ("Time [days]", "Inflow [m$^2$/day]"), limits=((0, None), (None, None))
-        )
+    if len(pictures) == 1:
+        return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown)}
+    history = files.history
+    curves = {c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary}
+    axes, limits = ("Time [days]", "Inflow [m$^2$/day]"), ((0, None), (None, None))
+    return {
+        "seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown[:1]),
+        "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", shown),
+        "inflow.png": lambda: save_curves(folder / "inflow.png", curves, axes, limits=limits),
+    }
 
 
 CAPTIONS = {
@@ -162,7 +163,7 @@ def main(arguments: list[str] | None = None) -> int:
         "last_time_days": flow.time / DAY, "stored_water_m2": flow.stored_water(),
         "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), draw=lambda: draw(site, files, pictures, folder))
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(site, files, pictures, folder))
     if comm.rank == 0:
         for name, value in steady.items():
             print(f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day")

@@ -68,7 +68,7 @@ def test_the_history_of_a_drawdown_balances(tmp_path):
     import seepage
 
     folder = tmp_path / "results"
-    arguments = ["--cell-size", "2", "--days", "20", "--frames", "2", "--no-pictures", "--output", str(folder)]
+    arguments = ["--cell-size", "2", "--days", "20", "--frames", "2", "--output", str(folder)]
     assert seepage.main(arguments) == 0
     rows = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
     inflow = sum(rows[name] for name in rows.dtype.names if name.startswith("inflow"))

@@ -139,7 +139,7 @@ def test_curves_fall_from_one_and_are_those_of_their_authors():
     # van Genuchten 1980, eq. 3 and 8, written out at alpha s = 2, n = 2, m = 1/2
     curve = water.VanGenuchten(2e-4, 2.0)
     assert curve.saturation(1e4) == pytest.approx(5**-0.5)
-    assert curve.relative_permeability(1e4) == pytest.approx(5**-0.25 * (1 - (1 - 1 / 5) ** 0.5) ** 2, rel=1e-6)
+    assert curve.relative_permeability(1e4) == pytest.approx(5**-0.25 * (1 - (1 - 1 / 5) ** 0.5) ** 2, abs=2e-8)
     assert curves[1].saturation(199.0) == 1.0
 
 
