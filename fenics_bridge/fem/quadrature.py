@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
+from mpm_core.parameter_fields import differences_of, has_varying
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import N_STRESS
@@ -16,6 +17,8 @@ class QuadraturePoints:
 
     n: their number; per_cell: number in a cell; cells: (m,) int32, the cells; material: (m,) int32, of each of them
     off: rows of the points in cells that are switched off, whose stress is zero
+    cell_size: (n,) [m] of the points' cells; time, duration: of the step under trial [s], for laws that depend on rate
+    parameters: {name: (n,)}, values of laws' parameters that vary, NaN where the law's number holds
     stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium; n_state: that of the law with most variables
     deviatoric_strain: (n,) accumulated up to there, the sum of sqrt(2/3 de : de) as the particles have it [-]
     trial_stress, trial_state, tangent: (n, S), (n, n_state), (n, S, S) at the displacement under trial
@@ -30,6 +33,10 @@ class QuadraturePoints:
         # With the points of a law in one piece it works on them in place.
         self.cells = np.argsort(material, kind="stable").astype(np.int32)
         self.n = len(self.cells) * self.per_cell
+        sizes = cell_sizes(cell_volumes(domain)[self.cells], domain.geometry.dim)
+        self.cell_size = np.repeat(sizes, self.per_cell)
+        self.time, self.duration = 0.0, np.inf
+        self.parameters = {}
         self.assign(material, len(laws))
         self.stress = np.zeros((self.n, self.size))
         self.state = np.zeros((self.n, max(law.n_state for law in laws)))
@@ -45,12 +52,12 @@ class QuadraturePoints:
         material: (owned cells,) int32, in the order of the mesh
         """
         self.material = material[self.cells]
-        of_point = np.repeat(self.material, self.per_cell)
+        of_point = self._numbers()
         self._pieces = [_piece(np.flatnonzero(of_point == number)) for number in range(n_laws)]
         self.off = np.flatnonzero(of_point < 0)
 
     def reset_state(self, laws, points=slice(None)):
-        """State variables as the laws want them at the start: zero, but for the size of cells [m] where asked for.
+        """State variables as the laws want them at the start: zero, but for parameters that vary.
 
         points: rows of the points that are reset; all by default
         """
@@ -59,14 +66,27 @@ class QuadraturePoints:
             self.state = np.pad(self.state, ((0, 0), (0, missing)))
             self.trial_state = self.state.copy()
         self.state[points], self.deviatoric_strain[points] = 0.0, 0.0
-        sizes = cell_sizes(cell_volumes(self._domain)[self.cells], self._domain.geometry.dim)
-        size = np.repeat(sizes, self.per_cell)
-        chosen = np.zeros(self.n, dtype=bool)
-        chosen[points] = True
-        for law, piece in zip(laws, self._pieces):
-            if "cell_size" in law.state_names:
-                rows = np.arange(self.n)[piece][chosen[piece]]
-                self.state[rows, law.state_names.index("cell_size")] = size[rows]
+        for name in self.parameters:
+            self._write_parameter(laws, name)
+
+    def set_parameter(self, laws, name, values):
+        """Give points their values (n,) of a parameter that varies; those where they are NaN keep theirs.
+
+        Raises InputError for a parameter that varies in no law, and for values out of its range.
+        """
+        before = self.parameters.get(name, np.full(self.n, np.nan))
+        values = np.where(np.isnan(values), before, values)
+        differences_of(name, values, laws, self._numbers(), self.state)  # checked before it is kept
+        self.parameters[name] = values
+        self._write_parameter(laws, name)
+
+    def _write_parameter(self, laws, name):
+        if any(has_varying(law, name) for law in laws):
+            self.state[:] = differences_of(name, self.parameters[name], laws, self._numbers(), self.state)
+
+    def _numbers(self):
+        """Number of each point's law: (n,)."""
+        return np.repeat(self.material, self.per_cell)
 
     def update(self, laws, strain_increment):
         """Trial stress, state and tangent by one call of each law; returns where and why one failed, empty if none did."""
@@ -78,7 +98,8 @@ class QuadraturePoints:
         for law, piece in zip(laws, self._pieces):
             state = np.ascontiguousarray(self.trial_state[piece, : law.n_state])  # the columns themselves if it has all
             stress, tangent = self.trial_stress[piece], self.tangent[piece]  # views, unless the piece is scattered
-            report = law.update(strain_increment[piece], stress, state, tangent)
+            context = {"time": self.time, "dt": self.duration, "cell_size": self.cell_size[piece]}
+            report = law.update(strain_increment[piece], stress, state, tangent, **context)
             self.trial_state[piece, : law.n_state] = state
             if not isinstance(piece, slice):
                 self.trial_stress[piece], self.tangent[piece] = stress, tangent

@@ -20,6 +20,7 @@ from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
+from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.supports import Constraints, tagged_facets
 from fenics_bridge.mesh.names import known_tags
@@ -118,24 +119,39 @@ class QuasiStatic:
         self.displacement.x.array[:] = 0.0
         self.load = load
 
+    def set_parameter(self, name, values):
+        """Give the points their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
+
+        name: such as "cohesion"; values: a number, (n,) at `points.coordinates()`, a function of positions (n, D) that
+        returns (n,), e.g. `mpm_core.RandomField`, or {cell tag or name: number}
+        Where a law with another number comes into force, points keep their values. They go to the particles at the
+        hand-over. Raises InputError, on all ranks, for a parameter that varies in no law or values out of its range.
+        Collective.
+        """
+        set_parameter(self, name, values)
+
     def reset_displacement(self):
         """Count displacements from here on (the stress stays)."""
         self.displacement.x.array[:] = 0.0
         self._body.constraints.origin[:] = 0.0
         self.load = replace(self.load, displacement=0.0)
 
-    def equilibrate(self, load, law=None, **options):
+    def equilibrate(self, load, law=None, duration=np.inf, **options):
         """Go to the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns EquilibriumReport.
 
         Newton's method first; where it gives up, the body relaxes with a viscosity until it rests or flows (`relaxation`).
+        duration: of the step [s], for laws that depend on rate; by default it is slow without limit
         Without equilibrium everything is left as it was. options: of `Solver`, in place of those of `solver`. Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)
         solver = replace(self.solver, **options)
+        self.points.duration = duration
         report = find_equilibrium(self._body, self._materials.laws(law), *forces, load.displacement, solver)
+        self.points.duration = np.inf
         self.converged = report.converged
         if report.converged:
+            self.points.time += duration if np.isfinite(duration) else 0.0
             self.load, self.law = self._loads.resolved(load), law
         return report
 

@@ -8,6 +8,7 @@ import numpy as np
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError
+from mpm_core import _core
 
 
 def reduced_strength(law, factor, unreduced=()):
@@ -18,7 +19,8 @@ def reduced_strength(law, factor, unreduced=()):
       friction angle: associated flow stays associated.
     - SofteningMohrCoulomb: peak and residual strength alike. - DruckerPrager: strength and slope of the cone.
     - CamClay: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
-    - Hencky and Undrained: the law that they are made of.
+    - ViscoplasticMohrCoulomb: the strength in the limit of slow loading; the viscosity stays.
+    - Heterogeneous: the strength of all points. - Hencky and Undrained: the law that they are made of.
     - LinearElastic beside other laws: it has no strength to reduce and stays as it is.
     - Any other (a UMAT, a law written in Python): give `factor_of_safety` a function of law and factor.
     Raises InputError for a factor that is not positive, and for a law whose strength is not known.
@@ -33,13 +35,7 @@ def reduced_strength(law, factor, unreduced=()):
         if len(kept) == len(law):
             raise InputError(f"unreduced: got {list(unreduced)}; no law is left whose strength could be reduced")
         return {tag: one if tag in kept else reduced_strength(one, factor) for tag, one in law.items()}
-    for kind, reduce in _REDUCTIONS.items():
-        if isinstance(law, kind):
-            return reduce(law, factor)
-    raise InputError(
-        f"law: the strength of {type(law).__name__} is not known here; give factor_of_safety a function `reduce` of law "
-        "and factor that returns the weaker law"
-    )
+    return _core.reduced_strength(law, factor)
 
 
 def davis_strength(law):
@@ -82,66 +78,3 @@ def _mohr_coulomb(law, cohesion, friction_angle, dilation_angle):
         dilation_angle=dilation_angle,
         tension_cutoff=law.tension_cutoff,
     )
-
-
-def _limited(dilation, friction_before, friction):
-    """The dilation angle that goes with a reduced friction angle."""
-    return friction if dilation == friction_before else min(dilation, friction)
-
-
-def _reduced_mohr_coulomb(law, factor):
-    friction = _divided(law.friction_angle, factor)
-    return _mohr_coulomb(
-        law, law.cohesion / factor, friction, _limited(law.dilation_angle, law.friction_angle, friction)
-    )
-
-
-def _reduced_softening(law, factor):
-    friction = _divided(law.residual_friction_angle, factor)
-    return mpm.SofteningMohrCoulomb(
-        _reduced_mohr_coulomb(law.peak, factor),
-        residual_cohesion=law.residual_cohesion / factor,
-        residual_friction_angle=friction,
-        residual_dilation_angle=_limited(law.residual_dilation_angle, law.residual_friction_angle, friction),
-        softening_strain=law.softening_strain,
-        reference_length=law.reference_length,
-        shape=law.shape,
-    )
-
-
-def _reduced_drucker_prager(law, factor):
-    friction = law.friction / factor
-    return mpm.DruckerPrager(
-        young=law.young,
-        poisson=law.poisson,
-        strength=law.strength / factor,
-        friction=friction,
-        dilation=_limited(law.dilation, law.friction, friction),
-        tension_cutoff=law.tension_cutoff,
-    )
-
-
-def _reduced_cam_clay(law, factor):
-    angle = math.asin(3 * law.critical_slope / (6 + law.critical_slope))
-    sine = math.sin(math.atan(math.tan(angle) / factor))
-    return mpm.CamClay(
-        compression=law.compression,
-        swelling=law.swelling,
-        critical_slope=6 * sine / (3 - sine),
-        poisson=law.poisson,
-        preconsolidation=law.preconsolidation,
-        void_ratio=law.void_ratio,
-        attraction=law.attraction,
-    )
-
-
-_REDUCTIONS = {
-    mpm.MohrCoulomb: _reduced_mohr_coulomb,
-    mpm.SofteningMohrCoulomb: _reduced_softening,
-    mpm.DruckerPrager: _reduced_drucker_prager,
-    mpm.CamClay: _reduced_cam_clay,
-    mpm.Hencky: lambda law, factor: mpm.Hencky(reduced_strength(law.law, factor)),
-    mpm.Undrained: lambda law, factor: mpm.Undrained(
-        reduced_strength(law.skeleton, factor), water_modulus=law.water_modulus, porosity=law.porosity
-    ),
-}

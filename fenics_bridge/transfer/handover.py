@@ -80,29 +80,13 @@ def _take_stress_and_state(model, fem, search, smooth):
     stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
     if isinstance(fem, QuasiStatic):
         values = search.values(fem.state_function())
-        own = state.copy()
         state[:, : values.shape[1]] = values
-        _keep_cell_size(model.laws, particles.material, state, own)
     returned = _returned(model.laws, particles.material, stress, state)
     particles.set("stress", stress)
     particles.set("state", state)
     particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
     particles.set("velocity", np.zeros_like(particles.velocity))
     return returned
-
-
-def _keep_cell_size(laws, material, state, own):
-    """Softening soil goes on with the size of the particles' cells, and with the strength that the finite elements left it.
-
-    The strength depends on plastic strain times cell size, so the plastic strain is that of a band in the particles' cells.
-    """
-    for number, law in enumerate(laws):
-        if "cell_size" in law.state_names:
-            rows = np.flatnonzero(material == number)
-            size, strain = law.state_names.index("cell_size"), law.state_names.index("plastic_strain")
-            before, here = (np.where(s[rows, size] > 0, s[rows, size], law.reference_length) for s in (state, own))
-            state[rows, strain] *= before / here
-            state[rows, size] = own[rows, size]
 
 
 def _displace(model, displacement, search, move, count):

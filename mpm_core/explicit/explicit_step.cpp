@@ -129,7 +129,7 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
       average_strains(model, dt);
     if (dual)
       average_gradients(model);
-    particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation});
+    particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation, dt});
     map_to_nodes(model); // the stresses have changed
   }
   solve_momentum(model, options.damping, dt);
@@ -139,7 +139,8 @@ void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
     average_strains(model, dt);
   if (dual && !first)
     average_gradients(model);
-  particle_pass<D>(model, {dt, true, !first, options.pic_share, options.mixed_discretisation}); // (18), (20), stresses
+  particle_pass<D>(model,
+                   {dt, true, !first, options.pic_share, options.mixed_discretisation, dt}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)
     return;

@@ -298,7 +298,7 @@ bool finish_step(Model<D>& model, const ImplicitStep<D>& step)
   if (!options.quasi_static && options.pic > 0)
     pic = pic_share_of_step(options.pic, step.dt, critical_time_step(model));
   find_velocity_change(model, pic, step.dt);
-  particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation,
+  particle_pass<D>(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation, law_dt(step),
                            options.hold_positions}); // (18), (20), stresses
   agree_on_trouble(model);
   if (work.trouble)

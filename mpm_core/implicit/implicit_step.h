@@ -39,6 +39,7 @@ struct ImplicitOptions
   bool second_order = false;                        ///< two stages instead of backward Euler; with inertia only
   bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
   bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
+  bool at_rest = false;        ///< laws are given all time, however long the step: stresses above the strength relax
   double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 
@@ -115,6 +116,13 @@ struct ImplicitStep
   std::optional<Trouble<D>> trouble; ///< of the last trial, where it failed
   std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
+
+/// Duration that laws are given [s]
+template <int D>
+double law_dt(const ImplicitStep<D>& step)
+{
+  return step.options.at_rest ? std::numeric_limits<double>::infinity() : step.dt;
+}
 
 /// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under
 /// the supports, as first iterate.

@@ -3,6 +3,7 @@
 #include "implicit/tangent.h"
 #include "model/batches.h"
 #include "model/integration.h"
+#include "model/law_increment.h"
 #include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
 
@@ -15,6 +16,15 @@ namespace
 /// Part of a cell's volume below which an increment is refused.
 constexpr double least_growth = 0.1;
 
+/// Strain and rotation of a cell.
+template <int D>
+struct TrialStrain
+{
+  Matrix<D> gradient; ///< of the displacement
+  CellStrain<D> strain;
+  bool keeps_volume;
+};
+
 /// Copies of a batch: what a law reads and writes.
 template <int D>
 struct TrialScratch
@@ -22,7 +32,9 @@ struct TrialScratch
   alignas(64) double strain[n_stress<D>][batch_size];
   alignas(64) double stress[n_stress<D>][batch_size]; ///< at the start, turned with the material; then at the end
   alignas(64) double state[max_states][batch_size];
-  std::vector<double> tangent; ///< (batch_size, components, components)
+  std::vector<double> tangent;                   ///< (batch_size, components, components)
+  std::array<TrialStrain<D>, batch_size> trials; ///< of the runs
+  LawIncrement<D> increment;
 };
 
 template <int D>
@@ -43,14 +55,6 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
            f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
 }
 
-/// Strain and rotation of a cell.
-template <int D>
-struct TrialStrain
-{
-  CellStrain<D> strain;
-  bool keeps_volume;
-};
-
 template <int D>
 TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell)
 {
@@ -62,9 +66,14 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
   if (step.options.hold_positions)
   {
     make_small<D>(strain);
-    return {strain, true};
+    return {{}, strain, true};
   }
-  return {strain, growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
+  Matrix<D> displacement_gradient = gradient;
+  for (Vector<D>& row : displacement_gradient)
+    for (double& entry : row)
+      entry *= step.dt;
+  return {displacement_gradient, strain,
+          growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
 /// Copies a batch's stresses and states to the scratch.
@@ -113,10 +122,11 @@ void note_failed_laws(const Model<D>& model, const Batch& batch, const std::vect
 }
 
 template <int D>
-BatchReport update_scratch(const Law& law, Index size, bool tangents, TrialScratch<D>& scratch)
+BatchReport update_scratch(const Model<D>& model, const ImplicitStep<D>& step, const Batch& batch, bool tangents,
+                           TrialScratch<D>& scratch)
 {
   PointBatch<D> points;
-  points.size = size;
+  points.size = batch.last - batch.first;
   for (int k = 0; k < n_stress<D>; ++k)
   {
     points.strain_increment[k] = scratch.strain[k];
@@ -127,7 +137,14 @@ BatchReport update_scratch(const Law& law, Index size, bool tangents, TrialScrat
     state[k] = scratch.state[k];
   points.state = state.data();
   points.tangent = tangents ? scratch.tangent.data() : nullptr;
-  return update<D>(law, points);
+  points.time = model.time;
+  points.dt = law_dt(step);
+  give_cell_sizes(model, batch, scratch.increment, points);
+  if (!step.options.hold_positions)
+    give_deformation(
+        model, batch, [&](std::size_t r) { return scratch.trials[r].gradient; },
+        [&](std::size_t r) { return scratch.trials[r].strain.volumetric; }, scratch.increment, points);
+  return update<D>(model.laws[batch.material], points);
 }
 
 /// Adds the particles of one run, at `at` in the scratch, to the sums of its cell.
@@ -195,14 +212,13 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
     load_batch(model, batch, scratch);
     for (r = batch.first_run; r < batch.last_run; ++r)
     {
-      const TrialStrain<D> trial = cell_strain(model, step, runs[r].cell);
+      const TrialStrain<D>& trial = scratch.trials[r - batch.first_run] = cell_strain(model, step, runs[r].cell);
       step.strains[runs[r].cell] = trial.strain;
       strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
       if (!trial.keeps_volume)
         note_failure(model, Trouble<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
     }
-    const BatchReport report =
-        update_scratch<D>(model.laws[batch.material], batch.last - batch.first, tangents, scratch);
+    const BatchReport report = update_scratch(model, step, batch, tangents, scratch);
     count.plastic += report.plastic;
     note_failed_laws(model, batch, report.failed, scratch, count);
     for (r = batch.first_run; r < batch.last_run; ++r)

@@ -4,6 +4,8 @@
 
 #include "base/tensor.h"
 
+#include <cmath>
+
 #include <span>
 
 namespace mpm
@@ -88,6 +90,21 @@ inline std::array<double, D + 1> shape_functions(const CellShape<D>& shape, cons
       n[k] += shape.gradient[k][i] * (x[i] - shape.centre[i]);
   }
   return n;
+}
+
+/// Size h of a simplex [m]: side of the square or cube that D! of its volume fill, (D! V)^(1/D).
+///
+/// Softening spreads over a band one row of cells wide, and rows of simplices are as wide as the squares or cubes that
+/// they come from; V^(1/D) would be 1 / sqrt(2) of that in the plane and 0.55 in space (Rots 1988, Computational
+/// modeling of concrete fracture, Delft: sqrt(2 A) for linear triangles).
+/// @param volume  [m2 or m3]
+template <int D>
+inline double cell_size(double volume)
+{
+  if constexpr (D == 2)
+    return std::sqrt(2 * volume);
+  else
+    return std::cbrt(6 * volume);
 }
 
 /// Local nodes of the facet opposite to vertex k of a cell

@@ -3,6 +3,7 @@
 #include "materials/laws/substeps.h"
 #include "mesh/search.h"
 #include "model/batch_strain.h"
+#include "model/law_increment.h"
 #include "transfer/affine_field.h"
 
 #include <algorithm>
@@ -99,6 +100,14 @@ void update_stress(Model<D>& model, const PassOptions& options, const Batch& bat
   for (std::size_t k = 0; k < particles.state.size(); ++k)
     state[k] = particles.state[k].data() + batch.first;
   points.state = state.data();
+  points.time = model.time;
+  points.dt = options.law_dt;
+  LawIncrement<D> columns;
+  give_cell_sizes(model, batch, columns, points);
+  if (!options.small && model.integration != Integration::dual_domain)
+    give_deformation(
+        model, batch, [&](std::size_t r) { return scratch.motion[r].displacement.gradient; },
+        [&](std::size_t r) { return scratch.cells[r / lanes].volumetric[r % lanes]; }, columns, points);
   const BatchReport report = update<D>(model.laws[batch.material], points);
   model.last.plastic += report.plastic;
   if (!report.failed.empty())

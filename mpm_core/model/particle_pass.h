@@ -14,6 +14,7 @@ struct PassOptions
   bool stress;        ///< strain increment and stress update
   double pic_share;   ///< share of the grid's velocity in the particle's, 0 is FLIP
   bool averaged;      ///< take volumetric strains from `work.volumetric_strain` (nodal mixed discretisation)
+  double law_dt;      ///< duration of the increment for laws [s]; infinite where they are given all time
   bool small = false; ///< small displacements: the strain changes stresses only, not volumes, and turns nothing
 };
 

@@ -1,94 +1,50 @@
+#include "materials/laws/strength_reduction.h"
+#include "mesh/mesh.h"
 #include "python/bindings.h"
 #include "python/law_binding.h"
-
-#include <limits>
 
 namespace mpm::python
 {
 namespace
 {
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-void bind_elastic(py::module_& m)
+void bind_soils(py::module_& m)
 {
-  bind_law<LinearElastic>(m, "LinearElastic", R"(Isotropic linear elasticity in rate form.
-
-Args:
-    young: Young's modulus [Pa], positive.
-    poisson: Poisson's ratio [-], in (-1, 0.5).)")
-      .def(py::init(
-               [](double young, double poisson) {
-                 return checked(LinearElastic{young, poisson});
-               }),
-           py::kw_only(), py::arg("young"), py::arg("poisson"))
-      .def_readonly("young", &LinearElastic::young)
-      .def_readonly("poisson", &LinearElastic::poisson);
-}
-
-void bind_mohr_coulomb(py::module_& m)
-{
+  bind_law<LinearElastic>(m, "LinearElastic", "Isotropic linear elasticity in rate form.");
   bind_law<MohrCoulomb>(
       m, "MohrCoulomb",
-      R"(Mohr-Coulomb, linear elastic and perfectly plastic, with non-associated flow and a tension cut-off.
-
-Args:
-    young: Young's modulus [Pa], positive.
-    poisson: Poisson's ratio [-], in (-1, 0.5).
-    cohesion: [Pa], at least 0.
-    friction_angle: [degrees], in [0, 90).
-    dilation_angle: [degrees], in [0, friction_angle].
-    tension_cutoff: largest principal stress [Pa], at least 0; by default the apex.)")
-      .def(py::init(
-               [](double young, double poisson, double cohesion, double friction_angle, double dilation_angle,
-                  std::optional<double> tension_cutoff)
-               {
-                 return checked(MohrCoulomb{young, poisson, cohesion, friction_angle, dilation_angle,
-                                            tension_cutoff.value_or(infinity)});
-               }),
-           py::kw_only(), py::arg("young"), py::arg("poisson"), py::arg("cohesion"), py::arg("friction_angle"),
-           py::arg("dilation_angle") = 0.0, py::arg("tension_cutoff") = py::none())
-      .def_readonly("young", &MohrCoulomb::young)
-      .def_readonly("poisson", &MohrCoulomb::poisson)
-      .def_readonly("cohesion", &MohrCoulomb::cohesion)
-      .def_readonly("friction_angle", &MohrCoulomb::friction_angle)
-      .def_readonly("dilation_angle", &MohrCoulomb::dilation_angle)
-      .def_readonly("tension_cutoff", &MohrCoulomb::tension_cutoff);
+      "Mohr-Coulomb, linear elastic and perfectly plastic, with non-associated flow and a tension cut-off.");
+  bind_law<ViscoplasticMohrCoulomb>(
+      m, "ViscoplasticMohrCoulomb",
+      "Mohr-Coulomb whose stress may exceed the strength for a while (Perzyna, Duvaut and Lions).",
+      R"(The overstress relaxes in relaxation_time, so that in steady shear without friction the shear stress is the cohesion plus
+the viscosity times the rate. Quasi-static finite elements without a duration, and Model.equilibrate, end without overstress.)")
+      .def_property_readonly("relaxation_time", &relaxation_time, "Time in which the overstress relaxes [s]");
+  bind_law<CamClay>(
+      m, "CamClay", "Modified Cam-Clay with pressure-dependent elasticity.",
+      R"(The state log_preconsolidation is ln of the preconsolidation pressure over that of the start, attraction included in both:
+set it for points that begin with another one. The modulus for the time step is that of twice the preconsolidation.)");
 }
 
 void bind_softening(py::module_& m)
 {
   py::enum_<Softening>(m, "Softening").value("LINEAR", Softening::linear).value("EXPONENTIAL", Softening::exponential);
   using L = SofteningMohrCoulomb;
-  bind_law<L>(m, "SofteningMohrCoulomb",
-              R"(Mohr-Coulomb whose strength falls with the accumulated plastic deviatoric strain.
-
-Args:
-    peak: MohrCoulomb law with elasticity, peak strength and tension cut-off.
-    residual_cohesion: [Pa], at most that of the peak.
-    residual_friction_angle: [degrees], at most that of the peak.
-    residual_dilation_angle: [degrees], at most residual_friction_angle.
-    softening_strain: plastic strain over which the strength falls in a band as wide as reference_length [-].
-    reference_length: [m]. In a cell of size h the strength falls over softening_strain * reference_length / h, so that the
-        energy that a band dissipates does not depend on the mesh. Sizes come with the seeding, as the state cell_size.
-    shape: Softening.EXPONENTIAL, by exp(-strain / softening_strain), or LINEAR.
-
-The state cohesion_deviation is the relative deviation of a point's cohesion from the law's, for random fields.)")
-      .def(py::init(
-               [](const MohrCoulomb& peak, double cohesion, double friction_angle, double dilation_angle, double strain,
-                  double length, Softening shape) {
-                 return checked(L{peak, cohesion, friction_angle, dilation_angle, strain, length, shape});
-               }),
-           py::arg("peak"), py::kw_only(), py::arg("residual_cohesion"), py::arg("residual_friction_angle"),
-           py::arg("residual_dilation_angle") = 0.0, py::arg("softening_strain"), py::arg("reference_length"),
-           py::arg("shape") = Softening::exponential)
-      .def("softened", &softened, py::arg("plastic_strain"), py::arg("cell_size") = 0.0,
-           py::arg("cohesion_deviation") = 0.0)
+  const auto with_parts = [](const Parts& parts)
+  {
+    L law{parts.get<MohrCoulomb>("peak", "a MohrCoulomb law"), 0, 0, 0, 0, 0};
+    law.shape = parts.get<Softening>("shape", "Softening.EXPONENTIAL or LINEAR", Softening::exponential);
+    return law;
+  };
+  bind_law<L>(
+      m, "SofteningMohrCoulomb", "Mohr-Coulomb whose strength falls with the accumulated plastic deviatoric strain.",
+      R"(In a cell of size h the strength falls over softening_strain * reference_length / h, so that the energy that a band
+dissipates does not depend on the mesh. The state band_strain is the plastic strain that a band as wide as reference_length would
+have; the strength follows from it. The state cohesion_deviation is the relative deviation of a point's cohesion from the
+law's.)",
+      with_parts)
+      .def("softened", &softened, py::arg("band_strain"), py::arg("cohesion_deviation") = 0.0,
+           "The perfectly plastic law that holds at some states")
       .def_readonly("peak", &L::peak)
-      .def_readonly("residual_cohesion", &L::residual_cohesion)
-      .def_readonly("residual_friction_angle", &L::residual_friction_angle)
-      .def_readonly("residual_dilation_angle", &L::residual_dilation_angle)
-      .def_readonly("softening_strain", &L::softening_strain)
-      .def_readonly("reference_length", &L::reference_length)
       .def_readonly("shape", &L::shape)
       .def_property_readonly("young", [](const L& law) { return law.peak.young; })
       .def_property_readonly("poisson", [](const L& law) { return law.peak.poisson; });
@@ -102,96 +58,67 @@ void bind_drucker_prager(py::module_& m)
       .value("PLANE_STRAIN", ConeMatch::plane_strain);
   m.def("cone_slope", &cone_slope, py::arg("angle"), py::arg("match"));
   m.def("cone_strength", &cone_strength, py::arg("cohesion"), py::arg("friction_angle"), py::arg("match"));
-  bind_law<DruckerPrager>(
-      m, "DruckerPrager",
-      R"(Drucker-Prager, linear elastic and perfectly plastic: sqrt(J2) + friction * p <= strength with the mean stress p.
-
-Args:
-    young: Young's modulus [Pa], positive.
-    poisson: Poisson's ratio [-], in (-1, 0.5).
-    strength: sqrt(J2) on the surface at zero mean stress [Pa], at least 0.
-    friction: slope of the surface [-], at least 0; 0 is the criterion of von Mises.
-    dilation: slope of the plastic potential [-], in [0, friction].
-    tension_cutoff: largest mean stress [Pa], at least 0; by default the apex.
-
-See also matched_drucker_prager and von_mises.)")
-      .def(py::init(
-               [](double young, double poisson, double strength, double friction, double dilation,
-                  std::optional<double> tension_cutoff) {
-                 return checked(
-                     DruckerPrager{young, poisson, strength, friction, dilation, tension_cutoff.value_or(infinity)});
-               }),
-           py::kw_only(), py::arg("young"), py::arg("poisson"), py::arg("strength"), py::arg("friction") = 0.0,
-           py::arg("dilation") = 0.0, py::arg("tension_cutoff") = py::none())
-      .def_readonly("young", &DruckerPrager::young)
-      .def_readonly("poisson", &DruckerPrager::poisson)
-      .def_readonly("strength", &DruckerPrager::strength)
-      .def_readonly("friction", &DruckerPrager::friction)
-      .def_readonly("dilation", &DruckerPrager::dilation)
-      .def_readonly("tension_cutoff", &DruckerPrager::tension_cutoff);
+  bind_law<DruckerPrager>(m, "DruckerPrager",
+                          "Drucker-Prager, linear elastic and perfectly plastic: sqrt(J2) + friction * p <= strength "
+                          "with the mean stress p.",
+                          "See also matched_drucker_prager and von_mises.");
 }
 
-void bind_cam_clay(py::module_& m)
+/// Throws InputError for the first point whose parameters are out of their range.
+/// @param differences  of the parameters that vary, shape (n, number of them)
+void check_points(const Heterogeneous& law, const py::array_t<double>& differences)
 {
-  bind_law<CamClay>(m, "CamClay", R"(Modified Cam-Clay with pressure-dependent elasticity.
+  const auto rows = differences.unchecked<2>();
+  std::vector<double> here(law.varying.size());
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i)
+  {
+    for (std::size_t k = 0; k < here.size(); ++k)
+      here[k] = rows(i, static_cast<py::ssize_t>(k));
+    const LawList<> point = law_of_point(law, here);
+    check(point);
+    if (p_wave_modulus(point) > p_wave_modulus(law) * (1 + 1e-12))
+      throw InputError("a point has the modulus " + number_text(p_wave_modulus(point)) +
+                       " Pa, above that of the law's numbers, " + number_text(p_wave_modulus(law)) +
+                       " Pa, which bounds the time step; give the law the largest stiffness");
+  }
+}
 
-Args:
-    compression: slope lambda of the virgin compression line in specific volume and ln p [-], above swelling.
-    swelling: slope kappa of the swelling lines [-], positive.
-    critical_slope: slope M of the critical state line in p and q [-], positive.
-    poisson: Poisson's ratio [-], in (-1, 0.5).
-    preconsolidation: preconsolidation pressure at the start [Pa], positive.
-    void_ratio: at the start [-], positive.
-    attraction: isotropic tension at which stiffness and strength vanish [Pa], at least 0. Without it a point at zero
-        pressure has no stiffness, and its update fails.
-
-The state log_preconsolidation is ln of the preconsolidation pressure over that of the start, attraction included in both:
-set it for points that begin with another one. The modulus for the time step is that of twice the preconsolidation.)")
-      .def(py::init(
-               [](double compression, double swelling, double critical_slope, double poisson, double preconsolidation,
-                  double void_ratio, double attraction) {
-                 return checked(
-                     CamClay{compression, swelling, critical_slope, poisson, preconsolidation, void_ratio, attraction});
-               }),
-           py::kw_only(), py::arg("compression"), py::arg("swelling"), py::arg("critical_slope"), py::arg("poisson"),
-           py::arg("preconsolidation"), py::arg("void_ratio"), py::arg("attraction") = 0.0)
-      .def_readonly("compression", &CamClay::compression)
-      .def_readonly("swelling", &CamClay::swelling)
-      .def_readonly("critical_slope", &CamClay::critical_slope)
-      .def_readonly("poisson", &CamClay::poisson)
-      .def_readonly("preconsolidation", &CamClay::preconsolidation)
-      .def_readonly("void_ratio", &CamClay::void_ratio)
-      .def_readonly("attraction", &CamClay::attraction);
+void bind_heterogeneous(py::module_& m)
+{
+  const auto with_parts = [](const Parts& parts)
+  {
+    return Heterogeneous{parts.get<LawList<>>("law", "a law, but none made of others"),
+                         parts.get<std::vector<std::string>>("varying", "a list of names")};
+  };
+  bind_law<Heterogeneous>(
+      m, "Heterogeneous", "A law of which some parameters differ from point to point.",
+      R"(Each parameter that varies has a state, NAME_difference, with what a point's value exceeds the law's number by. Give points
+their values by Model.set_parameter, and finite elements by QuasiStatic.set_parameter. No point may be stiffer than the law's
+numbers say, since these bound the time step.)",
+      with_parts)
+      .def_readonly("law", &Heterogeneous::law)
+      .def_readonly("varying", &Heterogeneous::varying)
+      .def_readonly("strength_factor", &Heterogeneous::strength_factor, "What the strength of all points is divided by")
+      .def("check_points", &check_points, py::arg("differences"));
 }
 
 void bind_wrappers(py::module_& m)
 {
   bind_law<Hencky>(m, "Hencky",
-                   R"(A law between Kirchhoff stress and logarithmic strain, for strains that are not small.
-
-Args:
-    law: any law but Undrained. It works on the Kirchhoff stress; points carry the Cauchy stress.
-
-The state log_volume is ln of the volume over that of the start.)")
-      .def(py::init([](const LawList<>& law) { return checked(Hencky{law}); }), py::arg("law"))
+                   "A law between Kirchhoff stress and logarithmic strain, for strains that are not small.",
+                   "The state log_volume is ln of the volume over that of the start.",
+                   [](const Parts& parts) {
+                     return Hencky{parts.get<LawList<Heterogeneous>>("law", "a law, but neither Hencky nor Undrained")};
+                   })
       .def_readonly("law", &Hencky::law);
-  bind_law<Undrained>(m, "Undrained", R"(A saturated soil that does not drain, in effective stresses.
-
-Args:
-    skeleton: law of the effective stress; any.
-    water_modulus: bulk modulus of the pore water [Pa], positive.
-    porosity: [-], in (0, 1).
-
-Points carry the total stress; the state excess_pore_pressure [Pa], positive in compression, is what the effective stress
-exceeds it by (tension positive). Where there is a steady pore pressure, stresses are less that one.)")
-      .def(py::init(
-               [](const LawList<Hencky>& skeleton, double water_modulus, double porosity) {
-                 return checked(Undrained{skeleton, water_modulus, porosity});
-               }),
-           py::arg("skeleton"), py::kw_only(), py::arg("water_modulus") = 2.2e9, py::arg("porosity"))
-      .def_readonly("skeleton", &Undrained::skeleton)
-      .def_readonly("water_modulus", &Undrained::water_modulus)
-      .def_readonly("porosity", &Undrained::porosity);
+  bind_law<Undrained>(
+      m, "Undrained", "A saturated soil that does not drain, in effective stresses.",
+      R"(Points carry the total stress; the state excess_pore_pressure [Pa], positive in compression, is what the effective stress
+exceeds it by (tension positive). Where there is a steady pore pressure, stresses are less that one.)",
+      [](const Parts& parts) {
+        return Undrained{parts.get<LawList<Heterogeneous, Hencky>>("skeleton", "a law, but not Undrained"), 0, 0};
+      })
+      .def_readonly("skeleton", &Undrained::skeleton);
 }
 
 /// SHA-256 of a file, in hexadecimal digits.
@@ -203,35 +130,45 @@ std::string file_hash(const std::string& path)
       .cast<std::string>();
 }
 
+Umat loaded_umat(const Parts& parts)
+{
+  const auto symbol = parts.get<std::string>("symbol", "a text", "umat_");
+  const UmatFunction function = load_umat(parts.get<std::string>("library", "a path as text"), symbol);
+  return {function,
+          parts.get<std::vector<double>>("properties", "a list of numbers"),
+          parts.get<int>("n_variables", "a whole number"),
+          parts.get<int>("plastic_strain_variable", "a whole number", 0),
+          0,
+          symbol + " of " + file_hash(library_file(function))};
+}
+
 void bind_umat(py::module_& m)
 {
-  bind_law<Umat>(m, "Umat", R"(A law given as an Abaqus UMAT in a shared library.
-
-Args:
-    library: path of the shared library, such as one made by ``gfortran -shared -fPIC -o umat.so umat.f``.
-    properties: PROPS.
-    n_variables: NSTATV.
-    p_wave_modulus: modulus of the compression wave [Pa], for the critical time step; an upper bound will do.
-    plastic_strain_variable: number, from one, of the STATEV with the accumulated plastic deviatoric strain; 0: none.
-    symbol: name of the subroutine in the library.
-
-NDI is 3, NSHR 1 in plane strain and 3 in three dimensions. DTIME is one and DROT the identity: the stress has been turned
+  bind_law<Umat>(
+      m, "Umat", "A law given as an Abaqus UMAT in a shared library.",
+      R"(NDI is 3, NSHR 1 in plane strain and 3 in three dimensions. DTIME is one and DROT the identity: the stress has been rotated
 with the material already. Laws that depend on rate, temperature or the deformation gradient cannot be used. PNEWDT below
-one counts as a failure.)")
-      .def(py::init(
-               [](const std::string& library, std::vector<double> properties, int n_variables, double p_wave_modulus,
-                  int plastic_strain_variable, const std::string& symbol)
-               {
-                 const UmatFunction function = load_umat(library, symbol);
-                 return checked(Umat{function, std::move(properties), n_variables, plastic_strain_variable,
-                                     p_wave_modulus, symbol + " of " + file_hash(library_file(function))});
-               }),
-           py::arg("library"), py::kw_only(), py::arg("properties"), py::arg("n_variables"), py::arg("p_wave_modulus"),
-           py::arg("plastic_strain_variable") = 0, py::arg("symbol") = "umat_")
+one counts as a failure.)",
+      &loaded_umat)
       .def_readonly("properties", &Umat::properties)
       .def_readonly("n_variables", &Umat::n_variables)
       .def_readonly("plastic_strain_variable", &Umat::plastic_strain_variable)
       .def_readonly("code", &Umat::code, "Symbol and SHA-256 of the library's file");
+}
+
+void bind_declaration(py::module_& m)
+{
+  py::class_<Declaration>(m, "LawParameter", "A parameter of a law, as the law declares it.")
+      .def_readonly("name", &Declaration::name)
+      .def_readonly("unit", &Declaration::unit, "\"-\" without unit; None for a part that is no real number")
+      .def_readonly("meaning", &Declaration::meaning)
+      .def_readonly("range", &Declaration::range, "Allowed values, in words")
+      .def_readonly("needed", &Declaration::needed, "Whether it must be given")
+      .def_readonly("default", &Declaration::standard, "None where it must be given, or where there is no limit then")
+      .def_readonly("lower", &Declaration::lower, "None where there is none, or where it is another parameter")
+      .def_readonly("upper", &Declaration::upper, "The same")
+      .def_readonly("lower_included", &Declaration::lower_included, "Whether it may be equal to the bound")
+      .def_readonly("upper_included", &Declaration::upper_included);
 }
 } // namespace
 
@@ -242,14 +179,20 @@ void bind_laws(py::module_& m)
       .def_property_readonly("failed", [](const BatchReport& report) { return report.failed.size(); })
       .def_property_readonly("first_failed", [](const BatchReport& report)
                              { return report.failed.empty() ? -1 : report.failed.front(); });
+  bind_declaration(m);
   m.attr("law_types") = py::list();
-  bind_elastic(m);
-  bind_mohr_coulomb(m);
+  bind_soils(m);
   bind_softening(m);
   bind_drucker_prager(m);
-  bind_cam_clay(m);
   bind_python_law(m);
   bind_umat(m);
+  bind_heterogeneous(m);
   bind_wrappers(m);
+  m.def(
+      "reduced_strength", [](const Law& law, double factor) { return reduced_strength(law, factor); }, py::arg("law"),
+      py::arg("factor"));
+  m.def("cell_sizes",
+        py::vectorize([](double volume, int dim) { return dim == 2 ? cell_size<2>(volume) : cell_size<3>(volume); }),
+        py::arg("volumes"), py::arg("dim"));
 }
 } // namespace mpm::python

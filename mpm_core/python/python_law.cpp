@@ -32,6 +32,20 @@ Rows loaded(const PointBatch<D>& points, int states)
           rows_of(points.state, states, points.size), tangent};
 }
 
+/// Time, duration, sizes of cells and deformation gradients, as the attributes of an object
+template <int D>
+py::object increment_of(const PointBatch<D>& points)
+{
+  using namespace py::literals;
+  py::object sizes = py::none(), deformation = py::none();
+  if (points.cell_size)
+    sizes = py::array_t<double>(points.size, points.cell_size);
+  if (points.deformation.front())
+    deformation = rows_of(points.deformation.data(), D * D, points.size).reshape({points.size, D, D});
+  return py::module_::import("types").attr("SimpleNamespace")("time"_a = points.time, "dt"_a = points.dt,
+                                                              "cell_size"_a = sizes, "deformation"_a = deformation);
+}
+
 /// Takes over what a law has written, but in the points whose stress or state is not finite: they have failed.
 template <int D>
 BatchReport stored(const PointBatch<D>& points, const Rows& rows, int states)
@@ -65,6 +79,8 @@ struct PythonObject
 {
   py::object law;
   int states;
+  /// Whether its update takes an `increment` beside the rest
+  bool takes_increment;
   /// Whether an exception of it has been printed; shared by all copies
   std::shared_ptr<bool> has_told = std::make_shared<bool>(false);
 };
@@ -82,8 +98,12 @@ BatchReport called(const PythonObject& object, const PointBatch<D>& points)
   try
   {
     const Rows rows = loaded(points, object.states);
-    object.law.attr("update")(rows.strain, rows.stress, rows.state,
-                              points.tangent ? py::object(rows.tangent) : py::none());
+    const py::object tangent = points.tangent ? py::object(rows.tangent) : py::none();
+    if (object.takes_increment)
+      object.law.attr("update")(rows.strain, rows.stress, rows.state, tangent,
+                                py::arg("increment") = increment_of(points));
+    else
+      object.law.attr("update")(rows.strain, rows.stress, rows.state, tangent);
     return stored(points, rows, object.states);
   }
   catch (py::error_already_set& error)
@@ -103,7 +123,7 @@ BatchReport called_one_by_one(const PythonObject& object, const PointBatch<D>& p
   BatchReport report;
   for (Index i = 0; i < points.size; ++i)
   {
-    const OnePoint<D> point(points, i, object.states);
+    const BatchSlice<D> point(points, i, 1, object.states);
     const BatchReport one = called(object, point.batch);
     report.plastic += one.plastic;
     if (!one.failed.empty())
@@ -128,31 +148,39 @@ ExternalLaw python_law(const py::object& law)
     names = law.attr("state_names").cast<std::vector<std::string>>();
   if (static_cast<int>(names.size()) != states || names.front() != "plastic_strain")
     throw InputError("law has state_names of another number than n_state, or not plastic_strain as the first");
-  const PythonObject object{law, states};
-  return checked(ExternalLaw{"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(), std::move(names),
-                             law.attr("p_wave_modulus").cast<double>(),
-                             [object](const PointBatch<2>& points) { return called(object, points); },
-                             [object](const PointBatch<3>& points) { return called(object, points); }, law.ptr()});
+  const bool takes_increment =
+      py::module_::import("inspect").attr("signature")(law.attr("update")).attr("parameters").contains("increment");
+  const PythonObject object{law, states, takes_increment};
+  return {"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(),
+          std::move(names),
+          law.attr("p_wave_modulus").cast<double>(),
+          [object](const PointBatch<2>& points) { return called(object, points); },
+          [object](const PointBatch<3>& points) { return called(object, points); },
+          law.ptr(),
+          {takes_increment, takes_increment}};
 }
 } // namespace
 
 void bind_python_law(py::module_& m)
 {
-  bind_law<ExternalLaw>(m, "PythonLaw", R"(A law written in Python on NumPy arrays, for trying ideas.
+  bind_law<ExternalLaw>(m, "PythonLaw", "A law written in Python on NumPy arrays, for trying ideas.",
+                        R"(The object has these members.
 
-Args:
-    law: an object with these members.
+- n_state: number of state variables, at least 1; the first is the accumulated plastic deviatoric strain.
+- p_wave_modulus: modulus of the compression wave [Pa], for the critical time step.
+- update(strain_increment, stress, state, tangent): updates in place, as the method `update` of any law;
+  tangent is None in the explicit scheme.
+- state_names: names of the state variables, optional.
 
-        - n_state: number of state variables, at least 1; the first is the accumulated plastic deviatoric strain.
-        - p_wave_modulus: modulus of the compression wave [Pa], for the critical time step.
-        - update(strain_increment, stress, state, tangent): updates in place, as the method `update` of any law;
-          tangent is None in the explicit scheme.
-        - state_names: names of the state variables, optional.
+Where update has a further parameter `increment`, it is given an object with the attributes time [s], dt [s], cell_size [m],
+shape (n,) or None, and deformation, shape (n, D, D) or None: the time at the start, the duration (infinite where loading is
+slow without limit), the sizes of the points' cells, and the increment of the deformation gradient, where None stands for
+1 + strain increment.
 
 A point fails where its stress or a state of it is not finite afterwards: so a law tells that it found no solution there.
 An exception in update is a failure of all its points; they are then tried one by one, and the first exception of a law
-is printed.)")
-      .def(py::init(&python_law), py::arg("law"))
+is printed.)",
+                        [](const Parts& parts) { return python_law(parts.get<py::object>("law", "an object")); })
       .def_property_readonly(
           "law",
           [](const ExternalLaw& law)

@@ -15,7 +15,7 @@ import mpm_core as mpm
 from .options import add_choice, add_count, add_number, check
 from .plots import Scene
 from .scenes import scene_of
-from .soils import add_law_options, law_of
+from .soils import add_law_options, add_parameter, law_of
 
 GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
@@ -46,10 +46,8 @@ def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> N
 
 def add_soil_options(parser: argparse.ArgumentParser, dilation_angle: float | None) -> None:
     """Options of the soil; without a default for the dilation angle it is the friction angle: associated flow."""
-    add_number(parser, "--young", 200e3, "Pa", "Young's modulus", above=0)
-    add_number(parser, "--poisson", 0.33, "-", "Poisson's ratio", above=-1, below=0.5)
-    add_number(parser, "--cohesion", 1e3, "Pa", "cohesion", at_least=0)
-    add_number(parser, "--friction-angle", 25.0, "degrees", "friction angle", at_least=0, below=90)
+    for name, default in [("young", 200e3), ("poisson", 0.33), ("cohesion", 1e3), ("friction_angle", 25.0)]:
+        add_parameter(parser, mpm.MohrCoulomb, name, default)
     associated = "" if dilation_angle is not None else " (default: that one, associated flow)"
     add_number(parser, "--dilation-angle", dilation_angle, "degrees",
                "dilation angle, at most the friction angle" + associated, at_least=0)  # fmt: skip

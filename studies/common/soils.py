@@ -12,7 +12,16 @@ import mpm_core as mpm
 
 from .options import add_choice, add_code, add_number, add_switch
 
-MATERIALS = ("mohr-coulomb", "softening", "tresca", "von-mises", "drucker-prager", "cam-clay", "elastic")
+MATERIALS = (
+    "mohr-coulomb",
+    "viscoplastic",
+    "softening",
+    "tresca",
+    "von-mises",
+    "drucker-prager",
+    "cam-clay",
+    "elastic",
+)
 
 
 def add_law_options(parser: argparse.ArgumentParser) -> None:
@@ -20,30 +29,49 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     p = parser
     add_choice(p, "--material", MATERIALS[0], MATERIALS,
                "law of the soil; Tresca and von Mises: the cohesion is the shear strength")  # fmt: skip
-    add_number(
-        p, "--tension-cutoff", None, "Pa", "largest principal stress (default: that of the strength)", at_least=0
-    )
-    add_number(p, "--residual-cohesion", 200.0, "Pa", "softening: cohesion in the end", at_least=0)
-    add_number(
-        p, "--residual-friction-angle", 15.0, "degrees", "softening: friction angle in the end", at_least=0, below=90
-    )
-    add_number(p, "--softening-strain", 0.3, "-", "softening: plastic strain over which strength falls, in a band of the "
-               "reference length", above=0)  # fmt: skip
-    add_number(p, "--reference-length", 0.1, "m", "softening: cell size for which the softening strain holds", above=0)
-    add_number(p, "--compression-slope", 0.1, "-", "Cam-Clay: slope lambda", above=0)
-    add_number(p, "--swelling-slope", 0.02, "-", "Cam-Clay: slope kappa", above=0)
-    add_number(p, "--critical-slope", 1.0, "-", "Cam-Clay: slope M", above=0)
-    add_number(p, "--void-ratio", 1.0, "-", "Cam-Clay: void ratio at the start", above=0)
-    add_number(p, "--preconsolidation", 20e3, "Pa", "Cam-Clay: preconsolidation pressure at the start", above=0)
-    add_number(p, "--attraction", 1e3, "Pa", "Cam-Clay: isotropic tension that it bears", at_least=0)
+    add_parameter(p, mpm.MohrCoulomb, "tension_cutoff", None)
+    add_parameter(p, mpm.ViscoplasticMohrCoulomb, "viscosity", 1e4, "viscoplastic: ")
+    for name, default in [("residual_cohesion", 200.0), ("residual_friction_angle", 15.0), ("softening_strain", 0.3),
+                          ("reference_length", 0.1)]:  # fmt: skip
+        add_parameter(p, mpm.SofteningMohrCoulomb, name, default, "softening: ")
+    for name, default, option in [("compression", 0.1, "--compression-slope"), ("swelling", 0.02, "--swelling-slope"),
+                                  ("critical_slope", 1.0, None), ("void_ratio", 1.0, None),
+                                  ("preconsolidation", 20e3, None), ("attraction", 1e3, None)]:  # fmt: skip
+        add_parameter(p, mpm.CamClay, name, default, "Cam-Clay: ", option)
     add_switch(p, "--undrained", False, "effective stresses, with pore water that does not drain")
-    add_number(p, "--water-modulus", 2e7, "Pa", "undrained: bulk modulus of the pore water", above=0)
-    add_number(p, "--porosity", 0.4, "-", "undrained: porosity", above=0, below=1)
+    for name, default in [("water_modulus", 2e7), ("porosity", 0.4)]:
+        add_parameter(p, mpm.Undrained, name, default, "undrained: ")
     add_code(p, "--python-law", "FILE:CLASS", "a law written in Python, made without arguments, instead of --material")
     add_code(p, "--umat", "LIBRARY", "shared library with an Abaqus UMAT, instead of --material")
     p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
     p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")
+
+
+def add_parameter(
+    parser: argparse.ArgumentParser,
+    law: Any,
+    name: str,
+    default: float | None,
+    about: str = "",
+    option: str | None = None,
+) -> None:
+    """An option for a parameter of a law, with the unit, the meaning and the range that the law declares.
+
+    Args:
+        default: None for an option that need not be given.
+        about: put before the meaning.
+        option: by default the parameter's name.
+    """
+    declared = next(p for p in law.parameters if p.name == name)
+    bounds = {
+        "at_least" if declared.lower_included else "above": declared.lower,
+        "at_most" if declared.upper_included else "below": declared.upper,
+    }
+    bounds = {kind: bound for kind, bound in bounds.items() if bound is not None}
+    add_number(
+        parser, option or "--" + name.replace("_", "-"), default, declared.unit, about + declared.meaning, **bounds
+    )
 
 
 def law_of(args: argparse.Namespace) -> Any:
@@ -97,6 +125,8 @@ def _skeleton(a: argparse.Namespace) -> Any:
                 compression=a.compression_slope, swelling=a.swelling_slope, critical_slope=a.critical_slope, poisson=a.poisson,
                 preconsolidation=a.preconsolidation, void_ratio=a.void_ratio, attraction=a.attraction,
             )  # fmt: skip
+        case "viscoplastic":
+            return mpm.ViscoplasticMohrCoulomb(**elastic, **strength, viscosity=a.viscosity)
         case "softening":
             return mpm.SofteningMohrCoulomb(
                 mpm.MohrCoulomb(**elastic, **strength),

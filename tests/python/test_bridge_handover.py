@@ -65,7 +65,7 @@ def test_particles_take_the_values_of_the_finite_elements():
 
 @pytest.mark.parametrize(("fem_size", "cell_size"), [(0.1, 0.1), (0.1, 0.05), (0.05, 0.1)])
 def test_soil_that_is_handed_over_softens_as_seeded_soil_does(fem_size, cell_size):
-    """The particles keep the size of their own cells, and the strength that the finite elements left them."""
+    """The particles begin with the strength that the finite elements left them, and soften by the size of their own cells."""
     peak = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0)
     law = mpm.SofteningMohrCoulomb(peak, residual_cohesion=0.9e3, residual_friction_angle=25.0, softening_strain=0.1,
                                    reference_length=0.1)  # fmt: skip
@@ -75,17 +75,19 @@ def test_soil_that_is_handed_over_softens_as_seeded_soil_does(fem_size, cell_siz
     fem_model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
     assert fem_model.converged
     model = slope_particles(UNIT_WEIGHT, cell_size, law=law)
-    size = model.state("cell_size")
-    # Squares cut in four by their diagonals: triangles that are halves of squares of this side.
-    assert np.allclose(size, cell_size / np.sqrt(2))
     bridge.initialise(model, fem_model, equilibrate=False)
-    assert np.array_equal(model.state("cell_size"), size)
-    plastic, sized, _ = law.state_names
-    state = fem_model.evaluate_at(model.particles.position)["state"]
-    before = dict(zip(law.state_names, state.T))
-    assert before[plastic].max() > 1e-4
-    # Strength is lost by plastic strain times size
-    assert np.allclose(model.state("plastic_strain") * size, before[plastic] * before[sized], rtol=1e-12, atol=0)
+    # Squares cut in four by their diagonals: triangles that are halves of squares of this side. Strength is lost by plastic
+    # strain times size over the reference length: that of the elements' cells before, that of the particles' cells after
+    plastic, band, _ = model.particles.state.T
+    assert plastic.max() > 1e-4
+    assert np.allclose(band, plastic * fem_size / np.sqrt(2) / 0.1, rtol=1e-12, atol=0)
+    order = np.argsort(model.particles.id)
+    before = model.particles.state[order]
+    model.set_gravity((0.0, -2 * 9.81))
+    list(model.explicit(0.02))
+    more = model.particles.state[np.argsort(model.particles.id)] - before
+    assert more[:, 0].max() > 1e-3
+    assert np.allclose(more[:, 1], more[:, 0] * cell_size / np.sqrt(2) / 0.1, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("count", [True, False])

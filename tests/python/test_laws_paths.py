@@ -69,7 +69,7 @@ def pyramid_strength(law, kind, p, state):
     """q at failure in triaxial compression (tau in shear) at the mean stress p, or at the side stress if drained."""
     if isinstance(law, mpm.LinearElastic):
         return np.inf
-    now = law.softened(state[0]) if isinstance(law, mpm.SofteningMohrCoulomb) else law
+    now = law.softened(state[1]) if isinstance(law, mpm.SofteningMohrCoulomb) else law
     sine, cosine = np.sin(np.radians(now.friction_angle)), np.cos(np.radians(now.friction_angle))
     if kind == "shear":
         return p * sine + now.cohesion * cosine
@@ -140,7 +140,7 @@ def test_drained_strength_of_hencky_is_that_of_the_kirchhoff_stress(name):
     law = PYRAMIDS[name]
     _, stresses, states = path_of(mpm.Hencky(law), "drained", strain=0.06)
     for stress, state in list(zip(stresses, states, strict=True))[-20:]:
-        now = law.softened(state[0]) if name == "softening" else law
+        now = law.softened(state[1]) if name == "softening" else law
         n = (1 + np.sin(np.radians(now.friction_angle))) / (1 - np.sin(np.radians(now.friction_angle)))
         expected = n * PRESSURE + 2 * now.cohesion * np.exp(-state[-1]) * np.sqrt(n)
         assert -stress[0] == pytest.approx(expected, rel=1e-7)

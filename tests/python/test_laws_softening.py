@@ -29,8 +29,8 @@ def strength_excess(law, stress, state):
     """Value of the yield function that holds at the points' plastic strain, by the scale of the stress."""
     s = principal(stress)
     excess = []
-    for (s1, _, s3), (strain, size, deviation) in zip(s, state, strict=True):
-        now = law.softened(strain, size, deviation)
+    for (s1, _, s3), (_, band_strain, deviation) in zip(s, state, strict=True):
+        now = law.softened(band_strain, deviation)
         phi = np.radians(now.friction_angle)
         f = (s1 - s3) / 2 + (s1 + s3) / 2 * np.sin(phi) - now.cohesion * np.cos(phi)
         excess.append(f / (abs(s1) + abs(s3) + now.cohesion))
@@ -93,7 +93,7 @@ def test_simple_shear_of_a_clay_softens_by_closed_form():
 def shear_band_energy(cells):
     """Energy [J/m2] that a column 1 m high dissipates in shear when its softest cell takes all the softening."""
     size = 1.0 / cells
-    tests = [mpm.ElementTest(CLAY, [0.0] * 4, [0.0, size, 0.0 if k else -0.01]) for k in range(2)]
+    tests = [mpm.ElementTest(CLAY, [0.0] * 4, [0.0, 0.0, 0.0 if k else -0.01], cell_size=size) for k in range(2)]
     band, rest = tests
     work = 0.0
     displacement = 0.0

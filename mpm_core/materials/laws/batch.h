@@ -4,12 +4,13 @@
 
 #include "base/types.h"
 
+#include <limits>
 #include <string_view>
 
 namespace mpm
 {
 /// Most state variables that a law may have
-inline constexpr int max_states = 64;
+inline constexpr int max_states = 73;
 
 /// A batch of points that follow one law: one contiguous column per component, not owned.
 template <int D>
@@ -26,28 +27,52 @@ struct PointBatch
   double* const* state = nullptr;
   /// Consistent tangent d stress / d strain, row-major (size, components, components); null if not wanted
   double* tangent = nullptr;
+  /// Time at the start of the increment [s]
+  double time = 0;
+  /// Duration of the increment [s]; infinite where loading is taken as slow without limit, as in steps of finite
+  /// elements without a duration
+  double dt = std::numeric_limits<double>::infinity();
+  /// Size of each point's cell [m], see `cell_size` in mesh/mesh.h; null where there is no cell, or no law needs it
+  const double* cell_size = nullptr;
+  /// Increment of the deformation gradient, F = 1 + grad u from the increment's start to its end, one column per entry,
+  /// row by row. Null stands for 1 + strain increment: small displacements, or no law needs it
+  std::array<const double*, D * D> deformation{};
 };
 
-/// One point of a batch as a batch of its own, in the same columns. It points into itself, so it is not copied.
-template <int D>
-struct OnePoint
+/// What of a batch a law needs beyond what all are given, so that it is not worked out for others.
+struct Needs
 {
-  OnePoint(const PointBatch<D>& points, Index i, int n_state)
+  bool cell_size = false;
+  bool deformation = false;
+};
+
+/// Points [first, first + size) of a batch as a batch of their own, in the same columns. It points into itself, so it
+/// is not copied.
+template <int D>
+struct BatchSlice
+{
+  BatchSlice(const PointBatch<D>& points, Index first, Index size, int n_state) : batch(points)
   {
     constexpr auto entries = static_cast<std::size_t>(n_stress<D> * n_stress<D>);
-    batch.size = 1;
+    batch.size = size;
     for (std::size_t k = 0; k < n_stress<D>; ++k)
     {
-      batch.strain_increment[k] = points.strain_increment[k] + i;
-      batch.stress[k] = points.stress[k] + i;
+      batch.strain_increment[k] += first;
+      batch.stress[k] += first;
     }
     for (int k = 0; k < n_state; ++k)
-      state[static_cast<std::size_t>(k)] = points.state[k] + i;
+      state[static_cast<std::size_t>(k)] = points.state[k] + first;
     batch.state = state.data();
-    batch.tangent = points.tangent ? points.tangent + static_cast<std::size_t>(i) * entries : nullptr;
+    if (points.tangent)
+      batch.tangent += static_cast<std::size_t>(first) * entries;
+    if (points.cell_size)
+      batch.cell_size += first;
+    if (points.deformation.front())
+      for (const double*& column : batch.deformation)
+        column += first;
   }
-  OnePoint(const OnePoint&) = delete;
-  OnePoint& operator=(const OnePoint&) = delete;
+  BatchSlice(const BatchSlice&) = delete;
+  BatchSlice& operator=(const BatchSlice&) = delete;
 
   std::array<double*, max_states> state;
   PointBatch<D> batch;

@@ -2,7 +2,6 @@
 
 #include "materials/tools/deviator.h"
 #include "materials/tools/elasticity.h"
-#include "materials/tools/require.h"
 #include "materials/tools/root.h"
 
 #include <numbers>
@@ -194,21 +193,6 @@ void write_point(const CamClay& law, const Start<D>& a, const Result<D>& r, cons
   points.state[2][i] -= a.volumetric;
 }
 } // namespace
-
-void check(const CamClay& law)
-{
-  const auto positive = [](const char* name, double value, const char* range)
-  { require(value > 0 && std::isfinite(value), name, value, range); };
-  positive("swelling", law.swelling, "positive and finite");
-  require(law.compression > law.swelling && std::isfinite(law.compression), "compression", law.compression,
-          "above the swelling and finite");
-  positive("critical_slope", law.critical_slope, "positive and finite");
-  require(law.poisson > -1 && law.poisson < 0.5, "poisson", law.poisson, "in (-1, 0.5)");
-  positive("preconsolidation", law.preconsolidation, "positive and finite [Pa]");
-  positive("void_ratio", law.void_ratio, "positive and finite");
-  require(law.attraction >= 0 && std::isfinite(law.attraction), "attraction", law.attraction,
-          "at least 0 and finite [Pa]");
-}
 
 double p_wave_modulus(const CamClay& law)
 {

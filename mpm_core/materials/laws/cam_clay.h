@@ -1,6 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
+#include "materials/tools/parameter.h"
 
 namespace mpm
 {
@@ -16,21 +17,28 @@ namespace mpm
 /// return with secant moduli).
 struct CamClay
 {
-  /// Slope lambda of the virgin compression line in v and ln p [-], > swelling
-  double compression;
-  /// Slope kappa of the swelling lines [-], > 0
-  double swelling;
-  /// Slope M of the critical state line in p and q [-], > 0
-  double critical_slope;
-  /// Poisson's ratio [-], in (-1, 0.5)
-  double poisson;
-  /// Preconsolidation pressure at the start, less the attraction [Pa], > 0
-  double preconsolidation;
-  /// Void ratio at the start [-], > 0
-  double void_ratio;
-  /// Isotropic tension at which the soil loses stiffness and strength [Pa], >= 0. Without it a point must be in
-  /// compression: one at zero pressure has no stiffness, and its update fails.
+  double compression, swelling, critical_slope, poisson, preconsolidation, void_ratio;
   double attraction = 0;
+
+  static constexpr auto parameters()
+  {
+    using L = CamClay;
+    return std::array{
+        parameter<L>("compression", entry<&L::compression>, "-", above<L>("swelling", entry<&L::swelling>),
+                     "slope lambda of the virgin compression line in specific volume and ln p"),
+        parameter<L>("swelling", entry<&L::swelling>, "-", above<L>(0), "slope kappa of the swelling lines"),
+        parameter<L>("critical_slope", entry<&L::critical_slope>, "-", above<L>(0),
+                     "slope M of the critical state line in p and q"),
+        poisson_parameter<L>(entry<&L::poisson>),
+        parameter<L>("preconsolidation", entry<&L::preconsolidation>, "Pa", above<L>(0),
+                     "preconsolidation pressure at the start, less the attraction"),
+        parameter<L>("void_ratio", entry<&L::void_ratio>, "-", above<L>(0), "void ratio at the start"),
+        parameter<L>("attraction", entry<&L::attraction>, "Pa", at_least<L>(0),
+                     "isotropic tension at which stiffness and strength vanish; without it a point at zero pressure "
+                     "has no stiffness, and its update fails",
+                     0.0),
+    };
+  }
 
   static constexpr std::string_view name = "CamClay";
   /// `log_preconsolidation` is ln of p_c over that of the law's start, set by the user for points that begin with
@@ -39,9 +47,6 @@ struct CamClay
 
   bool operator==(const CamClay&) const = default;
 };
-
-/// Throws InputError when a parameter is out of its range.
-void check(const CamClay& law);
 
 /// Modulus of the compression wave, K + 4G/3 [Pa], at twice the preconsolidation pressure of the start: the stiffness
 /// grows with the pressure, and a time step from it holds up to there

@@ -2,7 +2,6 @@
 
 #include "materials/tools/deviator.h"
 #include "materials/tools/elasticity.h"
-#include "materials/tools/require.h"
 
 #include <numbers>
 
@@ -31,7 +30,7 @@ Cone cone_of(const DruckerPrager& law)
   return {moduli, moduli.lambda + 2 * moduli.shear / 3, law.strength, law.friction, law.dilation, tension, corner};
 }
 
-enum class Part
+enum class ReturnPart
 {
   elastic,
   cone,
@@ -42,7 +41,7 @@ enum class Part
 /// Mean stress and ratio of the deviator to that of the trial stress after the return
 struct Returned
 {
-  Part part;
+  ReturnPart part;
   double mean;
   double ratio;
 };
@@ -53,14 +52,14 @@ Returned return_to_cone(const Cone& c, double p, double j)
   const double excess = j + c.friction * p - c.strength;
   const double tolerance = 1e-12 * (j + std::abs(p) + c.strength); // a stress that was returned counts as elastic
   if (excess <= tolerance && p - c.tension <= tolerance)
-    return {Part::elastic, p, 1};
+    return {ReturnPart::elastic, p, 1};
   const double multiplier = excess / (c.moduli.shear + c.bulk * c.friction * c.dilation);
   const double mean = p - c.bulk * c.dilation * multiplier;
   if (excess > 0 && mean <= c.tension)
-    return {Part::cone, mean, (c.strength - c.friction * mean) / j};
+    return {ReturnPart::cone, mean, (c.strength - c.friction * mean) / j};
   if (j <= c.corner)
-    return {Part::cut_off, c.tension, 1};
-  return {Part::corner, c.tension, c.corner / j};
+    return {ReturnPart::cut_off, c.tension, 1};
+  return {ReturnPart::corner, c.tension, c.corner / j};
 }
 
 template <int D>
@@ -69,13 +68,13 @@ void write_tangent(const Cone& c, const Returned& returned, const SymTensor<D>& 
   const double shear = c.moduli.shear, r = returned.ratio;
   switch (returned.part)
   {
-  case Part::elastic:
+  case ReturnPart::elastic:
     return;
-  case Part::cut_off:
+  case ReturnPart::cut_off:
     return write_deviatoric_tangent<D>(s, 1, shear, {0, 0, 0, 0}, tangent);
-  case Part::corner:
+  case ReturnPart::corner:
     return write_deviatoric_tangent<D>(s, r, shear, {0, 0, 0, -r / j}, tangent);
-  case Part::cone:
+  case ReturnPart::cone:
     const double stiffness = shear + c.bulk * c.friction * c.dilation;
     const double by_volume = c.bulk * c.bulk * c.dilation * c.friction / stiffness;
     const double by_radius = c.bulk * c.dilation / stiffness;
@@ -103,15 +102,6 @@ double cone_strength(double cohesion, double friction_angle, ConeMatch match)
   return 6 * cohesion * std::cos(phi) / (std::numbers::sqrt3 * (match == ConeMatch::outer ? 3 - sine : 3 + sine));
 }
 
-void check(const DruckerPrager& law)
-{
-  check_elastic(law.young, law.poisson);
-  require(law.strength >= 0 && std::isfinite(law.strength), "strength", law.strength, "at least 0 and finite [Pa]");
-  require(law.friction >= 0 && std::isfinite(law.friction), "friction", law.friction, "at least 0 and finite");
-  require(law.dilation >= 0 && law.dilation <= law.friction, "dilation", law.dilation, "between 0 and the friction");
-  require(law.tension_cutoff >= 0, "tension_cutoff", law.tension_cutoff, "at least 0 [Pa] (or infinite)");
-}
-
 double p_wave_modulus(const DruckerPrager& law)
 {
   const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
@@ -137,7 +127,7 @@ BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)
     const SymTensor<D> s = deviator<D>(trial);
     const double j = radius<D>(s);
     const Returned returned = return_to_cone(cone, mean<D>(trial), j);
-    const bool plastic = returned.part != Part::elastic;
+    const bool plastic = returned.part != ReturnPart::elastic;
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = plastic ? (k < 3 ? returned.mean : 0.0) + returned.ratio * s[k] : trial[k];
     points.state[0][i] += (1 - returned.ratio) * j / (std::numbers::sqrt3 * cone.moduli.shear);

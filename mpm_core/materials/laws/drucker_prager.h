@@ -1,8 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
-
-#include <limits>
+#include "materials/tools/parameter.h"
 
 namespace mpm
 {
@@ -16,18 +15,26 @@ namespace mpm
 /// Source: de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, sections 6.4.3 and 8.3.
 struct DruckerPrager
 {
-  /// Young's modulus [Pa], > 0
-  double young;
-  /// Poisson's ratio [-], in (-1, 0.5)
-  double poisson;
-  /// sqrt(J2) on the surface at zero mean stress [Pa], >= 0
-  double strength;
-  /// Slope of the surface in p and sqrt(J2) [-], >= 0
-  double friction = 0;
-  /// The same of the plastic potential [-], in [0, friction]
-  double dilation = 0;
-  /// Largest mean stress allowed [Pa], >= 0
-  double tension_cutoff = std::numeric_limits<double>::infinity();
+  double young, poisson, strength;
+  double friction = 0, dilation = 0;
+  double tension_cutoff = unlimited;
+
+  static constexpr auto parameters()
+  {
+    using L = DruckerPrager;
+    return std::array{
+        young_parameter<L>(entry<&L::young>),
+        poisson_parameter<L>(entry<&L::poisson>),
+        parameter<L>("strength", entry<&L::strength>, "Pa", at_least<L>(0),
+                     "sqrt(J2) on the surface at zero mean stress"),
+        parameter<L>("friction", entry<&L::friction>, "-", at_least<L>(0),
+                     "slope of the surface in p and sqrt(J2); 0 is the criterion of von Mises", 0.0),
+        parameter<L>("dilation", entry<&L::dilation>, "-", up_to<L>("friction", entry<&L::friction>),
+                     "slope of the plastic potential", 0.0),
+        parameter<L>("tension_cutoff", entry<&L::tension_cutoff>, "Pa", or_infinite(at_least<L>(0)),
+                     "largest mean stress allowed; without effect from the apex upwards", unlimited),
+    };
+  }
 
   static constexpr std::string_view name = "DruckerPrager";
   static constexpr std::array state_names{"plastic_strain"};
@@ -48,9 +55,6 @@ double cone_slope(double angle, ConeMatch match);
 
 /// sqrt(J2) at zero mean stress on the cone that matches a cohesion [Pa] and friction angle [degrees]
 double cone_strength(double cohesion, double friction_angle, ConeMatch match);
-
-/// Throws InputError when a parameter is out of its range.
-void check(const DruckerPrager& law);
 
 /// Modulus of the compression wave, K + 4G/3 [Pa], for the critical time step (16)
 double p_wave_modulus(const DruckerPrager& law);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
+#include "materials/tools/parameter.h"
 
 #include <functional>
 
@@ -19,12 +20,18 @@ struct ExternalLaw
   std::function<BatchReport(const PointBatch<3>&)> solid;
   /// What the functions call: laws that call the same are equal
   const void* identity;
+  /// What the functions want to know of a batch
+  Needs wants = {};
+
+  static constexpr std::array<Parameter<ExternalLaw>, 0> parameters() { return {}; }
+  static constexpr std::array parts{Part{"law", "an object with the members listed below"}};
 
   bool operator==(const ExternalLaw& other) const { return identity == other.identity && names == other.names; }
 };
 
 inline std::string law_name(const ExternalLaw& law) { return law.name; }
 inline int n_state(const ExternalLaw& law) { return static_cast<int>(law.names.size()); }
+inline Needs needs(const ExternalLaw& law) { return law.wants; }
 inline std::vector<std::string> state_names(const ExternalLaw& law) { return law.names; }
 inline double p_wave_modulus(const ExternalLaw& law) { return law.wave_modulus; }
 /// That of a Poisson's ratio of 1/4

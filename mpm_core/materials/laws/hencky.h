@@ -1,6 +1,6 @@
 #pragma once
 
-#include "materials/laws/law_list.h"
+#include "materials/laws/heterogeneous.h"
 
 #include <cmath>
 
@@ -15,7 +15,11 @@ namespace mpm
 /// Computational Methods for Plasticity, section 14.3.
 struct Hencky
 {
-  LawList<> law;
+  LawList<Heterogeneous> law;
+
+  static constexpr std::array<Parameter<Hencky>, 0> parameters() { return {}; }
+  static constexpr std::array parts{
+      Part{"law", "any law but Undrained; it works on the Kirchhoff stress, and points carry the Cauchy stress"}};
 
   bool operator==(const Hencky&) const = default;
 };
@@ -31,6 +35,8 @@ void check(const Hencky& law);
 
 /// Modulus of the compression wave [Pa] where the volume has not changed
 double p_wave_modulus(const Hencky& law);
+
+inline Needs needs(const Hencky& law) { return needs(law.law); }
 
 inline double shear_modulus(const Hencky& law) { return shear_modulus(law.law); }
 

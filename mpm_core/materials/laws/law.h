@@ -7,5 +7,5 @@
 namespace mpm
 {
 /// Any constitutive law, as a plain value
-using Law = LawList<Hencky, Undrained>;
+using Law = LawList<Heterogeneous, Hencky, Undrained>;
 } // namespace mpm

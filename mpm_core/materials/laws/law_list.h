@@ -10,6 +10,7 @@
 #include "materials/laws/mohr_coulomb.h"
 #include "materials/laws/softening_mohr_coulomb.h"
 #include "materials/laws/umat.h"
+#include "materials/laws/viscoplastic_mohr_coulomb.h"
 
 #include <string>
 #include <variant>
@@ -18,8 +19,15 @@ namespace mpm
 {
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
-using LawList = std::variant<LinearElastic, MohrCoulomb, SofteningMohrCoulomb, DruckerPrager, CamClay, ExternalLaw,
-                             Umat, Wrapper...>;
+using LawList = std::variant<LinearElastic, MohrCoulomb, ViscoplasticMohrCoulomb, SofteningMohrCoulomb, DruckerPrager,
+                             CamClay, ExternalLaw, Umat, Wrapper...>;
+
+/// Throws InputError, with name, value and range, when a parameter of a law is out of its range.
+template <class L>
+requires requires { L::state_names; } &&(!requires { L::parts; }) void check(const L& law)
+{
+  check_parameters(law);
+}
 
 /// What a law is called in messages
 template <class L>
@@ -40,6 +48,23 @@ std::vector<std::string> state_names(const L&) { return {L::state_names.begin(),
 template <class L>
 requires requires(L law) { law.young + law.poisson; }
 double shear_modulus(const L& law) { return law.young / (2 * (1 + law.poisson)); }
+
+/// What a law needs of a batch beyond what all are given
+template <class L>
+requires requires { L::state_names; }
+Needs needs(const L&)
+{
+  if constexpr (requires { L::special_needs; })
+    return L::special_needs;
+  else
+    return {};
+}
+
+template <class... L>
+Needs needs(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& l) { return needs(l); }, law);
+}
 
 template <class... L>
 std::string law_name(const std::variant<L...>& law)

@@ -1,20 +1,9 @@
 #include "materials/laws/linear_elastic.h"
 
 #include "materials/tools/elasticity.h"
-#include "materials/tools/require.h"
-
-#include <cmath>
 
 namespace mpm
 {
-void check_elastic(double young, double poisson)
-{
-  require(young > 0 && std::isfinite(young), "young", young, "positive and finite [Pa]");
-  require(poisson > -1 && poisson < 0.5, "poisson", poisson, "in (-1, 0.5)");
-}
-
-void check(const LinearElastic& law) { check_elastic(law.young, law.poisson); }
-
 double p_wave_modulus(const LinearElastic& law)
 {
   const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);

@@ -1,25 +1,26 @@
 #pragma once
 
 #include "materials/laws/batch.h"
+#include "materials/tools/parameter.h"
 
 namespace mpm
 {
 /// Isotropic linear elasticity, in rate form between Cauchy stress and strain increment.
 struct LinearElastic
 {
-  /// Young's modulus [Pa], > 0
-  double young;
-  /// Poisson's ratio [-], in (-1, 0.5)
-  double poisson;
+  double young, poisson;
+
+  static constexpr auto parameters()
+  {
+    using L = LinearElastic;
+    return std::array{young_parameter<L>(entry<&L::young>), poisson_parameter<L>(entry<&L::poisson>)};
+  }
 
   static constexpr std::string_view name = "LinearElastic";
   static constexpr std::array state_names{"plastic_strain"};
 
   bool operator==(const LinearElastic&) const = default;
 };
-
-/// Throws InputError when a parameter is out of its range.
-void check(const LinearElastic& law);
 
 /// Modulus of the compression wave, K + 4G/3 [Pa], for the critical time step (16)
 double p_wave_modulus(const LinearElastic& law);

@@ -2,7 +2,6 @@
 
 #include "base/work_columns.h"
 #include "materials/laws/mohr_coulomb_tangent.h"
-#include "materials/tools/require.h"
 #include "materials/tools/spectral.h"
 
 #include <optional>
@@ -237,17 +236,6 @@ Index return_block(const Surface& m, const std::optional<RegionMaps>& maps, cons
   return plastic;
 }
 } // namespace
-
-void check(const MohrCoulomb& law)
-{
-  check_elastic(law.young, law.poisson);
-  require(law.cohesion >= 0 && std::isfinite(law.cohesion), "cohesion", law.cohesion, "at least 0 and finite [Pa]");
-  require(law.friction_angle >= 0 && law.friction_angle < 90, "friction_angle", law.friction_angle,
-          "in [0, 90) [degrees]");
-  require(law.dilation_angle >= 0 && law.dilation_angle <= law.friction_angle, "dilation_angle", law.dilation_angle,
-          "between 0 and the friction angle [degrees]");
-  require(law.tension_cutoff >= 0, "tension_cutoff", law.tension_cutoff, "at least 0 [Pa] (or infinite)");
-}
 
 double p_wave_modulus(const MohrCoulomb& law)
 {

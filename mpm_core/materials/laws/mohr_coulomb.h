@@ -1,8 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
-
-#include <limits>
+#include "materials/tools/parameter.h"
 
 namespace mpm
 {
@@ -16,27 +15,34 @@ namespace mpm
 /// Source: Clausen, Damkilde, Andersen (2006), IJNME 66, 1967-1989, and (2007), Comput. Struct. 85, 1795-1807.
 struct MohrCoulomb
 {
-  /// Young's modulus [Pa], > 0
-  double young;
-  /// Poisson's ratio [-], in (-1, 0.5)
-  double poisson;
-  /// Cohesion c [Pa], >= 0
-  double cohesion;
-  /// Friction angle phi [degrees], in [0, 90)
-  double friction_angle;
-  /// Dilation angle psi [degrees], in [0, phi]
+  double young, poisson, cohesion, friction_angle;
   double dilation_angle = 0;
-  /// Largest principal stress allowed [Pa], >= 0; without effect from c cot(phi) upwards
-  double tension_cutoff = std::numeric_limits<double>::infinity();
+  double tension_cutoff = unlimited; ///< without effect from c cot(phi) upwards
+
+  /// The declarations for a law L that has such a soil within it, to which `path` leads
+  template <class L, auto... path>
+  static constexpr auto parameters_within()
+  {
+    using M = MohrCoulomb;
+    constexpr auto friction = entry<path..., &M::friction_angle>;
+    return std::array{
+        young_parameter<L>(entry<path..., &M::young>),
+        poisson_parameter<L>(entry<path..., &M::poisson>),
+        parameter<L>("cohesion", entry<path..., &M::cohesion>, "Pa", at_least<L>(0), "cohesion c"),
+        parameter<L>("friction_angle", friction, "degrees", {{0, true}, {90, false}}, "friction angle phi"),
+        parameter<L>("dilation_angle", entry<path..., &M::dilation_angle>, "degrees",
+                     up_to<L>("friction_angle", friction), "dilation angle psi", 0.0),
+        parameter<L>("tension_cutoff", entry<path..., &M::tension_cutoff>, "Pa", or_infinite(at_least<L>(0)),
+                     "largest principal stress allowed; without effect from the apex c cot(phi) upwards", unlimited),
+    };
+  }
+  static constexpr auto parameters() { return parameters_within<MohrCoulomb>(); }
 
   static constexpr std::string_view name = "MohrCoulomb";
   static constexpr std::array state_names{"plastic_strain"};
 
   bool operator==(const MohrCoulomb&) const = default;
 };
-
-/// Throws InputError when a parameter is out of its range.
-void check(const MohrCoulomb& law);
 
 /// Modulus of the compression wave, K + 4G/3 [Pa], for the critical time step (16)
 double p_wave_modulus(const MohrCoulomb& law);

@@ -1,7 +1,6 @@
 #include "materials/laws/softening_mohr_coulomb.h"
 
 #include "materials/laws/mohr_coulomb_tangent.h"
-#include "materials/tools/require.h"
 #include "materials/tools/root.h"
 
 namespace mpm
@@ -21,12 +20,13 @@ Surface surface_of(const MohrCoulomb& law)
 struct Softener
 {
   const SofteningMohrCoulomb& law;
-  double plastic_strain; ///< at the increment's start
-  double cell_size, cohesion_deviation;
+  double band_strain;    ///< at the increment's start
+  double bands_per_cell; ///< cell size over the reference length
+  double cohesion_deviation;
   Principal trial;
 
   /// Surface after a further plastic strain
-  Surface surface(double increment) const { return mohr_coulomb_surface(plastic_strain + increment); }
+  Surface surface(double increment) const { return mohr_coulomb_surface(band_strain + bands_per_cell * increment); }
 
   Principal returned(double increment) const { return return_to_surface(surface(increment), trial).stress; }
 
@@ -79,10 +79,7 @@ struct Softener
   }
 
 private:
-  Surface mohr_coulomb_surface(double strain) const
-  {
-    return surface_of(softened(law, strain, cell_size, cohesion_deviation));
-  }
+  Surface mohr_coulomb_surface(double strain) const { return surface_of(softened(law, strain, cohesion_deviation)); }
 };
 
 /// Derivative of the plastic strain of a return by the trial stress (principal values) at a fixed surface
@@ -130,7 +127,7 @@ void add_softening(const Softener& softener, const Surface& m, const Spectral<D>
 template <int D>
 bool is_intact(const Surface& peak, const PointBatch<D>& points, Index i, const SymTensor<D>& trial)
 {
-  return points.state[0][i] == 0 && points.state[2][i] >= 0 && !may_yield(peak, trial);
+  return points.state[1][i] == 0 && points.state[2][i] >= 0 && !may_yield(peak, trial);
 }
 
 /// Returns one trial stress that may be outside; whether it was.
@@ -138,7 +135,8 @@ template <int D>
 bool update_point(const SofteningMohrCoulomb& law, const PointBatch<D>& points, Index i, const SymTensor<D>& trial)
 {
   const Spectral<D> spectrum = spectral(trial);
-  const Softener softener{law, points.state[0][i], points.state[1][i], points.state[2][i], spectrum.stress};
+  const double bands = points.cell_size ? points.cell_size[i] / law.reference_length : 1;
+  const Softener softener{law, points.state[1][i], bands, points.state[2][i], spectrum.stress};
   if (!is_outside(softener.surface(0), spectrum.stress.s1, spectrum.stress.s3))
     return false;
   const double increment = softener.increment();
@@ -148,6 +146,7 @@ bool update_point(const SofteningMohrCoulomb& law, const PointBatch<D>& points, 
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     points.stress[k][i] = stress[k];
   points.state[0][i] += increment;
+  points.state[1][i] += softener.bands_per_cell * increment;
   if (points.tangent)
   {
     double* const tangent = points.tangent + static_cast<std::size_t>(i) * n_stress<D> * n_stress<D>;
@@ -158,27 +157,9 @@ bool update_point(const SofteningMohrCoulomb& law, const PointBatch<D>& points, 
 }
 } // namespace
 
-void check(const SofteningMohrCoulomb& law)
+MohrCoulomb softened(const SofteningMohrCoulomb& law, double band_strain, double cohesion_deviation)
 {
-  check(law.peak);
-  require(law.residual_cohesion >= 0 && law.residual_cohesion <= law.peak.cohesion, "residual_cohesion",
-          law.residual_cohesion, "between 0 and the cohesion [Pa]");
-  require(law.residual_friction_angle >= 0 && law.residual_friction_angle <= law.peak.friction_angle,
-          "residual_friction_angle", law.residual_friction_angle, "between 0 and the friction angle [degrees]");
-  require(law.residual_dilation_angle >= 0 && law.residual_dilation_angle <= law.residual_friction_angle,
-          "residual_dilation_angle", law.residual_dilation_angle,
-          "between 0 and the residual friction angle [degrees]");
-  require(law.softening_strain > 0 && std::isfinite(law.softening_strain), "softening_strain", law.softening_strain,
-          "positive and finite");
-  require(law.reference_length > 0 && std::isfinite(law.reference_length), "reference_length", law.reference_length,
-          "positive and finite [m]");
-}
-
-MohrCoulomb softened(const SofteningMohrCoulomb& law, double plastic_strain, double cell_size,
-                     double cohesion_deviation)
-{
-  const double h = cell_size > 0 ? cell_size : law.reference_length;
-  const double progress = plastic_strain * h / (law.softening_strain * law.reference_length);
+  const double progress = band_strain / law.softening_strain;
   const double lost = law.shape == Softening::linear ? std::min(progress, 1.0) : -std::expm1(-progress);
   const double factor = std::max(0.0, 1 + cohesion_deviation);
   MohrCoulomb now = law.peak;

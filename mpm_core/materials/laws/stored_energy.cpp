@@ -42,6 +42,12 @@ double energy(const SofteningMohrCoulomb& law, const SymTensor<D>& stress, const
 }
 
 template <int D>
+double energy(const ViscoplasticMohrCoulomb& law, const SymTensor<D>& stress, const double* state)
+{
+  return energy<D>(law.inviscid, stress, state);
+}
+
+template <int D>
 double energy(const CamClay& law, const SymTensor<D>& stress, const double* state)
 {
   const auto [mean, squared] = invariants<D>(stress);
@@ -66,6 +72,13 @@ double energy(const Umat&, const SymTensor<D>&, const double*)
 
 template <int D, class... L>
 double energy(const std::variant<L...>& law, const SymTensor<D>& stress, const double* state);
+
+template <int D>
+double energy(const Heterogeneous& law, const SymTensor<D>& stress, const double* state)
+{
+  const double* const first = state + n_state(law.law);
+  return energy<D>(law_of_point(law, {first, first + law.varying.size()}), stress, state);
+}
 
 template <int D>
 double energy(const Hencky& law, SymTensor<D> stress, const double* state)

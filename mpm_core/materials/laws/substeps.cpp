@@ -1,6 +1,9 @@
 #include "materials/laws/substeps.h"
 
+#include "base/tensor.h"
+
 #include <algorithm>
+#include <cmath>
 
 namespace mpm
 {
@@ -40,6 +43,15 @@ template <int D>
 BatchReport updated_by(int parts, const Law& law, PointBatch<D> point)
 {
   SymTensor<D> part;
+  Matrix<D> gradient; // of a part; that parts follow one another adds a term of second order, which is left out
+  const double start = point.time;
+  point.dt /= parts;
+  for (std::size_t k = 0; k < D * D && point.deformation[k]; ++k)
+  {
+    const double identity = k % (D + 1) == 0 ? 1 : 0;
+    gradient[k / D][k % D] = identity + (*point.deformation[k] - identity) / parts;
+    point.deformation[k] = &gradient[k / D][k % D];
+  }
   for (std::size_t k = 0; k < n_stress<D>; ++k)
   {
     part[k] = *point.strain_increment[k] / parts;
@@ -48,6 +60,8 @@ BatchReport updated_by(int parts, const Law& law, PointBatch<D> point)
   BatchReport whole;
   for (int i = 0; i < parts && whole.failed.empty(); ++i)
   {
+    if (std::isfinite(point.dt))
+      point.time = start + i * point.dt;
     const BatchReport report = update<D>(law, point);
     whole.plastic = std::max(whole.plastic, report.plastic);
     whole.failed = report.failed;
@@ -63,7 +77,7 @@ BatchReport update_in_parts(const Law& law, const PointBatch<D>& points, const s
   BatchReport total;
   for (Index i : failed)
   {
-    const OnePoint<D> point(points, i, states);
+    const BatchSlice<D> point(points, i, 1, states);
     const Values<D> start = values_of(point.batch, states);
     BatchReport report{0, {0}};
     for (int parts = 2; parts <= most_parts && !report.failed.empty(); parts *= 2)

@@ -20,10 +20,52 @@ struct Arguments
 {
   static constexpr std::size_t n = n_stress<D>;
   std::array<double, n> stress, strain, increment;
+  std::array<double, 9> gradient_before, gradient; ///< row by row
+  double time, duration, length;
   std::array<double, n * n> ddsdde{};
   std::array<double, max_states> variables{};
   double new_step = 1; ///< PNEWDT
 };
+
+/// Increment of the deformation gradient of a point, row by row
+template <int D>
+std::array<double, 9> deformation_increment(const PointBatch<D>& points, Index i)
+{
+  std::array<double, 9> f{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  if (points.deformation.front())
+  {
+    for (std::size_t a = 0; a < D; ++a)
+      for (std::size_t b = 0; b < D; ++b)
+        f[3 * a + b] = points.deformation[a * D + b][i];
+    return f;
+  }
+  const auto& strain = points.strain_increment;
+  for (std::size_t k = 0; k < 3; ++k)
+    f[4 * k] += strain[k][i];
+  constexpr std::array<std::array<std::size_t, 2>, 3> shears{{{1, 3}, {5, 7}, {2, 6}}}; // xy, yz, xz
+  for (std::size_t k = 3; k < n_stress<D>; ++k)
+    for (std::size_t entry : shears[k - 3])
+      f[entry] = 0.5 * strain[k][i];
+  return f;
+}
+
+std::array<double, 9> product(const std::array<double, 9>& a, const std::array<double, 9>& b)
+{
+  std::array<double, 9> c{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      for (std::size_t k = 0; k < 3; ++k)
+        c[3 * i + j] += a[3 * i + k] * b[3 * k + j];
+  return c;
+}
+
+std::array<double, 9> transposed(const std::array<double, 9>& a)
+{
+  return {a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]};
+}
+
+/// First of the columns of the deformation gradient, and of STATEV
+constexpr int first_gradient = 7, first_variable = 16;
 
 template <int D>
 Arguments<D> loaded(const Umat& law, const PointBatch<D>& points, Index i)
@@ -36,7 +78,13 @@ Arguments<D> loaded(const Umat& law, const PointBatch<D>& points, Index i)
     a.strain[abaqus_place[k]] = points.state[1 + k][i];
   }
   for (int k = 0; k < law.n_variables; ++k)
-    a.variables[static_cast<std::size_t>(k)] = points.state[7 + k][i];
+    a.variables[static_cast<std::size_t>(k)] = points.state[first_variable + k][i];
+  for (std::size_t k = 0; k < 9; ++k)
+    a.gradient_before[k] = points.state[first_gradient + static_cast<int>(k)][i] + (k % 4 == 0 ? 1 : 0);
+  a.gradient = product(deformation_increment(points, i), a.gradient_before);
+  a.time = points.time;
+  a.duration = std::isfinite(points.dt) ? points.dt : 1;
+  a.length = points.cell_size ? points.cell_size[i] : 1;
   return a;
 }
 
@@ -48,17 +96,18 @@ void call(const Umat& law, Index i, Arguments<D>& a)
   const std::array<int, 4> step{1, 0, 0, 0}; // JSTEP
   double sse = 0, spd = 0, scd = 0, rpl = 0, drpldt = 0;
   std::array<double, 6> ddsddt{}, drplde{};
-  const std::array<double, 2> time{};
+  const std::array<double, 2> time{a.time, a.time};
   const std::array<double, 3> coords{};
   constexpr std::array<double, 9> identity{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const double duration = 1, zero = 0, length = 1;
+  const std::array<double, 9> before = transposed(a.gradient_before), after = transposed(a.gradient); // Fortran
+  const double zero = 0;
   std::array<char, 80> name;
   name.fill(' ');
   law.function(a.stress.data(), a.variables.data(), a.ddsdde.data(), &sse, &spd, &scd, &rpl, ddsddt.data(),
-               drplde.data(), &drpldt, a.strain.data(), a.increment.data(), time.data(), &duration, &zero, &zero, &zero,
-               &zero, name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties,
-               coords.data(), identity.data(), &a.new_step, &length, identity.data(), identity.data(), &one, &point,
-               &none, &one, step.data(), &one, name.size());
+               drplde.data(), &drpldt, a.strain.data(), a.increment.data(), time.data(), &a.duration, &zero, &zero,
+               &zero, &zero, name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties,
+               coords.data(), identity.data(), &a.new_step, &a.length, before.data(), after.data(), &one, &point, &none,
+               &one, step.data(), &one, name.size());
 }
 
 /// Whether the call succeeded; the stress is looked at as a sum of squares
@@ -79,7 +128,9 @@ void store(const Umat& law, const Arguments<D>& a, const PointBatch<D>& points, 
     points.state[1 + k][i] += points.strain_increment[k][i];
   }
   for (int k = 0; k < law.n_variables; ++k)
-    points.state[7 + k][i] = a.variables[static_cast<std::size_t>(k)];
+    points.state[first_variable + k][i] = a.variables[static_cast<std::size_t>(k)];
+  for (std::size_t k = 0; k < 9; ++k)
+    points.state[first_gradient + static_cast<int>(k)][i] = a.gradient[k] - (k % 4 == 0 ? 1 : 0);
   if (law.plastic_strain_variable > 0)
     points.state[0][i] = a.variables[static_cast<std::size_t>(law.plastic_strain_variable - 1)];
 }
@@ -108,6 +159,9 @@ std::vector<std::string> state_names(const Umat& law)
 {
   std::vector<std::string> names{"plastic_strain", "strain_xx", "strain_yy", "strain_zz",
                                  "strain_xy",      "strain_yz", "strain_xz"};
+  for (const char a : {'x', 'y', 'z'})
+    for (const char b : {'x', 'y', 'z'})
+      names.push_back(std::string("displacement_gradient_") + a + b);
   for (int k = 1; k <= law.n_variables; ++k)
     names.push_back("statev_" + std::to_string(k));
   return names;
@@ -115,13 +169,12 @@ std::vector<std::string> state_names(const Umat& law)
 
 void check(const Umat& law)
 {
-  require(law.n_variables >= 0 && law.n_variables <= max_states - 9, "n_variables", law.n_variables, "from 0 to 55");
+  require(law.n_variables >= 0 && law.n_variables <= max_states - 18, "n_variables", law.n_variables, "from 0 to 55");
   require(law.plastic_strain_variable >= 0 && law.plastic_strain_variable <= law.n_variables, "plastic_strain_variable",
           law.plastic_strain_variable, "0, or the number of a state variable");
   for (double property : law.properties)
     require(std::isfinite(property), "properties", property, "finite numbers");
-  require(law.wave_modulus > 0 && std::isfinite(law.wave_modulus), "p_wave_modulus", law.wave_modulus,
-          "positive and finite [Pa]");
+  check_parameters(law);
 }
 
 template <int D>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
+#include "materials/tools/parameter.h"
 
 namespace mpm
 {
@@ -18,11 +19,13 @@ using UmatFunction = void (*)(double* stress, double* statev, double* ddsdde, do
 /// A law given as an Abaqus UMAT in a shared library, in Fortran or C.
 ///
 /// Called with NDI = 3 and NSHR = 1 in plane strain, 3 in three dimensions; components are put in Abaqus's order
-/// (11 22 33 12 13 23), engineering shear as there. STRAN is kept among the states. The stress has been turned with the
-/// material before the call, so DROT and the deformation gradients are identities; TIME, COORDS, TEMP and fields are
-/// zero and DTIME is one: a law that depends on rate or temperature cannot be used. PNEWDT below one, or a stress that
-/// is not finite, counts as a failure. NOEL is one and NPT the point's number in its batch, from one.
-/// Source: Abaqus User Subroutines Reference Guide, UMAT.
+/// (11 22 33 12 13 23), engineering shear as there. STRAN and the deformation gradient are kept among the states; the
+/// increments of the latter multiply up to DFGRD0 and DFGRD1. The stress has been rotated with the material before the
+/// call, so DROT is the identity. Both entries of TIME are the time at the increment's start and DTIME is its duration;
+/// where loading is slow without limit (see PointBatch::dt) DTIME is one. CELENT is the size of the point's cell, one
+/// where there is none. COORDS, TEMP and fields are zero: a law that depends on temperature cannot be used. PNEWDT
+/// below one, or a stress that is not finite, counts as a failure. NOEL is one and NPT the point's number in its batch,
+/// from one. Source: Abaqus User Subroutines Reference Guide, UMAT.
 struct Umat
 {
   UmatFunction function;
@@ -38,6 +41,20 @@ struct Umat
   std::string code = {};
 
   static constexpr std::string_view name = "Umat";
+  static constexpr auto parameters()
+  {
+    return std::array{parameter<Umat>("p_wave_modulus", entry<&Umat::wave_modulus>, "Pa", above<Umat>(0),
+                                      "modulus of the compression wave, for the critical time step; an upper bound "
+                                      "will do")};
+  }
+  static constexpr std::array parts{
+      Part{"library", "path of the shared library, such as one made by ``gfortran -shared -fPIC -o umat.so umat.f``"},
+      Part{"properties", "PROPS, a list of numbers"}, Part{"n_variables", "NSTATV, a whole number from 0 to 55"},
+      Part{"plastic_strain_variable",
+           "number, from one, of the STATEV with the accumulated plastic deviatoric strain; 0 for none", false},
+      Part{"symbol", "name of the subroutine in the library; ``umat_`` is what Fortran compilers make of UMAT", false}};
+
+  static constexpr Needs special_needs{.cell_size = true, .deformation = true};
 
   bool operator==(const Umat&) const = default;
 };
@@ -50,8 +67,10 @@ UmatFunction load_umat(const std::string& library, const std::string& symbol);
 /// The file that a function of a shared library was loaded from.
 std::string library_file(UmatFunction function);
 
-/// plastic_strain, six components of STRAN (of which plane strain uses four), then STATEV
-inline int n_state(const Umat& law) { return 7 + law.n_variables; }
+/// plastic_strain, six components of STRAN (of which plane strain uses four), nine of the deformation gradient less the
+/// identity (row by row), then STATEV
+inline int n_state(const Umat& law) { return 16 + law.n_variables; }
+inline Needs needs(const Umat&) { return Umat::special_needs; }
 std::vector<std::string> state_names(const Umat& law);
 inline double p_wave_modulus(const Umat& law) { return law.wave_modulus; }
 /// That of a Poisson's ratio of 1/4

@@ -1,7 +1,5 @@
 #include "materials/laws/undrained.h"
 
-#include "materials/tools/require.h"
-
 namespace mpm
 {
 std::vector<std::string> state_names(const Undrained& law)
@@ -14,9 +12,7 @@ std::vector<std::string> state_names(const Undrained& law)
 void check(const Undrained& law)
 {
   check(law.skeleton);
-  require(law.water_modulus > 0 && std::isfinite(law.water_modulus), "water_modulus", law.water_modulus,
-          "positive and finite [Pa]");
-  require(law.porosity > 0 && law.porosity < 1, "porosity", law.porosity, "in (0, 1)");
+  check_parameters(law);
 }
 
 double p_wave_modulus(const Undrained& law) { return p_wave_modulus(law.skeleton) + law.water_modulus / law.porosity; }

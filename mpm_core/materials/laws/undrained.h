@@ -14,11 +14,17 @@ namespace mpm
 /// Source: Zienkiewicz et al. (1999), Computational Geomechanics, section 2.2 (undrained limit, stiff grains).
 struct Undrained
 {
-  LawList<Hencky> skeleton;
-  /// Bulk modulus of the pore water K_w [Pa], > 0; 2.2 GPa without air
-  double water_modulus;
-  /// Porosity n [-], in (0, 1)
-  double porosity;
+  LawList<Heterogeneous, Hencky> skeleton;
+  double water_modulus, porosity;
+
+  static constexpr auto parameters()
+  {
+    using L = Undrained;
+    return std::array{parameter<L>("water_modulus", entry<&L::water_modulus>, "Pa", above<L>(0),
+                                   "bulk modulus of the pore water K_w; 2.2 GPa is that of water without air", 2.2e9),
+                      parameter<L>("porosity", entry<&L::porosity>, "-", between<L>(0, 1), "porosity n")};
+  }
+  static constexpr std::array parts{Part{"skeleton", "law of the effective stress, any but Undrained"}};
 
   bool operator==(const Undrained&) const = default;
 };
@@ -34,6 +40,8 @@ void check(const Undrained& law);
 
 /// Modulus of the compression wave [Pa], the water's K_w / n included
 double p_wave_modulus(const Undrained& law);
+
+inline Needs needs(const Undrained& law) { return needs(law.skeleton); }
 
 inline double shear_modulus(const Undrained& law) { return shear_modulus(law.skeleton); }
 

@@ -19,9 +19,6 @@ constexpr ElasticModuli elastic_moduli(double young, double poisson)
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
 
-/// Throws InputError unless young is positive and finite and poisson lies in (-1, 0.5).
-void check_elastic(double young, double poisson);
-
 /// Tangent d stress / d strain (engineering shear), row-major
 template <int D>
 std::array<double, n_stress<D> * n_stress<D>> elastic_tangent(const ElasticModuli& moduli)

@@ -9,8 +9,10 @@ from ._core import (
     ConeMatch,
     DruckerPrager,
     Hencky,
+    Heterogeneous,
     InputError,
     Integration,
+    LawParameter,
     LinearElastic,
     MohrCoulomb,
     PythonLaw,
@@ -21,19 +23,21 @@ from ._core import (
     StressUpdate,
     Umat,
     Undrained,
+    ViscoplasticMohrCoulomb,
+    law_types,
 )
 from ._core import compiler as compiler
-from ._core import law_types
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
 from .element import ElementTest
 from .energy import EnergyWarning
 from .ghost import GhostPenalty
-from .law_arguments import explain_arguments
+from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
 from .newton import Newton
+from .parameter_fields import RandomField
 from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
@@ -41,7 +45,7 @@ from .reports import Reports
 from .space import Space, parts, space
 
 for _law in law_types:
-    explain_arguments(_law)
+    _law.__signature__ = signature_of(_law)
 
 __all__ = [
     "CamClay",
@@ -51,9 +55,11 @@ __all__ = [
     "EnergyWarning",
     "GhostPenalty",
     "Hencky",
+    "Heterogeneous",
     "ImplicitReport",
     "InputError",
     "Integration",
+    "LawParameter",
     "LinearElastic",
     "Mesh",
     "Model",
@@ -61,6 +67,7 @@ __all__ = [
     "Newton",
     "Particles",
     "PythonLaw",
+    "RandomField",
     "Relaxation",
     "RelaxationKind",
     "Report",
@@ -72,6 +79,7 @@ __all__ = [
     "StressUpdate",
     "Umat",
     "Undrained",
+    "ViscoplasticMohrCoulomb",
     "__version__",
     "checkpoint_description",
     "log_preconsolidation",

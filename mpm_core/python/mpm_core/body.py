@@ -13,7 +13,8 @@ from . import _core, partition
 from ._core import InputError
 from .checks import positive
 from .collective import collectively
-from .mesh import Mesh, Tag, cell_sizes, floats
+from .mesh import Mesh, Tag, floats
+from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
 
 
@@ -53,14 +54,7 @@ class Body:
 
     def _seeded(self, added: int, ids: int) -> int:
         self._next_id += ids
-        if any("cell_size" in law.state_names for law in self.laws):
-            sizes, seen = self._cell_sizes(), self.state("cell_size")
-            self.set_state("cell_size", np.where(seen == 0, sizes, seen))
         return self.comm.allreduce(added)
-
-    def _cell_sizes(self) -> Any:
-        """Size of the cell of each particle [m]."""
-        return cell_sizes(self.mesh.cell_volumes, self.mesh.dim)[self.particles.cell]
 
     def _material(self, material: int) -> int:
         if not 0 <= material < len(self.laws):
@@ -212,6 +206,49 @@ class Body:
         for number, column in self._state_columns(name):
             state[material == number, column] = new[material == number]
         self.particles.set("state", state)
+
+    def parameter(self, name: str) -> NDArray[np.float64]:
+        """Values of a law's parameter that varies from particle to particle, see `set_parameter`.
+
+        Returns:
+            Shape (n,), in the order of ``particles``; NaN where it does not vary in a particle's law. Not collective.
+        """
+        values = np.full(len(self.particles), np.nan)
+        for number, law in enumerate(self.laws):
+            if has_varying(law, name):
+                rows = self.particles.material == number
+                column = law.state_names.index(f"{name}_difference")
+                values[rows] = nominal_value(law, name) + self.particles.state[rows, column]
+        return values
+
+    def set_parameter(self, name: str, values: Field) -> None:
+        """Give particles their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
+
+        Particles keep their values as they move. Give values after the particles are there; those seeded later have the
+        number of their law.
+
+        Args:
+            name: of the parameter, such as "cohesion".
+            values: a number; an array, shape (n,), in the order of ``particles``; a function of positions, shape (n, D), that
+                returns such an array, for instance a `RandomField`; or {cell tag or name: number} for the cells where the
+                particles are now.
+
+        Raises:
+            InputError: on all ranks: no law varies in the parameter, another shape, a value out of the parameter's range.
+
+        Example:
+            >>> soil = mpm.Heterogeneous(mpm.tresca(young=3e6, poisson=0.45, shear_strength=12e3), ["cohesion"])
+            >>> model.set_parameter("cohesion", lambda x: 12e3 + 1.5e3 * (3.0 - x[:, 1]))  # s_u grows with depth
+            >>> model.set_parameter("cohesion", -0.25 * model.particles.stress[:, 1])  # s_u of the stress at the start
+        """
+
+        def checked() -> NDArray[np.float64]:
+            tags = {tag: self.mesh.tags_of("cell", tag) for tag in values} if isinstance(values, dict) else {}
+            of_cell = self.mesh.cell_tags[self.particles.cell] if tags else None
+            new = parameter_values(name, values, self.particles.position, of_cell, tags)
+            return differences_of(name, new, self.laws, self.particles.material, self.particles.state)
+
+        self.particles.set("state", collectively(self.comm, checked))
 
     def _state_columns(self, name: str) -> list[tuple[int, int]]:
         """(number of a law, column of the state variable) for each law that has it."""

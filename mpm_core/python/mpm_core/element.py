@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError, RunError
+from .checks import positive
 from .mesh import floats
 
 MAX_ITERATIONS = 50
@@ -20,6 +21,7 @@ class ElementTest:
         law: any law.
         stress: at the start [Pa], tension positive, shape (4,) in plane strain or (6,).
         state: state variables at the start, shape (n_state,); zero by default.
+        cell_size: size of the cell that the point stands for [m]; without one the law takes its own.
 
     Example:
         >>> test = mpm.ElementTest(soil, stress=[-100e3] * 3 + [0.0] * 3)
@@ -28,8 +30,13 @@ class ElementTest:
         >>> test.stress
     """
 
-    def __init__(self, law: Any, stress: ArrayLike, state: ArrayLike | None = None) -> None:
+    def __init__(
+        self, law: Any, stress: ArrayLike, state: ArrayLike | None = None, cell_size: float | None = None
+    ) -> None:
         self.law = law
+        self.time = 0.0
+        """Time [s]"""
+        self._cell_size = None if cell_size is None else np.array([positive("cell_size", cell_size, "m")])
         self.stress = floats("stress", stress, (None,))
         """Stress [Pa], shape (S,)"""
         if len(self.stress) not in (4, 6):
@@ -40,16 +47,20 @@ class ElementTest:
         """Strain since the start, engineering shear, shape (S,)"""
         self._last = np.zeros_like(self.stress)
 
-    def step(self, strain_increment: ArrayLike, stress: ArrayLike | None = None) -> None:
+    def step(self, strain_increment: ArrayLike, stress: ArrayLike | None = None, dt: float = np.inf) -> None:
         """Drive the point by one increment, by Newton's method with the law's tangent.
 
         Args:
             strain_increment: shape (S,), None where the stress is prescribed instead.
             stress: stress [Pa] to reach in those components, shape (S,); the present one by default.
+            dt: duration of the increment [s]; by default loading is slow without limit.
 
         Raises:
             RunError: the law failed, or no strain gives the stresses; with the increment. The point is as it was.
         """
+        if not dt >= 0:
+            raise InputError(f"dt is {dt} s, expected at least 0")
+        self._dt = dt
         increment = np.array(strain_increment, dtype=float)
         free = np.isnan(increment)
         target = self.stress if stress is None else floats("stress", stress, self.stress.shape)
@@ -57,6 +68,7 @@ class ElementTest:
         for guess in (np.zeros_like(self.strain), self._last):
             increment[free] = guess[free]
             if self._solved(increment, free, target):
+                self.time += dt if np.isfinite(dt) else 0.0
                 return
         raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
 
@@ -80,7 +92,8 @@ class ElementTest:
     def _updated(self, increment: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
         size = len(increment)
         stress, state, tangent = self.stress[None].copy(), self.state[None].copy(), np.zeros((1, size, size))
-        report = self.law.update(np.ascontiguousarray(increment[None]), stress, state, tangent)
+        context = {"time": self.time, "dt": self._dt, "cell_size": self._cell_size}
+        report = self.law.update(np.ascontiguousarray(increment[None]), stress, state, tangent, **context)
         if report.failed:
             raise RunError(
                 f"{type(self.law).__name__} failed at the stress {self.stress} Pa, strain increment {increment}"

@@ -223,6 +223,7 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
     each time with a jump of the nodal forces that sends it there. The penalty's forces, which are part of a step's equilibrium
     but not of the particles', fade from step to step.
     """
+    options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)
     applied, part, ghost = 0.0, 1.0, options.ghost
     for _ in range(max_steps):

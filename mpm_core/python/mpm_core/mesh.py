@@ -213,11 +213,9 @@ class Mesh:
 def cell_sizes(volumes: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
     """Size h of simplices [m]: side of the square or cube that D! of their volume fill, (D! V)^(1/D).
 
-    Softening spreads over a band one row of cells wide, and rows of simplices are as wide as the squares or cubes that they come
-    from; V^(1/D) would be 1 / sqrt(2) of that in the plane and 0.55 in space (Rots 1988, Computational modeling of concrete
-    fracture, Delft: sqrt(2 A) for linear triangles).
+    It is the width of the band over which softening spreads, and what laws are given as the size of a point's cell.
 
     Args:
         volumes: of the cells [m2 or m3].
     """
-    return (2.0 * volumes) ** 0.5 if dim == 2 else np.cbrt(6.0 * volumes)
+    return _core.cell_sizes(volumes, dim)

@@ -1,0 +1,80 @@
+#include "materials/laws/strength_reduction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mpm
+{
+namespace
+{
+constexpr double degree = std::numbers::pi / 180;
+
+/// The angle [degrees] whose tangent is that of another one over a factor
+double divided(double angle, double factor) { return std::atan(std::tan(angle * degree) / factor) / degree; }
+
+/// The dilation that goes with a reduced friction
+double limited(double dilation, double friction_before, double friction)
+{
+  return dilation == friction_before ? friction : std::min(dilation, friction);
+}
+} // namespace
+
+MohrCoulomb reduced_strength(const MohrCoulomb& law, double factor)
+{
+  MohrCoulomb reduced = law;
+  reduced.cohesion = law.cohesion / factor;
+  reduced.friction_angle = divided(law.friction_angle, factor);
+  reduced.dilation_angle = limited(law.dilation_angle, law.friction_angle, reduced.friction_angle);
+  return reduced;
+}
+
+ViscoplasticMohrCoulomb reduced_strength(const ViscoplasticMohrCoulomb& law, double factor)
+{
+  return {reduced_strength(law.inviscid, factor), law.viscosity};
+}
+
+SofteningMohrCoulomb reduced_strength(const SofteningMohrCoulomb& law, double factor)
+{
+  SofteningMohrCoulomb reduced = law;
+  reduced.peak = reduced_strength(law.peak, factor);
+  reduced.residual_cohesion = law.residual_cohesion / factor;
+  reduced.residual_friction_angle = divided(law.residual_friction_angle, factor);
+  reduced.residual_dilation_angle =
+      limited(law.residual_dilation_angle, law.residual_friction_angle, reduced.residual_friction_angle);
+  return reduced;
+}
+
+DruckerPrager reduced_strength(const DruckerPrager& law, double factor)
+{
+  DruckerPrager reduced = law;
+  reduced.strength = law.strength / factor;
+  reduced.friction = law.friction / factor;
+  reduced.dilation = limited(law.dilation, law.friction, reduced.friction);
+  return reduced;
+}
+
+Heterogeneous reduced_strength(const Heterogeneous& law, double factor)
+{
+  std::visit([&](const auto& l) { reduced_strength(l, factor); }, law.law); // whether its strength is known
+  Heterogeneous reduced = law;
+  reduced.strength_factor *= factor;
+  return reduced;
+}
+
+Hencky reduced_strength(const Hencky& law, double factor) { return {reduced_strength(law.law, factor)}; }
+
+Undrained reduced_strength(const Undrained& law, double factor)
+{
+  return {reduced_strength(law.skeleton, factor), law.water_modulus, law.porosity};
+}
+
+CamClay reduced_strength(const CamClay& law, double factor)
+{
+  const double angle = std::asin(3 * law.critical_slope / (6 + law.critical_slope));
+  const double sine = std::sin(std::atan(std::tan(angle) / factor));
+  CamClay reduced = law;
+  reduced.critical_slope = 6 * sine / (3 - sine);
+  return reduced;
+}
+} // namespace mpm

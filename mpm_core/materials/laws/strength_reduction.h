@@ -1,0 +1,41 @@
+#pragma once
+/// @file
+/// Laws with their strength divided by a factor: cohesion and tan(friction angle), or what stands for them.
+
+#include "materials/laws/law.h"
+
+namespace mpm
+{
+/// c / F and tan(phi) / F. The dilation angle stays where it can, and is limited to the new friction angle: associated
+/// flow stays associated.
+MohrCoulomb reduced_strength(const MohrCoulomb& law, double factor);
+/// The strength in the limit of slow loading; the viscosity stays.
+ViscoplasticMohrCoulomb reduced_strength(const ViscoplasticMohrCoulomb& law, double factor);
+/// Peak and residual strength alike
+SofteningMohrCoulomb reduced_strength(const SofteningMohrCoulomb& law, double factor);
+/// Strength and slope of the cone
+DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
+/// The friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is
+CamClay reduced_strength(const CamClay& law, double factor);
+
+/// Of all points
+Heterogeneous reduced_strength(const Heterogeneous& law, double factor);
+/// Of the law that they are made of
+Hencky reduced_strength(const Hencky& law, double factor);
+Undrained reduced_strength(const Undrained& law, double factor);
+
+/// @throws InputError the strength of such a law is not known
+template <class L>
+L reduced_strength(const L& law, double)
+{
+  throw InputError("law: the strength of " + law_name(law) +
+                   " is not known here; give factor_of_safety a function `reduce` of law and factor that returns the "
+                   "weaker law");
+}
+
+template <class... L>
+std::variant<L...> reduced_strength(const std::variant<L...>& law, double factor)
+{
+  return std::visit([&](const auto& l) -> std::variant<L...> { return reduced_strength(l, factor); }, law);
+}
+} // namespace mpm

@@ -1,0 +1,56 @@
+#pragma once
+/// @file
+/// What a batch of particles tells a law of its increment beyond stress and strain, where the law needs it.
+
+#include "model/batches.h"
+
+namespace mpm
+{
+/// Columns of a batch; touched only where the law needs them.
+template <int D>
+struct LawIncrement
+{
+  std::array<double, batch_size> cell_size;
+  std::array<std::array<double, batch_size>, D * D> deformation;
+};
+
+/// Gives a batch the sizes of its particles' cells, if its law needs them.
+template <int D>
+void give_cell_sizes(const Model<D>& model, const Batch& batch, LawIncrement<D>& columns, PointBatch<D>& points)
+{
+  if (!needs(model.laws[batch.material]).cell_size)
+    return;
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Run& run = model.work.runs[r];
+    const double size = cell_size<D>(model.mesh.shapes[run.cell].volume);
+    std::fill_n(columns.cell_size.data() + (run.first - batch.first), run.last - run.first, size);
+  }
+  points.cell_size = columns.cell_size.data();
+}
+
+/// Gives a batch the increments of its particles' deformation gradients, if its law needs them.
+/// @param gradient  function of the number of a run in the batch that returns its displacement gradient
+/// @param volumetric  the same of its volumetric strain, which takes the place of the gradient's trace
+template <int D, class Gradient, class Volumetric>
+void give_deformation(const Model<D>& model, const Batch& batch, const Gradient& gradient, const Volumetric& volumetric,
+                      LawIncrement<D>& columns, PointBatch<D>& points)
+{
+  if (!needs(model.laws[batch.material]).deformation)
+    return;
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Run& run = model.work.runs[r];
+    Matrix<D> f = gradient(r - batch.first_run);
+    double change = volumetric(r - batch.first_run);
+    for (int a = 0; a < D; ++a)
+      change -= f[a][a];
+    for (int a = 0; a < D; ++a)
+      f[a][a] += 1 + change / D;
+    for (int k = 0; k < D * D; ++k)
+      std::fill_n(columns.deformation[k].data() + (run.first - batch.first), run.last - run.first, f[k / D][k % D]);
+  }
+  for (int k = 0; k < D * D; ++k)
+    points.deformation[k] = columns.deformation[k].data();
+}
+} // namespace mpm

@@ -1,0 +1,158 @@
+"""Parameters of laws that differ from point to point: profiles over depth, values by tag, random fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import Hencky, Heterogeneous, InputError, Undrained
+from .mesh import Tag, floats
+
+Field = Union[float, ArrayLike, Callable[[NDArray[np.float64]], ArrayLike], Mapping[Tag, float]]
+"""How values of a parameter are given, see `Model.set_parameter`"""
+
+
+def heterogeneous_part(law: Any) -> Heterogeneous | None:
+    """The `Heterogeneous` law that a law is, or is made of; None where there is none."""
+    while isinstance(law, (Hencky, Undrained)):
+        law = law.law if isinstance(law, Hencky) else law.skeleton
+    return law if isinstance(law, Heterogeneous) else None
+
+
+def has_varying(law: Any, name: str) -> bool:
+    """Whether a parameter of a law varies from point to point."""
+    part = heterogeneous_part(law)
+    return part is not None and name in part.varying
+
+
+def nominal_value(law: Any, name: str) -> float:
+    """The law's own number of a parameter that varies."""
+    part = heterogeneous_part(law)
+    assert part is not None
+    return getattr(part.law, name)
+
+
+def parameter_values(
+    name: str,
+    given: Any,
+    position: NDArray[np.float64],
+    of_cell: Any,
+    tags: Mapping[Any, Any],
+) -> NDArray[np.float64]:
+    """Values at points, shape (n,); NaN at points that none are given for.
+
+    Args:
+        given: as for `Model.set_parameter`.
+        position: [m], shape (n, D).
+        of_cell: tag of each point's cell, shape (n,); used where values are given by tag.
+        tags: {key of `given`: the cell tags that it stands for}.
+    """
+    if isinstance(given, Mapping):
+        values = np.full(len(position), np.nan)
+        for tag, value in given.items():
+            values[np.isin(of_cell, tags[tag])] = floats(name, [value], (1,))[0]
+        return values
+    if callable(given):
+        given = given(position)
+    elif np.ndim(given) == 0:
+        given = np.full(len(position), given, dtype=float)
+    return floats(name, given, (len(position),))
+
+
+def differences_of(
+    name: str, values: NDArray[np.float64], laws: Sequence[Any], material: NDArray[np.int32], state: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A copy of the states of points with the values of a parameter in them.
+
+    Args:
+        values: shape (n,); points where they are NaN keep theirs.
+        material: number of each point's law, shape (n,).
+        state: shape (n, number of states).
+
+    Raises:
+        InputError: no law varies in the parameter; a value out of its range, or stiffer than the law's numbers.
+    """
+    numbers = [k for k, law in enumerate(laws) if has_varying(law, name)]
+    if not numbers:
+        known = [one for law in laws if (part := heterogeneous_part(law)) for one in part.varying]
+        has = ", ".join(dict.fromkeys(known)) or "no parameter; make the law Heterogeneous(law, [names])"
+        raise InputError(f"name is '{name!s}', but what varies in the laws is {has}")
+    new = state.copy()
+    for number in numbers:
+        law, rows = laws[number], np.flatnonzero((material == number) & ~np.isnan(values))
+        part, first = heterogeneous_part(law), law.state_names.index(f"{name}_difference")
+        assert part is not None
+        new[rows, first] = values[rows] - nominal_value(law, name)
+        first -= part.varying.index(name)
+        part.check_points(np.ascontiguousarray(new[rows, first : first + len(part.varying)]))
+    return new
+
+
+class RandomField:
+    """A random field: a function of positions that is the same on any number of ranks, and for any other points.
+
+    A sum of waves with random directions and phases, whose spectrum is that of the correlation (Shinozuka & Jan 1972): over
+    all seeds mean, deviation and correlation are exact, and values are normal but for a share of 1 / waves.
+
+    Args:
+        mean: of the values.
+        deviation: standard deviation of the values.
+        lengths: correlation length along each axis [m], shape (D,); infinite where the field is constant along an axis.
+        seed: of the random numbers; another one gives another field.
+        correlation: "gaussian", exp(-sum (r_k / l_k)^2), smooth; or "markov", exp(-sum |r_k| / l_k), rough.
+        lognormal: the logarithm is normal, so that all values are positive. The correlation is that of the logarithm.
+        waves: number of waves.
+
+    Example:
+        >>> strength = mpm.RandomField(mean=20e3, deviation=5e3, lengths=[10.0, 1.0], seed=3, lognormal=True)
+        >>> model.set_parameter("cohesion", strength)
+    """
+
+    def __init__(
+        self,
+        *,
+        mean: float,
+        deviation: float,
+        lengths: ArrayLike,
+        seed: int = 0,
+        correlation: str = "gaussian",
+        lognormal: bool = False,
+        waves: int = 1000,
+    ) -> None:
+        scale = np.asarray(lengths, dtype=float)
+        if scale.ndim != 1 or not (scale > 0).all():
+            raise InputError(f"lengths is {lengths!r}, expected a positive number [m] for each axis")
+        if not deviation >= 0:
+            raise InputError(f"deviation is {deviation}, expected at least 0")
+        if lognormal and not mean > 0:
+            raise InputError(f"mean is {mean}, expected a positive one of a lognormal field")
+        if correlation not in ("gaussian", "markov"):
+            raise InputError(f"correlation is {correlation!r}, expected 'gaussian' or 'markov'")
+        if not waves >= 1:
+            raise InputError(f"waves is {waves}, expected at least 1")
+        self.mean, self.deviation, self.lognormal = mean, deviation, lognormal
+        random = np.random.default_rng(seed)
+        # The spectrum of exp(-r^2 / l^2) is normal with deviation sqrt(2) / l, that of exp(-|r| / l) is Cauchy's of scale 1 / l
+        draw = random.standard_normal if correlation == "gaussian" else random.standard_cauchy
+        self._wave = draw((waves, len(scale))) * (np.sqrt(2) if correlation == "gaussian" else 1.0) / scale
+        self._phase = random.uniform(0.0, 2 * np.pi, waves)
+
+    def __call__(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Values at positions [m], shape (n, D): shape (n,)."""
+        x = floats("position", position, (None, self._wave.shape[1]))
+        normal = np.zeros(len(x))
+        for wave, phase in zip(
+            self._wave, self._phase
+        ):  # one by one: little memory, and the same sum for any number of points
+            angle = np.full(len(x), phase)
+            for k, number in enumerate(wave):
+                angle += x[:, k] * number
+            normal += np.cos(angle)
+        normal *= np.sqrt(2 / len(self._phase))
+        if not self.lognormal:
+            return self.mean + self.deviation * normal
+        variance = np.log1p((self.deviation / self.mean) ** 2)
+        return self.mean * np.exp(np.sqrt(variance) * normal - variance / 2)
