@@ -10,6 +10,7 @@ from fenics_bridge.fem.equilibration import PRACTICE, EquilibriumReport, Solver
 from fenics_bridge.fem.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.fields import nodal_average
+from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.fem.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
 from fenics_bridge.fem.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
 from fenics_bridge.fem.load_steps import LoadStep, print_step
@@ -35,7 +36,7 @@ from fenics_bridge.transfer.particle_site import ParticleSite, apply_supports
 # fmt: off
 __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
-    "ElasticSolution", "EquilibriumReport", "FemSite", "Handover", "InputError", "Load", "LoadStep", "LogSpiral",
+    "ElasticSolution", "EquilibriumReport", "FemSite", "Geometry", "Handover", "InputError", "Load", "LoadStep", "LogSpiral",
     "MixedQuasiStatic", "ParticleSafety", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage",
     "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "box_mesh",
     "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",

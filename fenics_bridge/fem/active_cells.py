@@ -17,6 +17,7 @@ from dolfinx import fem, la
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
+from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.loads import LoadVectors
 from fenics_bridge.fem.supports import Constraints
 from fenics_bridge.mesh.names import tag_numbers
@@ -45,9 +46,11 @@ def reconfigure(model, off, supports, pore_pressure, stress, law):
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
     space = model.displacement.function_space
-    model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=there if off else None)
+    model._loads = LoadVectors(
+        space, model.facet_tags, model.cell_tags, active=there if off else None, radius=model.radius
+    )
     if water is not None:
-        model._loads.constant = _seepage_forces(space, water, there)
+        model._loads.constant = _seepage_forces(space, water, there, model.radius)
     old = replace(model._loads.resolved(model.load), displacement=0.0, held=0.0)
     model._loads.held = model._kinematics.internal_forces(points.stress).array - model._loads.forces(old)
     model.load = replace(old, held=1.0)
@@ -119,12 +122,12 @@ def _nodal_pressure(domain, pore_pressure):
     return p
 
 
-def _seepage_forces(space, p, there):
+def _seepage_forces(space, p, there, radius):
     """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
 
     By Gauss' theorem: the integral of p div v over what is there, less that of p n v over its surface.
     """
-    form = -there * ufl.inner(ufl.grad(p), ufl.TestFunction(space)) * ufl.dx
+    form = -weighted(there * ufl.inner(ufl.grad(p), ufl.TestFunction(space)), radius) * ufl.dx
     return assembled(fem.form(form), space).array.copy()
 
 
@@ -137,8 +140,10 @@ def free_motions(model):
     node, component = owned // dim, owned % dim
     real = np.isin(node, compat.cell_dofs(space)[model.points.cells[model.points.material >= 0]])
     node, component, x = node[real], component[real], x - x.mean(axis=0)
-    modes = [("along " + "xyz"[k], (component == k).astype(float)) for k in range(dim)]
-    for a, b in [(0, 1)] if dim == 2 else [(0, 1), (1, 2), (2, 0)]:
+    axisymmetric = model.radius is not None  # a motion along the radius strains the hoops, and nothing turns
+    axes = range(1, 2) if axisymmetric else range(dim)
+    modes = [("along " + "xyz"[k], (component == k).astype(float)) for k in axes]
+    for a, b in [] if axisymmetric else [(0, 1)] if dim == 2 else [(0, 1), (1, 2), (2, 0)]:
         turning = np.where(component == a, -x[node, b], np.where(component == b, x[node, a], 0.0))
         modes.append(("by turning" if dim == 2 else f"by turning about {'xyz'[3 - a - b]}", turning))
     rows = np.array([mode for _, mode in modes])

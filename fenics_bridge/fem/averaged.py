@@ -7,6 +7,7 @@ from dolfinx import la
 from petsc4py import PETSc
 
 from fenics_bridge import compat
+from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.mesh.background import global_numbers
 
 
@@ -14,29 +15,34 @@ class AveragedKinematics:
     """Strain of linear simplices whose volumetric part is averaged over nodes (paper, section 5; Detournay, Dzik).
 
     With theta_c = div u in a cell, theta_i the mean over the cells around a node by volume, and thetabar_c the mean of
-    theta_i over a cell's nodes, the in-plane normal strains (all three in 3D) are raised by (thetabar_c - theta_c) / d.
+    theta_i over a cell's nodes, the in-plane normal strains are raised by (thetabar_c - theta_c) / d; all three of them,
+    with d = 3, in 3D and in axisymmetric bodies, whose hoop strain is that at the centroid.
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
     transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is. (Particles
     do the same in small displacements, and average strains only in motion; see the theory.)
     """
 
-    def __init__(self, increment, points, constraints):
+    def __init__(self, increment, points, constraints, geometry=None):
         """As for `Kinematics`; the displacement must be of degree 1."""
         self._increment, self._points, self._constraints = increment, points, constraints
         self._space, comm = increment.function_space, increment.function_space.mesh.comm
         dim, rows = increment.function_space.mesh.geometry.dim, points.n
-        nodes, gradients, self._volumes = self._cells()
+        nodes, gradients, self._volumes, radii = self._cells(geometry is Geometry.AXISYMMETRIC)
         dofs = (dim * nodes[:, :, None] + np.arange(dim)).reshape(rows, -1)
         self._n_dofs = dim * self._space.dofmap.index_map.size_local
         cell = comm.scan(rows) - rows + np.arange(rows)
-        divergence = _matrix(comm, (rows, self._n_dofs), dofs, gradients.reshape(rows, -1))
+        in_divergence = gradients.copy()
+        if radii is not None:  # the hoop strain at the centroid
+            in_divergence[:, :, 0] += 1 / (3 * radii[:, None])
+        divergence = _matrix(comm, (rows, self._n_dofs), dofs, in_divergence.reshape(rows, -1))
         spread = self._mean_over_nodes(comm, nodes).matMult(divergence)
         spread.axpy(-1.0, divergence)
         size = rows * points.size
-        in_plane = np.tile(np.arange(points.size) < dim, rows)[:, None] / dim
+        normal = dim if radii is None else 3
+        in_plane = np.tile(np.arange(points.size) < normal, rows)[:, None] / normal
         share = _matrix(comm, (size, rows), np.repeat(cell, points.size)[:, None], in_plane)
         self._strain = _matrix(
-            comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0), _strain_rows(gradients)
+            comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0), _strain_rows(gradients, radii)
         )
         self._strain.axpy(1.0, share.matMult(spread))
         components = points.size * cell[:, None] + np.arange(points.size)
@@ -76,8 +82,11 @@ class AveragedKinematics:
         matrix.zeroRowsColumns(self._held, 1.0)
         return matrix
 
-    def _cells(self):
-        """Global nodes (m, D + 1), gradients of shape functions (m, D + 1, D) [1/m], volumes (m,) of owned cells."""
+    def _cells(self, axisymmetric):
+        """Global nodes (m, D + 1), gradients of shape functions (m, D + 1, D) [1/m], volumes (m,) of owned cells.
+
+        And the radii (m,) of their centroids in an axisymmetric body, where volumes are those of one radian; else None.
+        """
         dim = self._space.mesh.geometry.dim
         local = compat.cell_dofs(self._space)[self._points.cells]
         corners = self._space.tabulate_dof_coordinates()[local][:, :, :dim]
@@ -87,7 +96,10 @@ class AveragedKinematics:
         index_map = self._space.dofmap.index_map
         numbers = global_numbers(index_map, index_map.size_local + index_map.num_ghosts)
         volumes = np.abs(np.linalg.det(edges)) / (2 if dim == 2 else 6)
-        return numbers[local], gradients, volumes
+        if not axisymmetric:
+            return numbers[local], gradients, volumes, None
+        radii = corners[:, :, 0].mean(axis=1)
+        return numbers[local], gradients, radii * volumes, radii
 
     def _mean_over_nodes(self, comm, nodes):
         """Matrix from cells to cells: to the nodes by volume, and back as the mean over a cell's nodes."""
@@ -105,7 +117,7 @@ class AveragedKinematics:
         return (self._space.dofmap.index_map.local_range[0] * self._space.dofmap.index_map_bs + mine).astype(np.int32)
 
 
-def _strain_rows(gradients):
+def _strain_rows(gradients, radii):
     """Strain operator of each cell, (m * S, (D + 1) * D): components of strain by components of nodal displacement."""
     m, corners, dim = gradients.shape
     pairs = [(0, 0), (1, 1), None, (0, 1)] if dim == 2 else [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
@@ -117,6 +129,8 @@ def _strain_rows(gradients):
         rows[:, component, :, a] += gradients[:, :, b]
         if a != b:
             rows[:, component, :, b] += gradients[:, :, a]
+    if radii is not None:
+        rows[:, 2, :, 0] = 1 / (3 * radii[:, None])
     return rows.reshape(m * len(pairs), corners * dim)
 
 

@@ -1,6 +1,6 @@
 """Strain and stress as vectors of components, in the order of `mpm_core`.
 
-Two dimensions (plane strain): xx yy zz xy; three: xx yy zz xy yz xz; engineering shear; tension positive.
+Two dimensions: xx yy zz xy, with zz across the plane, which is the hoop direction of an axisymmetric body; three: xx yy zz xy yz xz; engineering shear; tension positive.
 """
 
 from __future__ import annotations
@@ -10,16 +10,20 @@ import ufl
 from dolfinx import fem, la
 
 from fenics_bridge import compat
+from fenics_bridge.fem.geometry import weighted
 
 N_STRESS = {2: 4, 3: 6}
 """Number of components by dimension."""
 
 
-def strain(u):
-    """Strain components of a displacement as a UFL vector."""
+def strain(u, radius=None):
+    """Strain components of a displacement as a UFL vector.
+
+    radius: of an axisymmetric body, a UFL expression; zz is then the hoop strain u_r / r
+    """
     e = ufl.sym(ufl.grad(u))
     if u.ufl_shape[0] == 2:
-        return ufl.as_vector([e[0, 0], e[1, 1], 0, 2 * e[0, 1]])
+        return ufl.as_vector([e[0, 0], e[1, 1], 0 if radius is None else u[0] / radius, 2 * e[0, 1]])
     return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
 
 
@@ -41,20 +45,20 @@ def cell_function(domain, expression, degree, name):
     return function
 
 
-def nodal_average(function):
+def nodal_average(function, radius=None):
     """Continuous, piecewise linear function whose nodal values average those of the cells around, by volume.
 
-    (The lumped L2 projection; it smooths stresses that jump between cells.) Collective.
+    (The lumped L2 projection; it smooths stresses that jump between cells.) radius: as for `strain`. Collective.
     """
     domain = function.function_space.mesh
     size = function.ufl_shape[0]
     space = compat.function_space(domain, "Lagrange", 1, size)
     test = ufl.TestFunction(space)
     ones = fem.Constant(domain, np.ones(size))
-    weighted = assembled(fem.form(ufl.inner(function, test) * ufl.dx), space)
-    weights = assembled(fem.form(ufl.inner(ones, test) * ufl.dx), space)
+    sums = assembled(fem.form(weighted(ufl.inner(function, test), radius) * ufl.dx), space)
+    weights = assembled(fem.form(weighted(ufl.inner(ones, test), radius) * ufl.dx), space)
     average = fem.Function(space, name=function.name)
-    average.x.array[:] = weighted.array / weights.array
+    average.x.array[:] = sums.array / weights.array
     return average
 
 

@@ -8,6 +8,7 @@ from dolfinx import fem, la
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, strain
+from fenics_bridge.fem.geometry import radius_of, weighted
 from fenics_bridge.fem.stiffness import Stiffness
 
 
@@ -17,18 +18,19 @@ class Kinematics:
     (`averaged.AveragedKinematics` has the same methods for strains that are averaged over nodes.)
     """
 
-    def __init__(self, increment, points, constraints):
-        """increment: displacement function whose strain is wanted; points: QuadraturePoints."""
+    def __init__(self, increment, points, constraints, geometry=None):
+        """increment: displacement function whose strain is wanted; points: QuadraturePoints; geometry: a Geometry."""
         self._space, self._points = increment.function_space, points
         domain, size = self._space.mesh, points.size
-        self._strain = fem.Expression(strain(increment), points.reference)
+        radius = radius_of(domain, geometry)
+        self._strain = fem.Expression(strain(increment, radius), points.reference)
         self._stress, self._stress_rows = self._quadrature_function(size)
         self._tangent, self._tangent_rows = self._quadrature_function(size**2)
         dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
         test, trial = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
-        self._internal = fem.form(ufl.inner(self._stress, strain(test)) * dx)
-        stiffness = ufl.inner(ufl.dot(matrix, strain(trial)), strain(test)) * dx
+        self._internal = fem.form(weighted(ufl.inner(self._stress, strain(test, radius)), radius) * dx)
+        stiffness = weighted(ufl.inner(ufl.dot(matrix, strain(trial, radius)), strain(test, radius)), radius) * dx
         self._stiffness = Stiffness(stiffness, self._space, constraints)
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
 

@@ -12,6 +12,7 @@ from dolfinx import fem
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
+from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.mesh.names import by_number, tag_numbers
 
 
@@ -71,12 +72,14 @@ class LoadVectors:
     constant, held: forces that always act, and those of which the load's share `held` acts; arrays like `forces`, or 0
     """
 
-    def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None):
+    def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None, radius=None):
         """test: test function of the displacement, where it is only a part of the space.
 
         active: function, 1 in cells that are there and 0 in those that are not; the others neither weigh nor are pressed
+        radius: of an axisymmetric body, a UFL expression; forces are then those of one radian
         """
         self._active: Any = active
+        self._radius = radius
         self.constant: Any = 0.0
         self.held: Any = 0.0
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
@@ -111,7 +114,9 @@ class LoadVectors:
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
         there = 1.0 if self._active is None else self._active
-        return assembled(fem.form(there * ufl.inner(down, self._test) * dx), self._space).array.copy()
+        return assembled(
+            fem.form(weighted(there * ufl.inner(down, self._test), self._radius) * dx), self._space
+        ).array.copy()
 
     def _unit_weight_of(self, tag):
         if tag not in self._weight:
@@ -125,11 +130,12 @@ class LoadVectors:
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
             normal, test, active = ufl.FacetNormal(domain), self._test, self._active
             if active is None:
-                form = -ufl.inner(normal, test) * ds(tag)
+                form = -weighted(ufl.inner(normal, test), self._radius) * ds(tag)
             else:  # also where what is there ends inside of the mesh; between two cells that are there it cancels
                 dS = ufl.Measure("dS", domain=domain, subdomain_data=self._facet_tags)
-                form = -active * ufl.inner(normal, test) * ds(tag)
-                form -= ufl.inner(active("+") * normal("+") + active("-") * normal("-"), test("+")) * dS(tag)
+                inside = ufl.inner(active("+") * normal("+") + active("-") * normal("-"), test("+"))
+                form = -weighted(active * ufl.inner(normal, test), self._radius) * ds(tag)
+                form -= weighted(inside, self._radius) * dS(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
 

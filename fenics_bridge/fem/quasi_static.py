@@ -15,6 +15,7 @@ from fenics_bridge.fem.equilibration import Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import nodal_average
+from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import raise_load
@@ -35,7 +36,17 @@ class QuasiStatic:
     """
 
     def __init__(
-        self, domain, law, facet_tags, supports, degree=2, nmd=False, options_prefix="fem_", cell_tags=None, solver=None
+        self,
+        domain,
+        law,
+        facet_tags,
+        supports,
+        degree=2,
+        nmd=False,
+        options_prefix="fem_",
+        cell_tags=None,
+        solver=None,
+        geometry=None,
     ):
         """
         law: of `mpm_core`, or {cell tag: law}; facet_tags, supports: as for `solve_elastic`
@@ -44,8 +55,11 @@ class QuasiStatic:
         options_prefix: of the PETSc options of the linear solver
         cell_tags: of the domain; needed where laws or unit weights are given by cell tag
         solver: the Solver, with tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice
+        geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose nodes on the axis need a roller
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
+        self.geometry = geometry_of(domain, geometry)
+        self.radius = radius_of(domain, self.geometry)
         agree(domain.comm, None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2")
         agree(domain.comm, f"nmd: averages strains of degree=1, got degree={degree}" if nmd and degree != 1 else None)
         space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
@@ -55,7 +69,7 @@ class QuasiStatic:
         self.cell_tags, self.supports, self.off = cell_tags, tuple(supports), ()
         self._nmd, self._options_prefix = nmd, options_prefix
         constraints = Constraints(space, facet_tags, supports)
-        self._loads = LoadVectors(space, facet_tags, cell_tags)
+        self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._materials = Materials(domain, law, cell_tags)
         self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
         self.load, self.converged, self.solver = Load(), False, solver or Solver()
@@ -63,8 +77,9 @@ class QuasiStatic:
 
     def _assemble(self, constraints):
         """Put together what a step works on, with the present points and the given constraints. Collective."""
+        require_axis_held(self.displacement.function_space, self.geometry, constraints)
         kinematics: type = AveragedKinematics if self._nmd else Kinematics
-        self._kinematics = kinematics(self.increment, self.points, constraints)
+        self._kinematics = kinematics(self.increment, self.points, constraints, self.geometry)
         linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
@@ -164,7 +179,8 @@ class QuasiStatic:
         return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
 
     def reaction(self, facet_tag):
-        """Force of the body on its support at the facets of a tag, summed over them: (D,) [N] ([N/m] in 2D).
+        """Force of the body on its support at the facets of a tag, summed over them: (D,) [N] ([N/m] in plane strain, [N] per radian in
+        an axisymmetric body).
 
         Collective.
         """
@@ -183,7 +199,7 @@ class QuasiStatic:
         if smooth and self.degree == 2:
             return self.points.cell_function(self.points.stress, "stress", 1)
         mean = self.points.cell_function(self.points.stress, "stress", 0)
-        return nodal_average(mean) if smooth else mean
+        return nodal_average(mean, self.radius) if smooth else mean
 
     def state_function(self):
         """State variables of the law as a function that is constant in each cell."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
 
@@ -120,6 +121,8 @@ def _returned(laws, material, stress, state):
 def _require_usable(model, fem, move):
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
+    plane = not isinstance(fem, QuasiStatic) or fem.geometry is not Geometry.AXISYMMETRIC
+    agree(model.comm, None if plane else "fem: it is axisymmetric, the particles are in plane strain")
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 

@@ -211,3 +211,23 @@ def test_hand_over_between_different_partitions(degree, cell_size, options):
 def in_order(model, *names):
     order = np.argsort(model.particles.id)
     return [getattr(model.particles, name)[order] for name in names]
+
+
+@pytest.mark.parametrize("options", [{"degree": 1, "nmd": True}, {"degree": 2}])
+def test_axisymmetric_elements_are_the_same_on_any_number_of_ranks(options):
+    """A cylinder of clay under a rigid plate that yields in part, and an elastic ring around it."""
+    found = []
+    for comm in (COMM, MPI.COMM_SELF):
+        domain, _, facet_tags = bridge.box_mesh(comm, [1.0, 1.0], [6, 6])
+        law = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=5e3, friction_angle=20.0)
+        supports = [bridge.roller(1, (1, 0)), bridge.fixed(3), bridge.prescribed(4, (0.0, -0.02))]
+        geometry = bridge.Geometry.AXISYMMETRIC
+        fem = bridge.QuasiStatic(domain, law, facet_tags, supports, geometry=geometry, **options)
+        fem.solve(bridge.Load(unit_weight=18e3, displacement=1.0))
+        assert fem.converged
+        points = np.random.default_rng(2).uniform(0.05, 0.95, (20, 2))
+        values = fem.evaluate_at(points, smooth=True)
+        found.append((fem.reaction(4)[1], values["stress"], values["displacement"]))
+        assert comm.allreduce(int((fem.points.state[:, 0] > 0).sum())) > 10
+    for here, alone in zip(*found):
+        np.testing.assert_allclose(here, alone, rtol=0, atol=1e-6 * np.abs(alone).max())

@@ -31,8 +31,11 @@ LAWS = {
     "Cam-Clay": CLAY,
     "Python": mpm.PythonLaw(VonMises(strength=3e3)),
     "undrained Hencky": mpm.Undrained(mpm.Hencky(SOFTENING), **WATER),
+    "viscoplastic": mpm.ViscoplasticMohrCoulomb(**ELASTIC, cohesion=1e3, friction_angle=25.0, viscosity=1e4),
+    "heterogeneous": mpm.Heterogeneous(SOIL, ["cohesion"]),
     "layers": [mpm.Undrained(CLAY, **WATER), SOFTENING],
 }
+STRENGTH = mpm.RandomField(mean=1e3, deviation=300.0, lengths=[0.5, 0.2], seed=4, lognormal=True)
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +58,8 @@ def slope(comm, owners_of, laws):
     if any("cohesion_deviation" in law.state_names for law in model.laws):
         field = np.random.default_rng(11).uniform(-0.3, 0.3, 10_000)  # by the particles' numbers, so alike on all ranks
         model.set_state("cohesion_deviation", field[particles.id])
+    if isinstance(model.laws[0], mpm.Heterogeneous):
+        model.set_parameter("cohesion", STRENGTH)
     return model
 
 
@@ -94,6 +99,8 @@ def test_finite_elements_are_the_same_on_any_number_of_ranks(comm, laws):
         domain, _, tags = bridge.soil_mesh(*bridge.slope_mesh(each, cell_size=0.25, crest=1.0))
         supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
         fem = bridge.QuasiStatic(domain, laws, tags, supports, degree=1)
+        if isinstance(laws, mpm.Heterogeneous):
+            fem.set_parameter("cohesion", STRENGTH)
         fem.solve(bridge.Load(unit_weight=8e3))
         assert fem.converged
         points = np.random.default_rng(2).uniform(0.05, 0.95, (20, 2))
@@ -101,6 +108,24 @@ def test_finite_elements_are_the_same_on_any_number_of_ranks(comm, laws):
         assert values["state"][:, 0].max() >= 0
         stress.append(np.column_stack([values["stress"], values["state"]]))
     np.testing.assert_allclose(stress[0], stress[1], rtol=0, atol=1e-6 * np.abs(stress[1]).max())
+
+
+def test_a_random_field_stays_with_the_particles(comm):
+    model, alone = slope(comm, scattered, LAWS["heterogeneous"]), slope(MPI.COMM_SELF, scattered, LAWS["heterogeneous"])
+    strengths = []
+    for each in (model, alone):
+        before = dict(zip(each.particles.id.tolist(), each.parameter("cohesion").tolist()))
+        *_, _ = each.explicit(0.3, dt=2e-4, pic=0.01)
+        after = dict(zip(each.particles.id.tolist(), each.parameter("cohesion").tolist()))
+        for one in each.comm.allgather(before):
+            before |= one
+        assert all(after[key] == before[key] for key in after)
+        whole = {key: value for one in each.comm.allgather(after) for key, value in one.items()}
+        strengths.append([whole[key] for key in sorted(whole)])
+    assert strengths[0] == strengths[1] and np.std(strengths[0]) > 100.0
+    with pytest.raises(mpm.InputError, match="^cohesion = -1, but it must be at least 0") as raised:
+        model.set_parameter("cohesion", lambda x: np.full(len(x), -1.0 if comm.rank == comm.size - 1 else 1e3))
+    assert len(set(comm.allgather(str(raised.value)))) == 1
 
 
 def test_a_law_that_fails_on_one_rank_ends_the_run_on_all(comm):
