@@ -13,8 +13,11 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Normalize
+from matplotlib.colors import Colormap, Normalize
 from PIL import Image
 
 from .files import expendable
@@ -98,24 +101,68 @@ def _pictures(
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        background = canvas.copy_from_bbox(figure.bbox)
+        pixels = np.asarray(canvas.buffer_rgba())
+        background = pixels.copy()
         still = list(axes.collections)
         draw_scene(axes, scene)
         lines = sorted((c for c in axes.collections if c not in still), key=lambda c: c.get_zorder())
+        above = _Overlay.of(canvas, axes, lines)
         title = axes.set_title("", loc="left", pad=4)
-        points = axes.scatter([], [], c=[], cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
-        points_per_metre = 72 * figure.get_figwidth() * axes.get_position().width / np.ptp(axes.get_xlim())
         for frame in frames:
-            canvas.restore_region(background)
+            pixels[:] = background
+            _draw_discs(pixels, axes, frame, colormaps[quantity.colours], Normalize(*limits), quantity.scale)
+            above.draw(pixels)
             title.set_text(f"$t$ = {frame.time:.2f} s")
-            points.set_offsets(frame.position)
-            points.set_sizes((disc_diameter(frame.volume) * points_per_metre) ** 2)
-            points.set_array(quantity.scale * frame.values)
-            for artist in (points, *lines, title):
-                axes.draw_artist(artist)
-            pixels = np.asarray(canvas.buffer_rgba())
-            yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2]
+            axes.draw_artist(title)
+            yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
         plt.close(figure)
+
+
+@dataclass(frozen=True)
+class _Overlay:
+    """What is drawn over each frame: rows of the pixels (k,), their colours (k, 3) and opacities (k, 1)."""
+
+    rows: np.ndarray
+    colours: np.ndarray
+    opacity: np.ndarray
+
+    @classmethod
+    def of(cls, canvas: FigureCanvasAgg, axes: Axes, artists: Sequence[Artist]) -> _Overlay:
+        """Of artists, drawn on nothing; the canvas is left empty."""
+        canvas.get_renderer().clear()
+        for artist in artists:
+            axes.draw_artist(artist)
+        drawn = np.array(canvas.buffer_rgba()).reshape(-1, 4)
+        rows = np.flatnonzero(drawn[:, 3])
+        return cls(rows, drawn[rows, :3].astype(np.float32), drawn[rows, 3:].astype(np.float32) / 255)
+
+    def draw(self, pixels: np.ndarray) -> None:
+        flat = pixels.reshape(-1, 4)
+        below = flat[self.rows, :3]
+        flat[self.rows, :3] = np.rint(below + self.opacity * (self.colours - below))
+
+
+def _draw_discs(pixels: np.ndarray, axes: Axes, frame: Frame, colours: Colormap, norm: Normalize, scale: float) -> None:
+    """Particles as discs, each with whole pixels; a tenth of the time that matplotlib takes for smooth ones."""
+    height, width = pixels.shape[:2]
+    left, bottom, right, top = (int(round(edge)) for edge in axes.bbox.extents)
+    centres = axes.transData.transform(frame.position)
+    columns, rows = np.rint(centres[:, 0] - 0.5).astype(int), height - 1 - np.rint(centres[:, 1] - 0.5).astype(int)
+    inside = (columns >= left) & (columns < right) & (rows >= height - top) & (rows < height - bottom)
+    per_metre = axes.bbox.width / np.ptp(axes.get_xlim())
+    # Twice the radius in whole pixels: so many kinds of discs there are.
+    kinds = np.maximum(np.rint(disc_diameter(frame.volume) * per_metre), 1).astype(int)
+    shown = np.ascontiguousarray(colours(norm(scale * frame.values), bytes=True)).view(np.uint32)[:, 0]
+    flat = pixels.reshape(-1, 4).view(np.uint32)[:, 0]
+    for kind in np.unique(kinds[inside]):
+        chosen = np.flatnonzero(inside & (kinds == kind))
+        reach = np.arange(-(kind // 2), kind // 2 + 1)
+        across, up = (offsets.ravel() for offsets in np.meshgrid(reach, reach))
+        disc = across**2 + up**2 <= (kind / 2) ** 2
+        for x, y in zip(across[disc], up[disc]):
+            column = np.clip(columns[chosen] + x, left, right - 1)
+            row = np.clip(rows[chosen] + y, height - top, height - bottom - 1)
+            flat[row * width + column] = shown[chosen]
 
 
 def _save_mp4(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
@@ -129,7 +176,7 @@ def _save_mp4(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
         assert encoder.stdin is not None and encoder.stderr is not None
         with contextlib.suppress(BrokenPipeError):  # then it says why
             for picture in itertools.chain([first], pictures):
-                encoder.stdin.write(picture.tobytes())
+                encoder.stdin.write(picture.data)
             encoder.stdin.close()
         reason = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode != 0:
@@ -137,5 +184,5 @@ def _save_mp4(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
 
 
 def _save_gif(path: Path, pictures: Iterator[np.ndarray], rate: int) -> None:
-    first, *others = (Image.fromarray(picture[..., :3]) for picture in pictures)
+    first, *others = (Image.fromarray(picture).convert("RGB") for picture in pictures)
     first.save(path, format="GIF", save_all=True, append_images=others, duration=1000 / rate, loop=0)

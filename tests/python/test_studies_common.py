@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
 from matplotlib.image import imread
 
 from studies.common import animation, interrupt, plots
@@ -251,6 +252,25 @@ def test_a_picture_that_fails_costs_only_itself(tmp_path, capsys):
     assert reason == f"cannot draw first: RuntimeError: no ink (test_studies_common.py:{line})"
     assert "figures: 2" in capsys.readouterr().err
     NOT_WRITTEN.clear()
+
+
+def test_discs_of_a_film_have_their_place_size_and_colour():
+    position, volume = np.array([[0.5, 0.25], [0.1, 0.75]]), np.full(2, 0.02)
+    frame = animation.Frame(1.0, position, volume, np.array([0.0, 1.0]))
+    (pixels,) = animation._pictures(scene(), [frame], plots.SHEAR_STRAIN, (0.0, 1.0), [position])
+    colours = colormaps[plots.SHEAR_STRAIN.colours]([0.0, 1.0], bytes=True)[:, :3]
+    height, width = pixels.shape[:2]
+    with plots.paper_style():
+        figure, axes, _ = plots.figure_with_bar(*scene().limits([position]))
+        figure.set_dpi(150)
+        centre = axes.transData.transform(position)
+        radius = 0.5 * plots.disc_diameter(volume)[0] * axes.bbox.width / np.ptp(axes.get_xlim())
+    found = (pixels[: int(height - axes.bbox.y0), :, :3] == colours[0]).all(axis=2)  # above the bar of colours
+    rows, columns = np.nonzero(found)
+    near = np.hypot(columns - centre[0, 0], height - rows - centre[0, 1]) < 1.5 * radius
+    assert columns[near].mean() == pytest.approx(centre[0, 0], abs=1.5)
+    assert height - rows[near].mean() == pytest.approx(centre[0, 1], abs=1.5)
+    assert near.sum() == pytest.approx(np.pi * radius**2, rel=0.15)  # lines of the mesh lie over it
 
 
 @pytest.mark.parametrize("has_ffmpeg", [True, False])
