@@ -106,7 +106,7 @@ def test_oblique_rollers_that_meet_fix_the_node():
 
 
 @pytest.mark.parametrize("dim", DIMS)
-def test_wishes_that_follow_from_others_are_taken_and_contradictions_refused(dim):
+def test_supports_that_follow_from_others_are_taken_and_contradictions_refused(dim):
     model = mpm.Model(box([2] * dim), ELASTIC)
     model.seed(density=DENSITY, per_cell=1)
     model.fix(1)

@@ -38,7 +38,7 @@ class Body:
             raise InputError("laws is empty, expected at least one constitutive law")
         core_type = _core.Model2 if mesh.dim == 2 else _core.Model3
         self._core = core_type(mesh._core, self.laws, MPI._addressof(self.comm))
-        self._wishes: list[tuple[int, bool, list[float]]] = []
+        self._conditions: list[tuple[int, bool, list[float]]] = []
         self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
@@ -336,9 +336,9 @@ class Body:
 
     # --- supports and loads --------------------------------------------------------------------------------------
 
-    def _set_supports(self, wishes: list[tuple[int, bool, list[float]]]) -> None:
-        collectively(self.comm, lambda: self._core.set_supports(wishes))
-        self._wishes = wishes
+    def _set_supports(self, conditions: list[tuple[int, bool, list[float]]]) -> None:
+        collectively(self.comm, lambda: self._core.set_supports(conditions))
+        self._conditions = conditions
 
     def _support(
         self, facet_tag: Tag, whole: bool, vector: ArrayLike, name: str, *, replaced: Sequence[Any] = ()
@@ -348,7 +348,7 @@ class Body:
             return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
 
         new = collectively(self.comm, checked)
-        kept = [wish for wish in self._wishes if not any(wish is old for old in replaced)]
+        kept = [condition for condition in self._conditions if not any(condition is old for old in replaced)]
         self._set_supports([*kept, *new])
         return new
 
@@ -364,8 +364,8 @@ class Body:
         """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
         tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
         before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
-        wishes = self._support(tags, True, velocity, "velocity", replaced=before)
-        self._prescribed.update({wish[0]: wish for wish in wishes})
+        conditions = self._support(tags, True, velocity, "velocity", replaced=before)
+        self._prescribed.update({condition[0]: condition for condition in conditions})
 
     def release(self, facet_tag: Tag) -> None:
         """Take away whatever holds the nodes on facets with this tag.
@@ -377,13 +377,13 @@ class Body:
         def remaining() -> list[tuple[int, bool, list[float]]]:
             tags = self.mesh.tags_of("facet", facet_tag)
             for tag in tags:
-                if tag not in {wish[0] for wish in self._wishes}:
+                if tag not in {condition[0] for condition in self._conditions}:
                     raise InputError(f"facet_tag {facet_tag!r} is not supported")
-            return [wish for wish in self._wishes if wish[0] not in tags]
+            return [condition for condition in self._conditions if condition[0] not in tags]
 
         self._set_supports(collectively(self.comm, remaining))
-        kept = {wish[0] for wish in self._wishes}
-        self._prescribed = {tag: wish for tag, wish in self._prescribed.items() if tag in kept}
+        kept = {condition[0] for condition in self._conditions}
+        self._prescribed = {tag: condition for tag, condition in self._prescribed.items() if tag in kept}
 
     def outflow(self, facet_tag: Tag) -> None:
         """Let particles leave the mesh through facets with this tag; they are counted in the report."""

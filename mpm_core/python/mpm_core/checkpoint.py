@@ -95,8 +95,8 @@ def _description(model: Model) -> dict[str, Any]:
         "gravity": list(core.gravity),
         "gravity_ramp": core.gravity_ramp,
         "outflow_tags": list(core.outflow_tags),
-        "supports": [[tag, whole, vector] for tag, whole, vector in model._wishes],
-        "prescribed": {str(tag): model._wishes.index(wish) for tag, wish in model._prescribed.items()},
+        "supports": [[tag, whole, vector] for tag, whole, vector in model._conditions],
+        "prescribed": {str(tag): model._conditions.index(condition) for tag, condition in model._prescribed.items()},
         "next_id": model._next_id,
         "added_fields": _added_fields(model),
         "cuts": model.cuts,
@@ -133,10 +133,10 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     core = model._core
     core.gravity, core.gravity_ramp = there["gravity"], there["gravity_ramp"]
     core.outflow_tags = there["outflow_tags"]
-    model._wishes = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
-    model._prescribed = {int(tag): model._wishes[k] for tag, k in there["prescribed"].items()}
+    model._conditions = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
+    model._prescribed = {int(tag): model._conditions[k] for tag, k in there["prescribed"].items()}
     model._next_id = there["next_id"]
     model._left_imbalance = there.get("left_imbalance", 1.0)
     model._control = None
     model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
-    collectively(model.comm, lambda: core.set_supports(model._wishes))
+    collectively(model.comm, lambda: core.set_supports(model._conditions))

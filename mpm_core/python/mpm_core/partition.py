@@ -74,7 +74,7 @@ def take_partition(body: Body, cells: NDArray) -> None:
 def take_mesh(body: Body, mesh: Mesh) -> None:
     """Give the model its mesh cut otherwise, and all that hangs on it. Collective."""
     body._core.set_partition(mesh._core)
-    body._core.set_supports(body._wishes)
+    body._core.set_supports(body._conditions)
     body.mesh = mesh
     body.cuts += 1
 
