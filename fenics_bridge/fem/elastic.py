@@ -125,7 +125,7 @@ def _solved(space, constraints, tangent, residual_of, options_prefix):
     solution.x.array[constraints.dofs] = constraints.values
     residual = assembled(fem.form(residual_of(solution)), space)
     residual.array[constraints.dofs] = 0.0
-    matrix = Stiffness(tangent, space, constraints).assembled()
+    matrix = Stiffness(tangent, constraints).assembled()
     failure = LinearSolver(space, options_prefix).solve(matrix, residual, increment)
     if failure:
         raise RuntimeError(failure)

@@ -31,7 +31,7 @@ class Kinematics:
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
         self._internal = fem.form(weighted(ufl.inner(self._stress, strain(test, radius)), radius) * dx)
         stiffness = weighted(ufl.inner(ufl.dot(matrix, strain(trial, radius)), strain(test, radius)), radius) * dx
-        self._stiffness = Stiffness(stiffness, self._space, constraints)
+        self._stiffness = Stiffness(stiffness, constraints)
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
 
     def strain_increment(self):

@@ -139,7 +139,7 @@ class _MixedKinematics:
 
         self._internal = fem.form(ufl.inner(self._stress, strain(v)) * dx + volume(u, p))
         stiffness = ufl.inner(ufl.dot(matrix, strain(du)), strain(v)) * dx + volume(du, dp)
-        self._stiffness = Stiffness(stiffness, space, constraints)
+        self._stiffness = Stiffness(stiffness, constraints)
         self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
 
     def strain_increment(self):
