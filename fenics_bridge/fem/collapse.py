@@ -80,13 +80,9 @@ def _not_carried(start, steps):
     """Why the load is not carried at the start, and what to try."""
     last = next((step for step in reversed(steps) if not step.converged), steps[-1])
     carried = max((step.value for step in steps if step.converged), default=0.0)
-    advice = {
-        "failure": "take a smaller start, or look at supports and strengths",
-        "undecided": "look at supports and strengths, or allow more steps of relaxation (max_steps)",
-    }[last.report.outcome]
     return (
         f"start: with the strength divided by {start!r} only {carried:.1%} of the load is carried; at {last.value:.1%}: "
-        f"{last.report.reason}; {advice}"
+        f"{last.report.reason}, or take a smaller start"
     )
 
 

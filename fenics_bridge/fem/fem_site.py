@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import free_motions, switch_off
+from fenics_bridge.fem.active_cells import switch_off
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.stages import SiteState, StageError, StageReport
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
@@ -75,47 +75,4 @@ class FemSite:
     def _failure(self, stage, steps):
         fem = self.fem
         reason = next((step.report.reason for step in reversed(steps) if not step.converged), "no step was tried")
-        where, soil, law = most_moved(fem)
-        place = ", ".join(f"{x:.3g}" for x in where)
-        return (
-            f"stage {self.number} ({stage.name!r}) has no equilibrium beyond {1 - fem.load.held:.3g} of its change: {reason}. "
-            f"Most moved the soil {label(fem.cell_tags, soil)} near ({place}) m, which follows the law {law.name}. {_advice(reason, free_motions(fem))}"
-        )
-
-
-def _advice(reason, free):
-    """What to try; free: motions that the supports do not hold."""
-    if free:
-        return f"Nothing holds the soil that is there against moving {' and '.join(free)}: give it supports."
-    if "linear solver" in reason:
-        return (
-            "Either the ground fails there: take a smaller change, more strength or more support; or a part of the soil is not "
-            "held, because it touches the others in points only."
-        )
-    if "law" in reason:
-        return (
-            "Does the soil come under tension there, or has it no strength? Give it some cohesion or a tension_cutoff."
-        )
-    return (
-        "Either the ground fails there: take a smaller change, more strength or more support; or Newton's method gave up: try "
-        "smaller steps, or more dilation."
-    )
-
-
-def most_moved(fem):
-    """Where the last increment, that of a step that failed too, is largest: place (D,) [m], soil's tag and law. Collective."""
-    comm, dim = fem.domain.comm, fem.domain.geometry.dim
-    space, points = fem.displacement.function_space, fem.points
-    size = np.linalg.norm(fem.increment.x.array.reshape(-1, dim), axis=1)
-    size = np.where(np.isfinite(size), size, np.inf)[: space.dofmap.index_map.size_local]
-    node = int(np.argmax(size)) if len(size) else None
-    found = (float(size[node]), space.tabulate_dof_coordinates()[node, :dim].tolist()) if len(size) else (-1.0, None)
-    where = max(comm.allgather(found), key=lambda one: one[0])[1]
-    distance = np.where(
-        np.repeat(points.material, points.per_cell) >= 0, np.linalg.norm(points.coordinates() - where, axis=1), np.inf
-    )
-    nearest = int(np.argmin(distance)) if points.n else None
-    material = -1 if nearest is None else int(points.material[nearest // points.per_cell])
-    candidate = (float(distance[nearest]) if nearest is not None else np.inf, material)
-    number = min(comm.allgather(candidate))[1]
-    return where, fem.soils[number], fem.laws[number]
+        return f"stage {self.number} ({stage.name!r}) has no equilibrium beyond {1 - fem.load.held:.3g} of its change: {reason}."

@@ -14,6 +14,7 @@ from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibration import Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
+from fenics_bridge.fem.failure import explained
 from fenics_bridge.fem.fields import nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
@@ -168,7 +169,8 @@ class QuasiStatic:
         if report.converged:
             self.points.time += duration if np.isfinite(duration) else 0.0
             self.load, self.law = self._loads.resolved(load), law
-        return report
+            return report
+        return replace(report, reason=explained(self, report.reason, load))
 
     def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
         """Raise the load from the present one to the given one, in steps that adapt. Returns a list of LoadStep.

@@ -279,7 +279,7 @@ def test_a_cut_that_does_not_stand_is_named_with_place_and_law(pit):
 
 def test_a_body_that_is_not_held_is_said_so(pit):
     message, _, _ = failure(pit, elastic(SOILS["pit"]), IN_SITU, supports=[ROLLERS[0]])
-    assert "Nothing holds the soil that is there against moving along y: give it supports." in message
+    assert "Nothing holds the soil that is there against moving along y: give it supports" in message
 
 
 def test_soil_without_strength_is_said_so(pit):

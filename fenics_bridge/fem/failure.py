@@ -1,0 +1,83 @@
+"""What to say about a step without equilibrium: under which load, where, in which soil, and what to try."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.fem.active_cells import free_motions
+from fenics_bridge.mesh.names import label
+
+
+def explained(fem, reason, load):
+    """The reason why a QuasiStatic found no equilibrium under a load, with load, place, soil, law and advice. Collective."""
+    where, soil, law, tension = most_moved(fem)
+    place = ", ".join(f"{x:.3g}" for x in where)
+    name = "" if soil is None else f"the soil {label(fem.cell_tags, soil)} "
+    return (
+        f"{reason}; under {_in_words(fem, load)}; most moved {name}near ({place}) m, which follows the law {law.name}. "
+        f"{advice(reason, free_motions(fem), law, tension)}"
+    )
+
+
+def advice(reason, free, law, tension):
+    """What to try. free: motions that the supports do not hold; law: where the body moves most; tension: whether it is there."""
+    if free:
+        return f"Nothing holds the soil that is there against moving {' and '.join(free)}: give it supports"
+    if "linear solver" in reason:
+        return (
+            "Either the ground fails there: take a smaller change, more strength or more support; or a part of the soil is not "
+            "held, because it touches the others in points only"
+        )
+    if getattr(law, "cohesion", 1.0) == 0 and getattr(law, "friction_angle", 1.0) == 0:
+        return "The soil has no strength there: give it cohesion or a friction angle"
+    if getattr(law, "cohesion", 1.0) == 0:
+        return "The soil has no cohesion, and next to a free surface it carries hardly anything: give it some, or less load"
+    if tension or "law" in reason:
+        return (
+            "The soil comes under tension there: take away what pulls, or give it cohesion or a larger tension_cutoff"
+        )
+    if "mechanism" in reason:
+        return "The ground fails there: take less load, more strength or more support"
+    return (
+        "Newton's method and relaxation gave up: try smaller steps, more steps of relaxation (max_steps of Solver), a tolerance as "
+        "in practice (PRACTICE), or more dilation"
+    )
+
+
+def most_moved(fem):
+    """Where the last increment, that of a step that failed too, is largest. Collective.
+
+    Returns the place (D,) [m], and of the soil nearest to it: its tag, its law, and whether it was under tension.
+    """
+    comm, dim = fem.domain.comm, fem.domain.geometry.dim
+    space, points = fem.displacement.function_space, fem.points
+    size = np.linalg.norm(fem.increment.x.array.reshape(-1, dim), axis=1)
+    size = np.where(np.isfinite(size), size, np.inf)[: space.dofmap.index_map.size_local]
+    node = int(np.argmax(size)) if len(size) else None
+    found = (float(size[node]), space.tabulate_dof_coordinates()[node, :dim].tolist()) if len(size) else (-1.0, None)
+    where = max(comm.allgather(found), key=lambda one: one[0])[1]
+    distance = np.where(
+        np.repeat(points.material, points.per_cell) >= 0, np.linalg.norm(points.coordinates() - where, axis=1), np.inf
+    )
+    candidate = (np.inf, -1, False)
+    if points.n:
+        nearest = int(np.argmin(distance))
+        stress = points.trial_stress
+        tension = bool(stress[nearest, :3].sum() >= -1e-9 * np.abs(stress).max())  # a cut-off leaves none
+        candidate = (float(distance[nearest]), int(points.material[nearest // points.per_cell]), tension)
+    _, number, tension = min(comm.allgather(candidate))
+    return where, fem.soils[number], fem.laws[number], tension
+
+
+def _in_words(fem, load):
+    """A load as it is given, without what it leaves out."""
+    weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
+    parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
+    parts += [f"pressure {p:.5g} Pa{_of(fem.facet_tags, tag)}" for tag, p in load.pressure.items() if p]
+    parts += [f"{load.displacement:.3g} of the prescribed displacements"] if load.displacement else []
+    parts += [f"{load.held:.3g} of the forces still held"] if load.held else []
+    return ", ".join(parts) or "no load"
+
+
+def _of(tags, tag):
+    return "" if tag is None else f" of {tag!r}" if isinstance(tag, str) else f" of {label(tags, tag)}"
