@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -16,6 +17,7 @@ CASES = sorted(path.stem for path in FOLDER.glob("[!_]*.py"))
 sys.path.insert(0, str(FOLDER))
 
 from _case import Check, Kind, Result  # noqa: E402
+from _slip_surfaces import sliding_blocks  # noqa: E402
 from _table import docs_page, percent, read_table  # noqa: E402
 
 
@@ -113,6 +115,15 @@ def test_wrong_case_is_named(tmp_path):
     command = [sys.executable, str(FOLDER / "__main__.py"), "--cases", "colum", "--output", str(tmp_path)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ran.returncode == 2 and "'colum'" in ran.stderr and "column" in ran.stderr
+
+
+def test_blocks_on_a_plane_are_one_wedge():
+    """A vertical cut on a plane at 45 degrees: 4 c / (gamma H), whatever cuts the wedge in three; no way down, no factor."""
+    surface = np.array([(0.0, 1.0), (3.0 - 1e-9, 1.0), (3.0, 0.0), (5.0, 0.0)])
+    plane = np.array([(2.0, 1.0), (2.4, 0.6), (2.7, 0.3), (3.0, 0.0)])
+    even = lambda x, y: np.full(len(x), 5e3)  # noqa: E731
+    assert sliding_blocks(plane, (2.5, 2.8), surface, even, 20e3) == pytest.approx(4 * 5 / 20, rel=1e-6)
+    assert sliding_blocks(plane[::-1], (2.8, 2.5), surface, even, 20e3) == np.inf
 
 
 def test_percentages_keep_two_digits():
