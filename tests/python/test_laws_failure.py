@@ -112,8 +112,8 @@ def test_finite_elements_halve_the_load_step_and_say_why():
     assert hard.converged and not hard_steps[0].converged
     assert np.abs(hard.points.stress - easy.points.stress).max() < 1e-6 * np.abs(easy.points.stress).max()
     assert not hopeless.converged and (hopeless.points.stress == 0).all()
-    pattern = r"the law PythonLaw of Fragile failed at \((.*), (.*)\) m for the strain increment \((.*)\)"
-    match = re.fullmatch(pattern, hopeless_steps[-1].report.reason)
+    pattern = r"the law PythonLaw of Fragile failed at \((.*), (.*)\) m for the strain increment \(([^)]*)\)"
+    match = re.match(pattern, hopeless_steps[-1].report.reason)
     assert match and np.abs(np.array(match[3].split(", "), dtype=float)).max() > 1e-9
 
 
