@@ -85,7 +85,7 @@ def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
 
 
 def run(a: Namespace, share: float, unit_weight: float) -> dict:
-    """One hand-over and slide; what is to be told about it."""
+    """One hand-over and slide; its results for the summary."""
     case = build_slope(a, comm)
     watch = Watch(case)  # of the particles as seeded, before the hand-over may move them
     report = hand_over(case, unit_weight)
@@ -148,17 +148,17 @@ def main(arguments: list[str] | None = None) -> int:
         "collapse_unit_weight_of_the_finite_elements": collapse,
         "runout_m_by_share_of_collapse": {f"{run['share']:g}": runout for run, runout in zip(runs, runouts)},
         "largest_relative_change_of_runout": (max(runouts) - min(runouts)) / max(runouts) if max(runouts) > 0 else 0.0,
-        "handovers": [told(run) for run in runs],
+        "handovers": [row_of(run) for run in runs],
         "wall_seconds": perf_counter() - start,
     }
     write_summary(folder, a, summary, comm, Page(movies=movies(runs) if comm.rank == 0 else ()),
                   drawn(runs, folder))  # fmt: skip
     if comm.rank == 0:
-        tell(summary, folder)
+        print_summary(summary, folder)
     return 0
 
 
-def told(run: dict) -> dict:
+def row_of(run: dict) -> dict:
     """A run as the summary has it."""
     report = run["report"]
     return {
@@ -172,7 +172,7 @@ def told(run: dict) -> dict:
     }
 
 
-def tell(summary: dict, folder: Path) -> None:
+def print_summary(summary: dict, folder: Path) -> None:
     print(
         f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3"
     )

@@ -154,14 +154,14 @@ class Files:
         for file in (self.frames, *self.probes):
             try:
                 file.__exit__(*error)
-            except mpm.RunError as failure:  # on all ranks alike; the results so far are still to be told
+            except mpm.RunError as failure:  # on all ranks alike; the results so far are still to be reported
                 self.failure = self.failure or str(failure)
 
 
 def slide(
     case: SlopeCase, watch: Watch, history: History, files: Files, interrupt: Interrupt, checkpoints: Checkpoints
 ) -> dict:
-    """Run to the end or to an interruption, and store frames; returns what is to be told about it."""
+    """Run to the end or to an interruption, and store frames; returns its results for the summary."""
     a, model = case.args, case.model
     loop = {"seconds": 0.0, "stopped": None}
     report = model.report()
@@ -310,7 +310,7 @@ def main(arguments: list[str] | None = None) -> int:
         frames, scene = watch.frames(), case.scene()
         write_summary(folder, a, summary, comm, page(case, frames, summary), drawn(a, scene, frames, history, folder))
     if comm.rank == 0:
-        tell(summary, folder)
+        print_summary(summary, folder)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)
 
 
@@ -345,7 +345,7 @@ def energies(report: mpm.Report) -> dict[str, float]:
     return {name: getattr(report, name) for name in names}
 
 
-def tell(summary: dict, folder: Path) -> None:
+def print_summary(summary: dict, folder: Path) -> None:
     print(
         f"crest displacement {summary['crest_displacement_m']:.4f} m, run-out {summary['runout_m']:.3f} m at "
         f"{summary['time_s']:g} s; {summary['particle_steps_per_second'] / 1e6:.1f} million particle-steps per second"

@@ -15,7 +15,7 @@ from fenics_bridge.mesh.gmsh_process import Limits, read_apart
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
 
 TIME_LIMIT = 600.0
-"""[s] that gmsh may take for a file, unless told otherwise"""
+"""[s] that gmsh may take for a file, unless given otherwise"""
 
 
 def read_mesh(path, comm, dim=2, parameters=None, *, time_limit=TIME_LIMIT, memory_limit=None, allow_commands=False):

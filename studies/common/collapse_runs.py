@@ -37,7 +37,7 @@ class Target:
         name, failed_name, reference_name: in the summary, of the value, of the smallest one above it that failed, and of
             limit analysis.
         reference: by limit analysis with associated flow, in the summary's unit.
-        title, line: how a value is told above a picture and in a line of text, as formats of a number.
+        title, line: how a value is written above a picture and in a line of text, as formats of a number.
         label: of its axis, with unit.
         unit: what the values of the runs are divided by for the summary.
         shown_unit: what the summary's values are divided by for pictures and text.

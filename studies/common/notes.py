@@ -41,7 +41,7 @@ def notes_of(
 
     Args:
         restarts: rows of earlier restarts.
-        start: what is told about the initial state.
+        start: results of the initial state for the summary.
     """
     return {"study": study, "options": plain_values(parameters), "restarts": list(restarts), "start": dict(start)}
 

@@ -1,4 +1,4 @@
-"""The results folder of a run: no two runs write to one, and none writes over another's results unless told to."""
+"""The results folder of a run: no two runs write to one, and none writes over another's results unless asked to."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
 def initialise(case: SlopeCase, kind: str, unit_weight: float) -> dict[str, float]:
     """Give the particles their initial stresses: "fem", "elastic", "k0" or "zero".
 
-    Returns what is to be told about it, by name: the ratio of out-of-balance to external force under that unit weight [-]
+    Returns its results for the summary, by name: the ratio of out-of-balance to external force under that unit weight [-]
     (1 without stresses) and, after "fem", how the hand-over went. Collective.
     """
     gravity = (0.0, -GRAVITY * unit_weight / case.args.unit_weight)

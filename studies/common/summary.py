@@ -112,9 +112,9 @@ def _write(
     write_text(folder / "summary.json", json.dumps(summary, indent=2, default=_plain) + "\n")
     draw_pictures(pictures)
     if isinstance(options, Options):
-        told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in summary["versions"].items())
+        used = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in summary["versions"].items())
         more = {"restarts": options.restarts} if options.restarts else {}
-        write_page(folder, options, {**results, **more}, page, f"{told}; {comm.size} rank(s); {summary['finished']}")
+        write_page(folder, options, {**results, **more}, page, f"{used}; {comm.size} rank(s); {summary['finished']}")
     summary["run_seconds"], summary["not_written"] = seconds_since_start(), list(NOT_WRITTEN)
     with expendable(folder / "summary.json") as aside:
         aside.write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")

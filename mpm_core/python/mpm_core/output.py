@@ -32,10 +32,10 @@ Fields = list[tuple[str, np.ndarray]]
 PARTICLE_FIELDS = (
     "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
 )  # fmt: skip
-"""What is told of a model's particles, beside the position, where nothing else is asked for."""
+"""Fields that are written of a model's particles beside the position, where nothing else is asked for."""
 
 NODAL_FIELDS = ("mass", "velocity", "internal_force")
-"""What is told of its nodes."""
+"""Fields that are written of its nodes."""
 
 # What a rank hands over whose fields are refused.
 NO_FIELDS: tuple[Fields, Fields] = ([], [])
