@@ -20,6 +20,7 @@ def block(**options):
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 def test_a_run_that_nobody_iterates_says_so(scheme):
     model = block()
+    model.fix(3)
     model.set_gravity((0.0, -10.0))
     with pytest.warns(RuntimeWarning, match=rf"Model.{scheme}\(...\) made no step.*last\(\)"):
         getattr(model, scheme)(0.01, dt=1e-3)
@@ -35,7 +36,7 @@ def test_a_run_without_anything_that_acts_warns():
     with pytest.warns(RuntimeWarning, match="nothing acts on the particles: gravity is zero.*set_gravity"):
         model.explicit(0.01).last()
     for act in (
-        lambda m: m.set_gravity((0.0, -10.0)),
+        lambda m: (m.fix(3), m.set_gravity((0.0, -10.0))),
         lambda m: m.traction(2, (1.0, 0.0)),
         lambda m: m.prescribe(1, (1.0, 0.0)),
         lambda m: m.particles.set("velocity", np.ones((len(m.particles), 2))),

@@ -16,6 +16,7 @@ from .collective import collectively
 from .mesh import Mesh, Tag, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
+from .space import SpaceWatch
 
 
 class Body:
@@ -39,6 +40,7 @@ class Body:
         core_type = _core.Model2 if mesh.dim == 2 else _core.Model3
         self._core = core_type(mesh._core, self.laws, MPI._addressof(self.comm))
         self._conditions: list[tuple[int, bool, list[float]]] = []
+        self._space_watch: SpaceWatch | None = None
         self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl

@@ -96,7 +96,9 @@ def run_explicit(
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    energy, body = EnergyWatch(energy_limit, model.comm.rank == 0), SpaceWatch(model)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+    if model._space_watch is None:
+        model._space_watch = SpaceWatch(model)
 
     def report() -> Report:
         now = model.report()
@@ -115,5 +117,5 @@ def run_explicit(
             if ends:
                 return
         if until == times[-1]:
-            body.look()
+            model._space_watch.look()
         yield report()

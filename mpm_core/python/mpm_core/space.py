@@ -18,6 +18,10 @@ LEAST_PART = 0.01
 """Fraction of the mass from which on a piece of the body counts as a part"""
 
 
+STEPS_BETWEEN = 256
+"""Steps after which a run looks at its space and parts again"""
+
+
 class Space(NamedTuple):
     """Volumes, in plane strain areas times one metre [m3].
 
@@ -80,11 +84,15 @@ def _piece_masses(cells: NDArray, masses: NDArray) -> NDArray[np.float64]:
 
 
 class SpaceWatch:
-    """Compares a body at the end of a run with the one at its start."""
+    """Compares a body with itself at the start of a model's first run, at the ends of runs.
+
+    It looks again only after so many steps that its cost, that of some ten steps, does not matter.
+    """
 
     def __init__(self, model: Model) -> None:
         self._model = model
         self._parts = self._count()
+        self._steps = model.steps
 
     def _count(self) -> int:
         masses = parts(self._model)
@@ -92,12 +100,16 @@ class SpaceWatch:
 
     def look(self) -> None:
         """Warn where the body has fallen apart, or has lost space. Collective."""
+        if self._model.steps - self._steps < STEPS_BETWEEN:
+            return
+        self._steps = self._model.steps
         now, volumes = self._count(), space(self._model)
         if self._model.comm.rank != 0:
             return
         if now > self._parts:
+            before, self._parts = self._parts, now
             warnings.warn(
-                f"the body is in {now} parts at t = {self._model.time:.6g} s, and was in {self._parts}: particles moved apart "
+                f"the body is in {now} parts at t = {self._model.time:.6g} s, and was in {before}: particles moved apart "
                 "by more than a cell, so that no force acts between them. Unless the soil is to break, take more particles per "
                 "cell or larger cells",
                 RuntimeWarning,
