@@ -12,6 +12,10 @@ WARN_ABOVE = 0.01
 """Part of the energy at work that may be unaccounted for without a warning"""
 
 
+LEAST_STEPS = 32
+"""Steps of a model before its energy is looked at: in the first ones half a step more or less is a large part of it"""
+
+
 class EnergyWarning(RuntimeWarning):
     """The energy of a run does not add up; see docs/energy.md."""
 
@@ -35,6 +39,8 @@ class EnergyWatch:
         Raises:
             RunError: it has passed the limit.
         """
+        if report.steps < LEAST_STEPS:
+            return
         share = abs(report.unexplained_share)
         if self.limit is not None and share > self.limit:
             raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {_ADVICE}")
