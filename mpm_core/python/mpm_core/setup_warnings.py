@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 
+from . import _core
+
 if TYPE_CHECKING:
     from .model import Model
 
@@ -72,11 +74,12 @@ def _locks(model: Model, nmd: bool) -> str:
 def _reasons_to_lock(law: Any) -> Iterator[str]:
     """Why a law keeps the volume of the soil, itself or the one that it wraps."""
     for inner in ("skeleton", "law", "peak"):
-        if hasattr(law, inner):
+        if isinstance(getattr(law, inner, None), tuple(_core.law_types)):
             yield from _reasons_to_lock(getattr(law, inner))
     if hasattr(law, "water_modulus"):
         yield "undrained"
-    if getattr(law, "poisson", 0.0) > NEARLY_INCOMPRESSIBLE:
-        yield f"Poisson's ratio {law.poisson:g}"
-    if getattr(law, "friction_angle", 1.0) == 0:
+    poisson, friction = getattr(law, "poisson", None), getattr(law, "friction_angle", None)
+    if isinstance(poisson, (int, float)) and poisson > NEARLY_INCOMPRESSIBLE:
+        yield f"Poisson's ratio {poisson:g}"
+    if isinstance(friction, (int, float)) and friction == 0:
         yield "friction angle 0"
