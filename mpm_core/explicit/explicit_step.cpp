@@ -1,9 +1,9 @@
 #include "explicit/explicit_step.h"
 
+#include "explicit/momentum.h"
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
-#include "transfer/kinematics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,154 +13,162 @@ namespace mpm
 {
 namespace
 {
-/// a_i = (f_ext - f_int - D)_i / m_i, with supports; D_i = alpha |R_i| sign(v_i) per component, R = f_ext - f_int.
-template <int D>
-void solve_momentum(Model<D>& model, double damping, double dt)
+/// What the velocity of a field gives to the strains beside the gradients of the cells: means over the cells around the
+/// nodes, where the run asks for them.
+/// @note Collective where it does
+template <class G>
+void find_means(const Mesh<G::dim>& mesh, NodeExchange& exchange, const ExplicitOptions& options, double dt,
+                VelocityField<G>& field)
 {
-  const PhaseTimer timer(model.phase_seconds, Phase::momentum);
-  Workspace<D>& work = model.work;
-  const Vector<D> gravity = current_gravity(model);
-  for (Index i : work.soil.nodes)
-  {
-    const NodeSums<D>& node = work.nodes[i];
-    const double per_mass = node.mass > work.least_mass ? 1 / node.mass : 0;
-    for (int a = 0; a < D; ++a)
-    {
-      const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double drag = local_damping(damping, residual, node.mass * work.start_velocity[i][a], dt);
-      work.acceleration[i][a] = (residual - drag) * per_mass;
-    }
-  }
-  for (const Support<D>& support : model.supports)
-  {
-    const Vector<D>& start = work.start_velocity[support.node];
-    Vector<D>& acceleration = work.acceleration[support.node];
-    Vector<D> end;
-    for (int a = 0; a < D; ++a)
-      end[a] = start[a] + dt * acceleration[a];
-    impose<D>(support, end);
-    for (int a = 0; a < D; ++a)
-      acceleration[a] = (end[a] - start[a]) / dt;
-  }
+  if (options.mixed_discretisation)
+    average_strains(mesh, exchange, field, dt);
+  if (options.integration == Integration::dual_domain)
+    average_gradients(mesh, exchange, field);
 }
 
-/// v_i at the end of the step. MUSL maps the new velocities of the particles back (19): what is kept of the old ones
-/// gives the momentum of the step's start, and the moments tell what their changes give.
-template <int D>
-void find_end_velocity(Model<D>& model, const ExplicitOptions& options, double dt)
+/// Nodes to particles: v_p += dt sum N_i a_i (18), x_p += dt sum N_i v_i (20), and with `stress` strains, stresses and
+/// volumes, in one pass that also takes the cells' moments along; then the mesh is reset under the particles.
+/// @note Collective
+template <class G>
+void update_particles(Model<G>& model, const ExplicitOptions& options, double dt, bool stress, PhaseClock& clock)
 {
-  const PhaseTimer timer(model.phase_seconds, Phase::mapping);
-  Workspace<D>& work = model.work;
-  find_velocity_change(model, options.pic_share, dt);
-  if (options.stress_update != StressUpdate::modified_last)
-  {
-    for (Index i : work.soil.nodes)
-      for (int a = 0; a < D; ++a)
-        work.velocity[i][a] = work.start_velocity[i][a] + dt * work.acceleration[i][a];
+  clock.begin(Phase::particles);
+  particle_pass(model, {dt, true, stress, options.pic_share, options.mixed_discretisation, dt});
+  agree_on_failure(model);
+  if (model.failure)
     return;
-  }
-  scatter_momentum<D>(model.mesh, work.soil, work.moments, work.velocity_change, work.velocity);
-  sum_shared(model.exchange, work.velocity);
-  const double keep = 1 - options.pic_share;
-  for (Index i : work.soil.nodes)
-  {
-    const NodeSums<D>& node = work.nodes[i];
-    const double per_mass = node.mass > work.least_mass ? 1 / node.mass : 0;
-    for (int a = 0; a < D; ++a)
-      work.velocity[i][a] = (keep * node.momentum[a] + work.velocity[i][a]) * per_mass;
-  }
-  for (const Support<D>& support : model.supports)
-    impose<D>(support, work.velocity[support.node]);
+  clock.begin(Phase::migration);
+  migrate_particles(model);
 }
 
-/// Work done in the step. Forces act at the step's start, so their displacement is the mean
-/// of the one before and the one after: the energy balance of the leap-frog scheme.
-/// @param strained  the stresses have been updated (USF): they are half a step behind the velocities, not ahead
-template <int D>
-void tally(Model<D>& model, double damping, double dt, bool strained)
+/// The step of the paper: stresses last, with the velocities of the moved particles (MUSL).
+template <class G>
+void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options, double dt)
 {
-  const PhaseTimer timer(model.phase_seconds, Phase::momentum);
-  const Workspace<D>& work = model.work;
-  const Vector<D> gravity = current_gravity(model);
-  model.last.dt = dt;
-  double ahead = 0;
-  Totals sums; // beside the model's: a sum kept in a register need not wait for memory
-  for (Index i : work.soil.nodes)
+  PhaseClock clock(model.phase_seconds);
+  const auto gravity = gravity_at(model, model.time);
+  const auto& mesh = model.mesh;
+  NodeExchange& exchange = model.exchange;
+  for (VelocityField<G>& field : model.fields)
   {
-    const NodeSums<D>& node = work.nodes[i];
-    if (!model.exchange.owned[i] || !(node.mass > work.least_mass))
-      continue;
-    const Vector<D>& start = work.start_velocity[i];
-    for (int a = 0; a < D; ++a)
-    {
-      const double external = node.traction[a] + node.mass * gravity[a];
-      const double u = 0.5 * dt * (start[a] + work.velocity[i][a]);
-      const double residual = external - node.internal[a];
-      const double drag = local_damping(damping, residual, node.mass * start[a], dt);
-      sums.external_work += external * u;
-      sums.internal_work += node.internal[a] * u;
-      ahead += node.internal[a] * dt * work.velocity[i][a];
-      sums.damping_work += drag * u;
-      sums.support_work += (node.mass * work.acceleration[i][a] - residual + drag) * u;
-    }
+    // Particles to nodes: m_i (11), momentum, f_int,i (14) and tractions (15)
+    clock.begin(Phase::node_sums);
+    particles_to_nodes(mesh, exchange, model.particles, model.order.runs, field);
+    sum_shared(exchange, field.nodes);
+    find_start_velocity(field);
+    // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
+    clock.begin(Phase::momentum);
+    find_acceleration(gravity, options.damping, dt, field);
+    // The second mapping, m_i v_i = sum m_p N_i v_p (19) with v_p from (18), comes before (18) here: sum m_p N_i dt
+    // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
+    clock.begin(Phase::mapping);
+    find_velocity_change(field, options.pic_share, dt);
+    scatter_momentum<G>(mesh, field.part, field.moments, field.velocity_change, field.velocity);
+    sum_shared(exchange, field.velocity);
+    find_mapped_velocity(1 - options.pic_share, field);
+    clock.begin(Phase::momentum);
+    add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
+    clock.begin(Phase::averaging);
+    find_means(mesh, exchange, options, dt, field);
   }
-  model.totals.external_work += sums.external_work;
-  model.totals.internal_work += sums.internal_work;
-  model.totals.damping_work += sums.damping_work;
-  model.totals.support_work += sums.support_work;
-  if (strained)
-    model.energy.ahead = -0.5 * ahead;
+  update_particles(model, options, dt, true, clock); // (18), (20), stresses; migration
+}
+
+/// Stresses last, with v_i + dt a_i (USL).
+template <class G>
+void update_stress_last(Model<G>& model, const ExplicitOptions& options, double dt)
+{
+  PhaseClock clock(model.phase_seconds);
+  const auto gravity = gravity_at(model, model.time);
+  for (VelocityField<G>& field : model.fields)
+  {
+    clock.begin(Phase::node_sums);
+    particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
+    sum_shared(model.exchange, field.nodes);
+    find_start_velocity(field);
+    clock.begin(Phase::momentum);
+    find_acceleration(gravity, options.damping, dt, field);
+    find_velocity_change(field, options.pic_share, dt);
+    find_advanced_velocity(dt, field);
+    add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
+    clock.begin(Phase::averaging);
+    find_means(model.mesh, model.exchange, options, dt, field);
+  }
+  update_particles(model, options, dt, true, clock);
+}
+
+/// Stresses first, with the velocities at the step's start (USF).
+template <class G>
+void update_stress_first(Model<G>& model, const ExplicitOptions& options, double dt)
+{
+  PhaseClock clock(model.phase_seconds);
+  const auto gravity = gravity_at(model, model.time);
+  clock.begin(Phase::node_sums);
+  map_to_nodes(model);
+  for (VelocityField<G>& field : model.fields)
+  {
+    find_start_velocity(field);
+    field.velocity = field.start_velocity;
+    find_means(model.mesh, model.exchange, options, dt, field);
+  }
+  clock.begin(Phase::particles);
+  particle_pass(model, {dt, false, true, 0, options.mixed_discretisation, dt});
+  clock.begin(Phase::node_sums);
+  map_to_nodes(model); // the stresses have changed
+  clock.begin(Phase::momentum);
+  double work_at_end = 0;
+  for (VelocityField<G>& field : model.fields)
+  {
+    find_acceleration(gravity, options.damping, dt, field);
+    find_velocity_change(field, options.pic_share, dt);
+    find_advanced_velocity(dt, field);
+    work_at_end += add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
+  }
+  model.energy.ahead = -0.5 * work_at_end; // the stresses are half a step behind the velocities, not ahead
+  update_particles(model, options, dt, false, clock);
 }
 } // namespace
 
-template <int D>
-void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt)
+template <class G>
+void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
-  Workspace<D>& work = model.work;
-  const bool first = options.stress_update == StressUpdate::first;
-  model.integration = options.integration;
-  const bool dual = options.integration == Integration::dual_domain;
-  map_to_nodes(model); // (11), (14), (15)
-  find_start_velocity(model);
-  if (first)
+  for (VelocityField<G>& field : model.fields)
+    field.integration.kind = options.integration;
+  model.last.dt = dt;
+  switch (options.stress_update)
   {
-    work.velocity = work.start_velocity;
-    if (options.mixed_discretisation)
-      average_strains(model, dt);
-    if (dual)
-      average_gradients(model);
-    particle_pass<D>(model, {dt, false, true, 0, options.mixed_discretisation, dt});
-    map_to_nodes(model); // the stresses have changed
+  case StressUpdate::modified_last:
+    modified_update_stress_last(model, options, dt);
+    break;
+  case StressUpdate::last:
+    update_stress_last(model, options, dt);
+    break;
+  case StressUpdate::first:
+    update_stress_first(model, options, dt);
+    break;
   }
-  solve_momentum(model, options.damping, dt);
-  find_end_velocity(model, options, dt); // (19)
-  tally(model, options.damping, dt, first);
-  if (options.mixed_discretisation && !first)
-    average_strains(model, dt);
-  if (dual && !first)
-    average_gradients(model);
-  particle_pass<D>(model,
-                   {dt, true, !first, options.pic_share, options.mixed_discretisation, dt}); // (18), (20), stresses
-  agree_on_trouble(model);
-  if (work.trouble)
+  if (model.failure)
     return;
-  settle_particles(model);
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
 }
 
-template <int D>
-double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
+namespace
 {
-  std::array<double, 3> squares{}; // of f_ext - f_int over unsupported directions, of f_ext, and of reactions
-  auto support = model.supports.begin();
-  for (Index i = 0; i < model.mesh.n_nodes(); ++i)
+/// Adds squares of f_ext - f_int over unsupported directions, of f_ext, and of reactions.
+template <class G>
+void add_squares(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
+                 std::array<double, 3>& squares)
+{
+  constexpr int D = G::dim;
+  auto support = field.supports.begin();
+  for (std::size_t i = 0; i < field.nodes.size(); ++i)
   {
-    while (support != model.supports.end() && support->node < i)
+    while (support != field.supports.end() && support->node < static_cast<Index>(i))
       ++support;
-    const NodeSums<D>& node = model.work.nodes[i];
-    if (!model.exchange.owned[i] || !(node.mass > model.work.least_mass))
+    const NodeSums<D>& node = field.nodes[i];
+    if (!owned[i] || !(node.mass > field.least_mass))
       continue;
     Vector<D> external, unbalanced;
     for (int a = 0; a < D; ++a)
@@ -168,7 +176,7 @@ double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
       external[a] = node.traction[a] + node.mass * gravity[a];
       unbalanced[a] = external[a] - node.internal[a];
     }
-    if (support != model.supports.end() && support->node == i)
+    if (support != field.supports.end() && support->node == static_cast<Index>(i))
     {
       Support<D> held = *support;
       held.value.fill(0);
@@ -179,18 +187,27 @@ double out_of_balance(const Model<D>& model, const Vector<D>& gravity)
     squares[0] += dot<D>(unbalanced, unbalanced);
     squares[1] += dot<D>(external, external);
   }
+}
+} // namespace
+
+template <class G>
+double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
+{
+  std::array<double, 3> squares{};
+  for (const VelocityField<G>& field : model.fields)
+    add_squares(field, model.exchange.owned, gravity, squares);
   MPI_Allreduce(MPI_IN_PLACE, squares.data(), 3, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   const double acting = squares[1] > 0 ? squares[1] : squares[2];
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
 }
 
-template <int D>
-double critical_time_step(const Model<D>& model)
+template <class G>
+double critical_time_step(const Model<G>& model)
 {
   double squared = std::numeric_limits<double>::infinity();
-  for (const Run& run : model.work.runs)
+  for (const Run& run : model.order.runs)
   {
-    const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
+    const double h = smallest_altitude<G::dim>(model.mesh.shapes[run.cell]);
     double density = std::numeric_limits<double>::infinity();
     for (Index p = run.first; p < run.last; ++p)
       density = std::min(density, model.particles.mass[p] / model.particles.volume[p]);
@@ -205,10 +222,11 @@ double pic_share_of_step(double share, double dt, double critical)
   return share == 0 ? 0 : -std::expm1(dt / critical * std::log1p(-share)); // 1 for a share of 1
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void explicit_step(Model<D>&, const ExplicitOptions&, double);                                              \
-  template double out_of_balance<D>(const Model<D>&, const Vector<D>&);                                                \
-  template double critical_time_step(const Model<D>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
+  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
+  template double critical_time_step(const Model<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

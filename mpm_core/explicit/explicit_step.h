@@ -25,22 +25,22 @@ struct ExplicitOptions
 
 /// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.
 /// @pre prepare(model) has been called
-/// @post work.trouble is set on every rank when it is on any; the step is then not whole
+/// @post model.failure is set on every rank when it is on any; the step is then not whole
 /// @note Collective
-template <int D>
-void explicit_step(Model<D>& model, const ExplicitOptions& options, double dt);
+template <class G>
+void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt);
 
-/// |f_ext - f_int| / |f_ext| at the nodes under this gravity [m/s2], for the sums as they were mapped last; supported
-/// directions do not count above. Without external force, as under prescribed velocities, reactions take its place; 0
-/// without either.
+/// |f_ext - f_int| / |f_ext| at the nodes of all fields under this gravity [m/s2], for the sums as they were mapped
+/// last; supported directions do not count above. Without external force, as under prescribed velocities, reactions
+/// take its place; 0 without either.
 /// @note Collective
-template <int D>
-double out_of_balance(const Model<D>& model, const Vector<D>& gravity);
+template <class G>
+double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 
 /// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
 /// @note Collective
-template <int D>
-double critical_time_step(const Model<D>& model);
+template <class G>
+double critical_time_step(const Model<G>& model);
 
 /// The PIC share of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the step:
 /// 1 - (1 - share)^(dt / dt_cr).

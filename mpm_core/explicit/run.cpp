@@ -23,32 +23,31 @@ std::string show(const std::array<double, N>& values)
 
 } // namespace
 
-template <int D>
-std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble)
+template <class G, int D>
+std::string failure_text(const Model<G>& model, const Failure<D>& failure)
 {
   std::ostringstream out;
   out.precision(9);
-  out << "particle " << trouble.particle << " at " << show(trouble.position) << " m with velocity "
-      << show(trouble.velocity) << " m/s ";
-  switch (trouble.kind)
+  out << "particle " << failure.particle << " at " << show(failure.position) << " m with velocity "
+      << show(failure.velocity) << " m/s ";
+  switch (failure.kind)
   {
-  case Trouble<D>::Kind::left_mesh:
+  case Failure<D>::Kind::left_mesh:
     out << "left the background mesh; where the soil is to stay, support it there (model.fix, model.roller), else "
-           "extend the mesh "
-           "or name the facets as outflow";
+           "extend the mesh or name the facets as outflow";
     break;
-  case Trouble<D>::Kind::not_finite:
+  case Failure<D>::Kind::not_finite:
     out << "has a position that is not a number; the step may be too large for the stiffness";
     break;
-  case Trouble<D>::Kind::law_failed:
-  case Trouble<D>::Kind::law_failed_in_parts:
-    out << "follows the law " << law_name(model.laws[static_cast<std::size_t>(trouble.material)]) << " (number "
-        << trouble.material << "), which failed for the strain increment " << show(trouble.strain_increment);
-    if (trouble.kind == Trouble<D>::Kind::law_failed_in_parts)
+  case Failure<D>::Kind::law_failed:
+  case Failure<D>::Kind::law_failed_in_parts:
+    out << "follows the law " << law_name(model.laws[static_cast<std::size_t>(failure.material)]) << " (number "
+        << failure.material << "), which failed for the strain increment " << show(failure.strain_increment);
+    if (failure.kind == Failure<D>::Kind::law_failed_in_parts)
       out << ", also when it was cut into " << most_parts << " parts";
     break;
-  case Trouble<D>::Kind::lost_volume:
-    out << "is in a cell that would lose its volume by the strain increment " << show(trouble.strain_increment);
+  case Failure<D>::Kind::lost_volume:
+    out << "is in a cell that would lose its volume by the strain increment " << show(failure.strain_increment);
     break;
   }
   out << " (in the step after t = " << model.time << " s)";
@@ -57,8 +56,18 @@ std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble)
 
 namespace
 {
-template <int D>
-double next_step(const Model<D>& model, const RunOptions& run, double critical)
+/// @throws InputError integration that the geometry or several velocity fields do not have
+template <class G>
+void require_integration(const Model<G>& model, const ExplicitOptions& options)
+{
+  if (options.integration == Integration::dual_domain && (G::has_hoop || model.fields.size() > 1))
+    throw InputError(
+        "integration is DUAL_DOMAIN, expected PARTICLES or MIXED in axial symmetry and with several velocity "
+        "fields");
+}
+
+template <class G>
+double next_step(const Model<G>& model, const RunOptions& run, double critical)
 {
   if (run.dt && *run.dt > critical * (1 + 1e-12) && !run.allow_unstable)
   {
@@ -74,9 +83,10 @@ double next_step(const Model<D>& model, const RunOptions& run, double critical)
 }
 } // namespace
 
-template <int D>
-std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run)
+template <class G>
+std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const RunOptions& run)
 {
+  require_integration(model, options);
   prepare(model);
   ExplicitOptions of_step = options;
   std::int64_t done = 0;
@@ -91,8 +101,8 @@ std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const
       of_step.pic_share = pic_share_of_step(run.pic, dt, critical);
     }
     explicit_step(model, of_step, dt);
-    if (model.work.trouble)
-      throw RunError(trouble_text(model, *model.work.trouble));
+    if (model.failure)
+      throw RunError(failure_text(model, *model.failure));
     ++done;
   }
   if (run.until - model.time <= closeness)
@@ -104,8 +114,8 @@ namespace
 {
 /// Each particle must be in exactly one cell's sums, and none may have been lost or doubled between ranks.
 /// @throws RunError on all ranks
-template <int D>
-void check_conservation(const Model<D>& model, const Diagnostics& local)
+template <class G, int D = G::dim>
+void check_conservation(const Model<G>& model, const Diagnostics& local)
 {
   const Inventory now = taken_inventory(model);
   std::ostringstream out;
@@ -115,12 +125,13 @@ void check_conservation(const Model<D>& model, const Diagnostics& local)
         << "there were " << model.inventory.particles << " of " << model.inventory.mass << " kg";
   std::array<double, 4> cells{};
   double scale = 0;
-  for (const CellMoments<D>& moments : model.work.moments)
-  {
-    cells[0] += moments.mass;
-    for (int i = 0; i < D; ++i)
-      cells[static_cast<std::size_t>(i) + 1] += moments.momentum[i];
-  }
+  for (const VelocityField<G>& field : model.fields)
+    for (const CellMoments<G>& moments : field.moments)
+    {
+      cells[0] += moments.mass;
+      for (int i = 0; i < D; ++i)
+        cells[static_cast<std::size_t>(i) + 1] += moments.momentum[i];
+    }
   for (Index p = 0; p < model.particles.size(); ++p)
     scale += model.particles.mass[p] * norm<D>(at<D>(model.particles.velocity, p));
   const std::array<double, 4> particles{local.mass, local.momentum[0], local.momentum[1], local.momentum[2]};
@@ -136,8 +147,8 @@ void check_conservation(const Model<D>& model, const Diagnostics& local)
 namespace
 {
 /// What is taken at particles and nodes, of this rank.
-template <int D>
-void take_energies(const Model<D>& model, Diagnostics& d)
+template <class G, int D = G::dim>
+void take_energies(const Model<G>& model, Diagnostics& d)
 {
   const EnergyBook& book = model.energy;
   const ParticleEnergy energy = particle_energy(model);
@@ -147,14 +158,15 @@ void take_energies(const Model<D>& model, Diagnostics& d)
   d.plastic_work = book.stress_work - energy.stored - book.outflow_stored - book.plastic_start;
   d.pic_loss = book.pic_loss;
   d.unexplained_energy = energy_balance(model, energy.kinetic) - book.balance_start;
-  for (Index i : model.work.soil.nodes)
-    if (model.exchange.owned[i])
-      d.nodal_kinetic_energy += 0.5 * model.work.nodes[i].mass * dot<D>(model.work.velocity[i], model.work.velocity[i]);
+  for (const VelocityField<G>& field : model.fields)
+    for (Index i : field.part.nodes)
+      if (model.exchange.owned[i])
+        d.nodal_kinetic_energy += 0.5 * field.nodes[i].mass * dot<D>(field.velocity[i], field.velocity[i]);
 }
 
 /// The works and energies since the balance began, of which the largest says what an unexplained one amounts to.
-template <int D>
-std::array<double, 5> energy_scales(const Model<D>& model, double kinetic, double stored)
+template <class G>
+std::array<double, 5> energy_scales(const Model<G>& model, double kinetic, double stored)
 {
   const EnergyBook& book = model.energy;
   return {std::isnan(stored) ? 0 : stored, model.totals.external_work + model.totals.support_work - book.external_start,
@@ -162,9 +174,10 @@ std::array<double, 5> energy_scales(const Model<D>& model, double kinetic, doubl
 }
 } // namespace
 
-template <int D>
-Diagnostics diagnostics(const Model<D>& model)
+template <class G>
+Diagnostics diagnostics(const Model<G>& model)
 {
+  constexpr int D = G::dim;
   const Particles<D>& particles = model.particles;
   Diagnostics d{};
   d.particles = particles.size();
@@ -175,7 +188,7 @@ Diagnostics diagnostics(const Model<D>& model)
     for (int i = 0; i < D; ++i)
       d.momentum[i] += particles.mass[p] * v[i];
   }
-  if (!model.work.trouble)
+  if (!model.failure)
     check_conservation(model, d);
   d.external_work = model.totals.external_work;
   d.internal_work = model.totals.internal_work;
@@ -195,14 +208,15 @@ Diagnostics diagnostics(const Model<D>& model)
   d.plastic_share = d.particles > 0 ? d.plastic_share / d.particles : 0;
   for (double scale : scales)
     d.energy_scale = std::max(d.energy_scale, std::abs(scale));
-  d.unbalanced_ratio = out_of_balance<D>(model, current_gravity(model));
+  d.unbalanced_ratio = out_of_balance(model, gravity_at(model, model.time));
   return d;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template std::string trouble_text(const Model<D>&, const Trouble<D>&);                                               \
-  template std::int64_t run_explicit(Model<D>&, const ExplicitOptions&, const RunOptions&);                            \
-  template Diagnostics diagnostics(const Model<D>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template std::string failure_text(const Model<G>&, const Failure<G::dim>&);                                          \
+  template std::int64_t run_explicit(Model<G>&, const ExplicitOptions&, const RunOptions&);                            \
+  template Diagnostics diagnostics(const Model<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

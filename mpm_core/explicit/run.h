@@ -25,12 +25,12 @@ inline constexpr std::int64_t control_interval = 32;
 /// @throws InputError `dt` above the critical step (both numbers are given)
 /// @throws RunError a particle left the mesh, a value is not finite, a law failed; with its place; on all ranks alike
 /// @note Collective
-template <int D>
-std::int64_t run_explicit(Model<D>& model, const ExplicitOptions& options, const RunOptions& run);
+template <class G>
+std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const RunOptions& run);
 
 /// What stopped a step of the model, in words.
-template <int D>
-std::string trouble_text(const Model<D>& model, const Trouble<D>& trouble);
+template <class G, int D = G::dim>
+std::string failure_text(const Model<G>& model, const Failure<D>& failure);
 
 /// Where a run stands, summed over ranks. Units SI; energies in J, masses in kg (per metre in plane strain).
 struct Diagnostics
@@ -59,6 +59,6 @@ struct Diagnostics
 
 /// @throws RunError on all ranks: particles, mass or momentum were lost or counted twice
 /// @note Collective
-template <int D>
-Diagnostics diagnostics(const Model<D>& model);
+template <class G>
+Diagnostics diagnostics(const Model<G>& model);
 } // namespace mpm

@@ -9,15 +9,15 @@ namespace mpm
 namespace
 {
 /// P = 1 - sum d d^T of a node's supported directions.
-template <int D>
-Matrix<D> projector(const Model<D>& model, const ImplicitSystem<D>& system, Index node)
+template <class G, int D = G::dim>
+Matrix<D> projector(const Model<G>& model, const ImplicitSystem<D>& system, Index node)
 {
   Matrix<D> p{};
   for (int i = 0; i < D; ++i)
     p[i][i] = 1;
   if (system.support[node] == none)
     return p;
-  const Support<D>& support = model.supports[system.support[node]];
+  const Support<D>& support = model.fields.front().supports[system.support[node]];
   for (int k = 0; k < support.count; ++k)
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
@@ -84,22 +84,35 @@ private:
   std::size_t _next = 0;
 };
 
-/// d f_int of a vertex with gradient g_k / du of one with gradient g_l
-template <int D>
-Matrix<D> cell_block(const CellTangent<D>& tangent, const Vector<D>& g_k, const Vector<D>& g_l)
+/// d f_int of vertex k / du of vertex l of a cell
+template <class G, int D = G::dim>
+Matrix<D> cell_block(const CellTangent<G>& tangent, const CellShape<D>& shape, int k, int l)
 {
   Matrix<D> block{};
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b)
       for (int j = 0; j < D; ++j)
         for (int m = 0; m < D; ++m)
-          block[a][b] += g_k[j] * tangent.by_gradient[symmetric_index<D>(a, j)][b * D + m] * g_l[m];
+          block[a][b] +=
+              shape.gradient[k][j] * tangent.by_gradient[symmetric_index<D>(a, j)][b * D + m] * shape.gradient[l][m];
+  if constexpr (G::has_hoop)
+  {
+    const double hoop = hoop_gradient<G>(shape);
+    const auto& by_hoop = tangent.by_gradient[n_symmetric<D>];
+    for (int a = 0; a < D; ++a) // forces of stresses in the plane, by the hoop strain
+      for (int j = 0; j < D; ++j)
+        block[a][0] += shape.gradient[k][j] * tangent.by_gradient[symmetric_index<D>(a, j)][D * D] * hoop;
+    for (int b = 0; b < D; ++b) // that of the hoop stress, by strains in the plane
+      for (int m = 0; m < D; ++m)
+        block[0][b] += hoop * by_hoop[b * D + m] * shape.gradient[l][m];
+    block[0][0] += hoop * by_hoop[D * D] * hoop;
+  }
   return block;
 }
 
 /// Projectors of a cell's vertices.
-template <int D>
-std::array<Matrix<D>, D + 1> projectors(const Model<D>& model, const ImplicitSystem<D>& system, Index c)
+template <class G, int D = G::dim>
+std::array<Matrix<D>, D + 1> projectors(const Model<G>& model, const ImplicitSystem<D>& system, Index c)
 {
   std::array<Matrix<D>, D + 1> p;
   for (int k = 0; k <= D; ++k)
@@ -115,8 +128,8 @@ std::size_t entries_of_cells(const ImplicitSystem<D>& system, int per_pair)
 }
 
 /// Entries of `add_ghost_entries` over all facets.
-template <int D>
-std::size_t entries_of_ghosts(const ImplicitStep<D>& step)
+template <class G, int D = G::dim>
+std::size_t entries_of_ghosts(const ImplicitStep<G>& step)
 {
   std::size_t rows = 0;
   for (const GhostFacet<D>& facet : step.ghosts)
@@ -126,8 +139,8 @@ std::size_t entries_of_ghosts(const ImplicitStep<D>& step)
 }
 
 /// Rows of the nodes to whose forces this rank adds; the same from both sides of a rank boundary.
-template <int D>
-void add_ghost_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D = G::dim>
+void add_ghost_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                        const GhostFacet<D>& facet, Writer& writer)
 {
   const double factor =
@@ -146,21 +159,20 @@ void add_ghost_entries(const Model<D>& model, const ImplicitStep<D>& step, const
 }
 } // namespace
 
-template <int D>
-void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D>
+void stiffness_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                        CooEntries& entries)
 {
   Writer writer(entries, entries_of_cells(system, D * D) + entries_of_ghosts(step) + system.owned.size() * D * D);
   for (Index c : system.cells)
   {
     const auto& nodes = model.mesh.cells[c];
-    const auto& gradient = model.mesh.shapes[c].gradient;
     const bool held = std::any_of(nodes.begin(), nodes.end(), [&](Index i) { return system.support[i] != none; });
     const auto p = held ? projectors(model, system, c) : std::array<Matrix<D>, D + 1>{};
     for (int k = 0; k <= D; ++k)
       for (int l = 0; l <= D; ++l)
       {
-        const Matrix<D> block = cell_block<D>(step.tangents[c], gradient[k], gradient[l]);
+        const Matrix<D> block = cell_block(step.tangents[c], model.mesh.shapes[c], k, l);
         writer.add_block<D>(system.number[nodes[k]], system.number[nodes[l]],
                             held ? product<D>(p[k], product<D>(block, p[l])) : block);
       }
@@ -181,8 +193,8 @@ void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const
   }
 }
 
-template <int D>
-void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D>
+void volumetric_force_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                               CooEntries& entries)
 {
   Writer writer(entries, entries_of_cells(system, D));
@@ -191,8 +203,7 @@ void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step
     const auto p = projectors(model, system, c);
     for (int k = 0; k <= D; ++k)
     {
-      Vector<D> force =
-          product<D>(p[k], internal_force<D>(step.tangents[c].by_volumetric, model.mesh.shapes[c].gradient[k]));
+      Vector<D> force = product<D>(p[k], internal_force<G>(step.tangents[c].by_volumetric, model.mesh.shapes[c], k));
       for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
         for (int a = 0; a < D; ++a)
           writer.add(D * system.number[model.mesh.cells[c][k]] + a, system.number[model.mesh.cells[c][l]],
@@ -201,40 +212,45 @@ void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step
   }
 }
 
-template <int D>
-void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries)
+template <class G, int D>
+void volumetric_strain_entries(const Model<G>& model, const ImplicitSystem<D>& system, CooEntries& entries)
 {
   Writer writer(entries, entries_of_cells(system, D));
   for (Index c : system.cells)
     for (int k = 0; k <= D; ++k)
     {
       const Index node = model.mesh.cells[c][k];
-      const double weight = integrated_volume(model, c) / model.work.volumetric_strain[node].volume;
+      const double weight =
+          integrated_volume(model.mesh, model.fields.front(), c) / model.fields.front().volumetric_strain[node].volume;
       for (int l = 0; l <= D; ++l)
       {
         const Index other = model.mesh.cells[c][l];
-        const Vector<D> change = product<D>(projector(model, system, other), model.mesh.shapes[c].gradient[l]);
+        Vector<D> volumetric = model.mesh.shapes[c].gradient[l];
+        if constexpr (G::has_hoop)
+          volumetric[0] += hoop_gradient<G>(model.mesh.shapes[c]);
+        const Vector<D> change = product<D>(projector(model, system, other), volumetric);
         for (int b = 0; b < D; ++b)
           writer.add(system.number[node], D * system.number[other] + b, weight * change[b]);
       }
     }
 }
 
-template <int D>
-void mean_stress_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D>
+void mean_stress_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                          CooEntries& by_displacement, CooEntries& by_strain)
 {
   Writer displacement(by_displacement, entries_of_cells(system, D)), strain(by_strain, entries_of_cells(system, 1));
   for (Index c : system.cells)
   {
-    const CellTangent<D>& tangent = step.tangents[c];
+    const CellTangent<G>& tangent = step.tangents[c];
     for (int l = 0; l <= D; ++l)
     {
       const Index other = model.mesh.cells[c][l];
       Vector<D> change{};
+      const auto rows = gradient_rows<G>(model.mesh.shapes[c], l);
       for (int b = 0; b < D; ++b)
-        for (int m = 0; m < D; ++m)
-          change[b] += tangent.mean_by_gradient[b * D + m] * model.mesh.shapes[c].gradient[l][m] / (D + 1);
+        for (int m = 0; m < n_gradient<G>; ++m)
+          change[b] += tangent.mean_by_gradient[m] * rows[b][m] / (D + 1);
       change = product<D>(projector(model, system, other), change);
       for (int k = 0; k <= D; ++k)
       {
@@ -247,13 +263,15 @@ void mean_stress_entries(const Model<D>& model, const ImplicitStep<D>& step, con
   }
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void stiffness_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&, CooEntries&);     \
-  template void volumetric_force_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&,            \
+#define INSTANTIATE(G)                                                                                                 \
+  template void stiffness_entries(const Model<G>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,              \
+                                  CooEntries&);                                                                        \
+  template void volumetric_force_entries(const Model<G>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,       \
                                          CooEntries&);                                                                 \
-  template void volumetric_strain_entries(const Model<D>&, const ImplicitSystem<D>&, CooEntries&);                     \
-  template void mean_stress_entries(const Model<D>&, const ImplicitStep<D>&, const ImplicitSystem<D>&, CooEntries&,    \
-                                    CooEntries&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+  template void volumetric_strain_entries(const Model<G>&, const ImplicitSystem<G::dim>&, CooEntries&);                \
+  template void mean_stress_entries(const Model<G>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,            \
+                                    CooEntries&, CooEntries&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -14,11 +14,11 @@ struct CellContents
   double shear; ///< integral of the shear modulus over the filled volume
 };
 
-template <int D>
-std::vector<CellContents> cell_contents(const Model<D>& model, const Halo& cells)
+template <class G, int D = G::dim>
+std::vector<CellContents> cell_contents(const Model<G>& model, const Halo& cells)
 {
   std::vector<CellContents> contents(model.mesh.cells.size(), CellContents{});
-  for (const Run& run : model.work.runs)
+  for (const Run& run : model.order.runs)
   {
     const double shear = shear_modulus(model.laws[run.material]);
     for (Index p = run.first; p < run.last; ++p)
@@ -76,27 +76,28 @@ GhostFacet<D> outer_facet(const Mesh<D>& mesh, Index cell, int k)
 }
 
 /// Weights of a facet of cell c, opposite to vertex k; h is the mean of both altitudes over it.
-template <int D>
+template <class G, int D = G::dim>
 void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const CellContents& both,
                  const GhostOptions& options, GhostFacet<D>& facet)
 {
   // |grad N_k| is one over the altitude, so the facet's measure is D times the volume times that.
-  const double area = D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
+  // In axial symmetry both are those of one radian, at the cell's radius.
+  const double area = D * cell_volume<G>(mesh.shapes[c]) * norm<D>(mesh.shapes[c].gradient[k]);
   const double h = D * volumes / (2 * area);
   facet.stiffness = options.stiffness * both.shear / both.volume * h * area;
   facet.mass = options.mass * both.mass / both.volume * h * h * h * area;
 }
 } // namespace
 
-template <int D>
-std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos& halos, const GhostOptions& options)
+template <class G, int D>
+std::vector<GhostFacet<D>> find_ghost_facets(const Model<G>& model, const Halos& halos, const GhostOptions& options)
 {
   std::vector<GhostFacet<D>> facets;
   if (options.filled == 0)
     return facets;
   const Mesh<D>& mesh = model.mesh;
   const auto contents = cell_contents(model, halos.cells);
-  const auto bad = [&](Index c) { return contents[c].volume < options.filled * mesh.shapes[c].volume; };
+  const auto bad = [&](Index c) { return contents[c].volume < options.filled * cell_volume<G>(mesh.shapes[c]); };
   const auto filled = [&](Index c) { return c != none && contents[c].volume > 0; };
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
@@ -109,7 +110,7 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos&
       if (lone)
       {
         GhostFacet<D> facet = outer_facet(mesh, c, k);
-        set_weights(mesh, c, k, mesh.shapes[c].volume, contents[c], options, facet);
+        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]), contents[c], options, facet);
         facets.push_back(facet);
       }
       // Each facet once: from the lower of two owned cells, and from the owned cell where the other is a ghost.
@@ -118,7 +119,8 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos&
         GhostFacet<D> facet = facet_between(mesh, c, k, other);
         const CellContents both{contents[c].volume + contents[other].volume, contents[c].mass + contents[other].mass,
                                 contents[c].shear + contents[other].shear};
-        set_weights(mesh, c, k, mesh.shapes[c].volume + mesh.shapes[other].volume, both, options, facet);
+        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]) + cell_volume<G>(mesh.shapes[other]), both, options,
+                       facet);
         facets.push_back(facet);
       }
     }
@@ -126,6 +128,7 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos&
   return facets;
 }
 
-template std::vector<GhostFacet<2>> find_ghost_facets(const Model<2>&, const Halos&, const GhostOptions&);
-template std::vector<GhostFacet<3>> find_ghost_facets(const Model<3>&, const Halos&, const GhostOptions&);
+template std::vector<GhostFacet<2>> find_ghost_facets(const Model<PlaneStrain>&, const Halos&, const GhostOptions&);
+template std::vector<GhostFacet<2>> find_ghost_facets(const Model<Axisymmetric>&, const Halos&, const GhostOptions&);
+template std::vector<GhostFacet<3>> find_ghost_facets(const Model<Solid>&, const Halos&, const GhostOptions&);
 } // namespace mpm

@@ -40,8 +40,8 @@ struct GhostFacet
 
 /// The stabilised facets of this rank's owned cells.
 /// @note Collective over neighbours
-template <int D>
-std::vector<GhostFacet<D>> find_ghost_facets(const Model<D>& model, const Halos& halos, const GhostOptions& options);
+template <class G, int D = G::dim>
+std::vector<GhostFacet<D>> find_ghost_facets(const Model<G>& model, const Halos& halos, const GhostOptions& options);
 
 /// Jump over a facet of a nodal field, a callable Index -> Vector<D>
 template <int D, class Nodal>

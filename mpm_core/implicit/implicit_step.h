@@ -26,6 +26,8 @@
 #include "implicit/inertia.h"
 #include "transfer/cell_strain.h"
 
+#include <limits>
+
 namespace mpm
 {
 struct ImplicitOptions
@@ -43,17 +45,34 @@ struct ImplicitOptions
   double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 
-/// Derivatives of sum V sigma over the particles of a cell, without zz in plane strain.
-template <int D>
+/// Entries of a cell's gradient: du_b/dx_m at b * D + m, then the hoop strain in axial symmetry.
+template <class G>
+inline constexpr int n_gradient = G::dim* G::dim + (G::has_hoop ? 1 : 0);
+
+/// Derivatives of the gradient's entries by the displacement of vertex l of a cell, one row per component.
+template <class G, int D = G::dim>
+std::array<std::array<double, n_gradient<G>>, D> gradient_rows(const CellShape<D>& shape, int l)
+{
+  std::array<std::array<double, n_gradient<G>>, D> rows{};
+  for (int b = 0; b < D; ++b)
+    for (int m = 0; m < D; ++m)
+      rows[b][b * D + m] = shape.gradient[l][m];
+  if constexpr (G::has_hoop)
+    rows[0][D * D] = hoop_gradient<G>(shape);
+  return rows;
+}
+
+/// Derivatives of sum V sigma over the particles of a cell.
+template <class G>
 struct CellTangent
 {
-  /// by du_b/dx_m, entry b * D + m; with nodal mixed discretisation at constant volumetric strain
-  std::array<std::array<double, D * D>, n_symmetric<D>> by_gradient;
+  /// by the entries of the gradient; with nodal mixed discretisation at constant volumetric strain
+  std::array<std::array<double, n_gradient<G>>, G::n_working> by_gradient;
   /// by the averaged volumetric strain; zero without nodal mixed discretisation
-  std::array<double, n_symmetric<D>> by_volumetric;
-  /// Where mean stresses are averaged: of the mean of the normal components in the plane, which the above are then
+  Working<G> by_volumetric;
+  /// Where mean stresses are averaged: of the mean of the normal components, which the above are then
   /// without
-  std::array<double, D * D> mean_by_gradient;
+  std::array<double, n_gradient<G>> mean_by_gradient;
   double mean_by_volumetric;
 };
 
@@ -93,33 +112,33 @@ struct Stage
   std::vector<MeanForces<D>> before; ///< forces of the stages before, weighted; likewise
 };
 
-/// A step under way. The iterate is `work.velocity` of the model, f_int is in `work.nodes` too.
-template <int D>
+/// A step under way. The iterate is `velocity` of the velocity field, f_int is in its `nodes` too.
+template <class G, int D = G::dim>
 struct ImplicitStep
 {
   ImplicitOptions options;
   double length = 0; ///< of the whole step [s]
   double dt = 0;     ///< from the step's start to the end of the stage [s]
   Stage<D> stage;
-  std::vector<Vector<D>> external;                        ///< f_ext at the step's end
-  std::vector<Vector<D>> residual;                        ///< zero along supported directions
-  std::vector<std::array<double, n_symmetric<D>>> stress; ///< sum V sigma of each owned cell in the trial
-  /// Sum V dsigma/dstrain of each owned cell, without zz in plane strain; engineering shear
-  std::vector<std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>> stiffness;
+  std::vector<Vector<D>> external; ///< f_ext at the step's end
+  std::vector<Vector<D>> residual; ///< zero along supported directions
+  std::vector<Working<G>> stress;  ///< sum V sigma of each owned cell in the trial
+  /// Sum V dsigma/dstrain of each owned cell, of the components that do work; engineering shear
+  std::vector<std::array<Working<G>, G::n_working>> stiffness;
   std::vector<CellStrain<D>> strains;   ///< of each owned cell that is filled, in the trial
-  std::vector<CellTangent<D>> tangents; ///< of each owned cell
+  std::vector<CellTangent<G>> tangents; ///< of each owned cell
   std::vector<TrialForces<D>> forces;
   std::vector<GhostFacet<D>> ghosts; ///< stabilised facets
   Halos halos;                       ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
-  std::optional<Trouble<D>> trouble; ///< of the last trial, where it failed
+  std::optional<Failure<D>> failure; ///< of the last trial, where it failed
   std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
 
 /// Duration that laws are given [s]
-template <int D>
-double law_dt(const ImplicitStep<D>& step)
+template <class G>
+double law_dt(const ImplicitStep<G>& step)
 {
   return step.options.at_rest ? std::numeric_limits<double>::infinity() : step.dt;
 }
@@ -127,51 +146,52 @@ double law_dt(const ImplicitStep<D>& step)
 /// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under
 /// the supports, as first iterate.
 /// @note Collective
-template <int D>
-void start_step(Model<D>& model, ImplicitStep<D>& step, const ImplicitOptions& options, double dt);
+template <class G, int D = G::dim>
+void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& options, double dt);
 
 /// Begins the second stage of a step of second order, after the first one has been solved.
 /// @pre `find_residual` was called for the solution of the first stage
-template <int D>
-void start_second_stage(Model<D>& model, ImplicitStep<D>& step);
+template <class G, int D = G::dim>
+void start_second_stage(Model<G>& model, ImplicitStep<G>& step);
 
 /// Velocity at the end of the stage for the iterate.
-template <int D>
-inline double end_velocity(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component)
+template <class G, int D = G::dim>
+inline double end_velocity(const Model<G>& model, const ImplicitStep<G>& step, Index node, int component)
 {
   const Stage<D>& stage = step.stage;
   const double carried = stage.carried.empty() ? 0 : stage.carried[node][component];
-  return (model.work.velocity[node][component] - carried) / stage.weight;
+  return (model.fields.front().velocity[node][component] - carried) / stage.weight;
 }
 
 /// Inertia force of one component of a node, damping in it, and its derivative by the iterate; none in a quasi-static
 /// step.
-template <int D>
-Inertia inertia_force(const Model<D>& model, const ImplicitStep<D>& step, Index node, int component);
+template <class G, int D = G::dim>
+Inertia inertia_force(const Model<G>& model, const ImplicitStep<G>& step, Index node, int component);
 
 /// The same for given velocities at start and end of the stage.
-template <int D>
-Inertia stage_inertia(const Model<D>& model, const ImplicitStep<D>& step, Index node, double start, double end);
+template <class G, int D = G::dim>
+Inertia stage_inertia(const Model<G>& model, const ImplicitStep<G>& step, Index node, double start, double end);
 
 /// What a solved step of second order differs by from one of first order, u2 - dt v1 = g dt (v2 - v1): root mean square
 /// over the mass [m]. An estimate of the error of the displacement of a step that errs on the safe side.
 /// @note Collective
-template <int D>
-double displacement_error(const Model<D>& model, const ImplicitStep<D>& step);
+template <class G, int D = G::dim>
+double displacement_error(const Model<G>& model, const ImplicitStep<G>& step);
 
 /// Makes the iterate satisfy the supports.
-template <int D>
-void impose_supports(Model<D>& model, const ImplicitStep<D>& step);
+template <class G, int D = G::dim>
+void impose_supports(Model<G>& model, const ImplicitStep<G>& step);
 
-/// Residual of the iterate `work.velocity`, and the tangents of the cells when wanted.
+/// Residual of the iterate `field.velocity`, and the tangents of the cells when wanted.
 /// @note Collective
-template <int D>
-TrialReport find_residual(Model<D>& model, ImplicitStep<D>& step, bool tangents);
+template <class G, int D = G::dim>
+TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents);
 
 /// Ends the step with the iterate: moves and strains the particles, adds to the totals.
 /// @pre `find_residual` was called for the iterate, so that the work of its forces is known
-/// @returns whether it could; otherwise `work.trouble` says why, and the particles are as they were at the step's start
+/// @returns whether it could; otherwise `model.failure` says why, and the particles are as they were at the step's
+/// start
 /// @note Collective
-template <int D>
-bool finish_step(Model<D>& model, const ImplicitStep<D>& step);
+template <class G, int D = G::dim>
+bool finish_step(Model<G>& model, const ImplicitStep<G>& step);
 } // namespace mpm

@@ -4,11 +4,11 @@
 
 namespace mpm
 {
-template <int D>
-std::vector<double> shear_frequencies(Model<D>& model)
+template <class G, int D>
+std::vector<double> shear_frequencies(Model<G>& model)
 {
   std::vector<double> stiffness(model.mesh.points.size(), 0.0);
-  for (const Run& run : model.work.runs)
+  for (const Run& run : model.order.runs)
   {
     double volume = 0;
     for (Index p = run.first; p < run.last; ++p)
@@ -23,11 +23,12 @@ std::vector<double> shear_frequencies(Model<D>& model)
   sum_shared(model.exchange, stiffness.data(), 1);
   std::vector<double> frequency(stiffness.size(), 0.0);
   for (std::size_t i = 0; i < frequency.size(); ++i)
-    if (model.work.nodes[i].mass > 0)
-      frequency[i] = std::sqrt(stiffness[i] / model.work.nodes[i].mass);
+    if (model.fields.front().nodes[i].mass > 0)
+      frequency[i] = std::sqrt(stiffness[i] / model.fields.front().nodes[i].mass);
   return frequency;
 }
 
-template std::vector<double> shear_frequencies(Model<2>&);
-template std::vector<double> shear_frequencies(Model<3>&);
+template std::vector<double> shear_frequencies(Model<PlaneStrain>&);
+template std::vector<double> shear_frequencies(Model<Axisymmetric>&);
+template std::vector<double> shear_frequencies(Model<Solid>&);
 } // namespace mpm

@@ -70,6 +70,6 @@ inline double left_by_second_order(double x)
 /// m). The yielding soil slides by shear, and of the oscillations at the mesh's scale those in shear are slowest.
 /// @pre the nodes' masses are known
 /// @note Collective
-template <int D>
-std::vector<double> shear_frequencies(Model<D>& model);
+template <class G, int D = G::dim>
+std::vector<double> shear_frequencies(Model<G>& model);
 } // namespace mpm

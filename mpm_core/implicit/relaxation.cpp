@@ -14,7 +14,7 @@ constexpr double local_damping_share = 0.8; ///< beta, the customary value in FL
 
 /// Largest sum over a row of vertex k of |elastic stiffness of a whole cell|, and of the part that turns its stress
 /// [N/m]
-template <int D>
+template <class G, int D = G::dim>
 double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& moduli, double stress)
 {
   double largest = 0;
@@ -26,21 +26,25 @@ double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& modu
       const double product = dot<D>(shape.gradient[k], shape.gradient[l]);
       sum += 2 * stress * norm<D>(shape.gradient[k]) * norm<D>(shape.gradient[l]);
       for (int b = 0; b < D; ++b)
-        sum += std::abs(moduli.lambda * shape.gradient[k][a] * shape.gradient[l][b] +
-                        moduli.shear * (shape.gradient[k][b] * shape.gradient[l][a] + (a == b ? product : 0)));
+      {
+        const double hoop_k = a == 0 ? hoop_gradient<G>(shape) : 0, hoop_l = b == 0 ? hoop_gradient<G>(shape) : 0;
+        sum += std::abs(moduli.lambda * (shape.gradient[k][a] + hoop_k) * (shape.gradient[l][b] + hoop_l) +
+                        moduli.shear * (shape.gradient[k][b] * shape.gradient[l][a] + (a == b ? product : 0) +
+                                        2 * hoop_k * hoop_l));
+      }
     }
     largest = std::max(largest, sum);
   }
-  return shape.volume * largest;
+  return cell_volume<G>(shape) * largest;
 }
 
 /// Bound on the rows of |J| = |dr/dv| at each node [N s/m].
-template <int D>
-std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
+template <class G, int D = G::dim>
+std::vector<double> tangent_rows(Model<G>& model, const ImplicitStep<G>& step)
 {
   std::vector<double> rows(model.mesh.points.size(), 0.0),
       cell(static_cast<std::size_t>(model.mesh.owned_cells) * (D + 1), 0.0);
-  for (const Run& run : model.work.runs)
+  for (const Run& run : model.order.runs)
   {
     double stress = 0, filled = 0;
     for (Index p = run.first; p < run.last; ++p)
@@ -52,11 +56,11 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
     const double shear = shear_modulus(model.laws[run.material]);
     const ElasticModuli moduli{p_wave_modulus(model.laws[run.material]) - 2 * shear, shear};
     const CellShape<D>& shape = model.mesh.shapes[run.cell];
-    const double overfull = std::max(1.0, model.work.moments[run.cell].volume / shape.volume);
+    const double overfull = std::max(1.0, model.fields.front().moments[run.cell].volume / cell_volume<G>(shape));
     for (int k = 0; k <= D; ++k)
     {
       double& row = cell[static_cast<std::size_t>(run.cell) * (D + 1) + static_cast<std::size_t>(k)];
-      row = std::max(row, overfull * stiffness_row<D>(shape, k, moduli, stress));
+      row = std::max(row, overfull * stiffness_row<G>(shape, k, moduli, stress));
     }
   }
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
@@ -75,9 +79,8 @@ std::vector<double> tangent_rows(Model<D>& model, const ImplicitStep<D>& step)
   }
   sum_shared(model.exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] += step.options.quasi_static
-                   ? 0
-                   : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
+    rows[i] += step.options.quasi_static ? 0
+                                         : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
   return rows;
 }
 
@@ -99,8 +102,8 @@ constexpr double mass_share(RelaxationKind kind)
 }
 
 /// Sum over all nodes, each counted once.
-template <int D, class F>
-double nodal_sum(const Model<D>& model, F&& term)
+template <class G, class F>
+double nodal_sum(const Model<G>& model, F&& term)
 {
   double sum = 0;
   for (std::size_t i = 0; i < model.mesh.points.size(); ++i)
@@ -112,8 +115,8 @@ double nodal_sum(const Model<D>& model, F&& term)
 
 /// c of Underwood (1983), critical for the mode that the iteration moves in: 2 sqrt(w J w / w M w), J w from the last
 /// change of r.
-template <int D>
-double critical_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
+template <class G, int D = G::dim>
+double critical_damping(const Model<G>& model, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
 {
   const double stiffness = nodal_sum(model,
                                      [&](std::size_t i)
@@ -130,8 +133,8 @@ double critical_damping(const Model<D>& model, const ImplicitStep<D>& step, cons
 
 /// Damping of the kind in the next iteration. Kinetic: 1 where the body has passed a peak of its kinetic energy, as the
 /// power of the residual says, else 0.
-template <int D>
-double next_damping(const Model<D>& model, const ImplicitStep<D>& step, const Relaxation<D>& relaxation)
+template <class G, int D = G::dim>
+double next_damping(const Model<G>& model, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
 {
   switch (relaxation.kind)
   {
@@ -172,8 +175,8 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
 
 } // namespace
 
-template <int D>
-Relaxation<D> start_relaxation(Model<D>& model, ImplicitStep<D>& step, RelaxationKind kind)
+template <class G, int D>
+Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, RelaxationKind kind)
 {
   Relaxation<D> relaxation{kind, tangent_rows(model, step), {}, {}, {}};
   for (double& mass : relaxation.mass)
@@ -184,8 +187,8 @@ Relaxation<D> start_relaxation(Model<D>& model, ImplicitStep<D>& step, Relaxatio
   return relaxation;
 }
 
-template <int D>
-int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, double tolerance, int most)
+template <class G, int D>
+int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, double tolerance, int most)
 {
   int done = 0;
   while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale &&
@@ -199,7 +202,7 @@ int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, dou
       relaxation.rate[i] =
           next_rate<D>(relaxation.kind, relaxation.rate[i], step.residual[i], relaxation.mass[i], damping);
       for (int a = 0; a < D; ++a)
-        model.work.velocity[i][a] += relaxation.rate[i][a];
+        model.fields.front().velocity[i][a] += relaxation.rate[i][a];
     }
     impose_supports(model, step);
     relaxation.last = step.residual;
@@ -209,9 +212,10 @@ int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, dou
   return done;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template Relaxation<D> start_relaxation(Model<D>&, ImplicitStep<D>&, RelaxationKind);                                \
-  template int relax(Model<D>&, ImplicitStep<D>&, Relaxation<D>&, double, int);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template Relaxation<G::dim> start_relaxation(Model<G>&, ImplicitStep<G>&, RelaxationKind);                           \
+  template int relax(Model<G>&, ImplicitStep<G>&, Relaxation<G::dim>&, double, int);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -42,13 +42,13 @@ struct Relaxation
 
 /// Begins at the step's present iterate.
 /// @note Collective
-template <int D>
-Relaxation<D> start_relaxation(Model<D>& model, ImplicitStep<D>& step, RelaxationKind kind);
+template <class G, int D = G::dim>
+Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, RelaxationKind kind);
 
 /// Iterates until |r| is not above `tolerance` times the scale of the forces, a trial fails, or `most` iterations are
 /// done.
 /// @returns iterations done
 /// @note Collective
-template <int D>
-int relax(Model<D>& model, ImplicitStep<D>& step, Relaxation<D>& relaxation, double tolerance, int most);
+template <class G, int D = G::dim>
+int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, double tolerance, int most);
 } // namespace mpm

@@ -8,19 +8,19 @@ namespace mpm
 {
 namespace
 {
-template <int D>
-std::vector<Index> filled_cells(const Model<D>& model)
+template <class G, int D = G::dim>
+std::vector<Index> filled_cells(const Model<G>& model)
 {
   std::vector<Index> cells;
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
-    if (model.work.moments[c].volume > 0)
+    if (model.fields.front().moments[c].volume > 0)
       cells.push_back(c);
   return cells;
 }
 } // namespace
 
-template <int D>
-bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D>& system)
+template <class G, int D>
+bool number_nodes(Model<G>& model, const ImplicitStep<G>& step, ImplicitSystem<D>& system)
 {
   NodeExchange& exchange = model.exchange;
   const Index n = model.mesh.n_nodes();
@@ -39,7 +39,7 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
   std::vector<std::array<double, 2>> sums(static_cast<std::size_t>(n)); // number, stiffness; whole numbers are exact
   for (std::size_t k = 0; k < owned.size(); ++k)
     sums[owned[k]][0] = static_cast<double>(rows.before + static_cast<GlobalIndex>(k));
-  for (const Run& run : model.work.runs)
+  for (const Run& run : model.order.runs)
   {
     double volume = 0;
     for (Index p = run.first; p < run.last; ++p)
@@ -64,8 +64,8 @@ bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D
     system.diagonal[i] = sums[i][1];
   }
   system.support.assign(sums.size(), none);
-  for (std::size_t s = 0; s < model.supports.size(); ++s)
-    system.support[model.supports[s].node] = static_cast<Index>(s);
+  for (std::size_t s = 0; s < model.fields.front().supports.size(); ++s)
+    system.support[model.fields.front().supports[s].node] = static_cast<Index>(s);
   return changed;
 }
 
@@ -89,8 +89,10 @@ void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::spa
   sum_shared(exchange, nodal);
 }
 
+template bool number_nodes(Model<PlaneStrain>&, const ImplicitStep<PlaneStrain>&, ImplicitSystem<2>&);
+template bool number_nodes(Model<Axisymmetric>&, const ImplicitStep<Axisymmetric>&, ImplicitSystem<2>&);
+template bool number_nodes(Model<Solid>&, const ImplicitStep<Solid>&, ImplicitSystem<3>&);
 #define INSTANTIATE(D)                                                                                                 \
-  template bool number_nodes(Model<D>&, const ImplicitStep<D>&, ImplicitSystem<D>&);                                   \
   template std::vector<double> owned_values<D>(const ImplicitSystem<D>&, std::span<const Vector<D>>);                  \
   template void set_nodal<D>(NodeExchange&, const ImplicitSystem<D>&, std::span<const double>, std::span<Vector<D>>);
 INSTANTIATE(2)

@@ -32,31 +32,31 @@ struct CooEntries
 /// Numbers the active nodes of the step: consecutive on each rank.
 /// @returns whether nodes or cells differ on any rank from what the system had before
 /// @note Collective
-template <int D>
-bool number_nodes(Model<D>& model, const ImplicitStep<D>& step, ImplicitSystem<D>& system);
+template <class G, int D = G::dim>
+bool number_nodes(Model<G>& model, const ImplicitStep<G>& step, ImplicitSystem<D>& system);
 
 /// J = d (f_int + inertia) / du; with nodal mixed discretisation at constant averaged volumetric strain.
 /// @pre the step's tangents belong to the iterate
 /// @post the order of the entries is always the same for the same system; rows and columns are filled when they are
 /// empty
-template <int D>
-void stiffness_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D = G::dim>
+void stiffness_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                        CooEntries& entries);
 
 /// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes,
 /// ...
-template <int D>
-void volumetric_force_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D = G::dim>
+void volumetric_force_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                               CooEntries& entries);
 
 /// ... and G = d theta / du, the nodes' averaged volumetric strain; the product has the two-ring stencil.
-template <int D>
-void volumetric_strain_entries(const Model<D>& model, const ImplicitSystem<D>& system, CooEntries& entries);
+template <class G, int D = G::dim>
+void volumetric_strain_entries(const Model<G>& model, const ImplicitSystem<D>& system, CooEntries& entries);
 
 /// Where mean stresses are averaged as well, J gains G^T (L + H G), with these L = d q / du and H = d q / d theta: q_i
 /// is what the nodes' averaged volumetric strains work against, the cells' means of V sigma, shared among their nodes.
-template <int D>
-void mean_stress_entries(const Model<D>& model, const ImplicitStep<D>& step, const ImplicitSystem<D>& system,
+template <class G, int D = G::dim>
+void mean_stress_entries(const Model<G>& model, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                          CooEntries& by_displacement, CooEntries& by_strain);
 
 /// Vectors at this rank's nodes of the system, one after the other.

@@ -55,25 +55,29 @@ Symmetric<D> turned_by(const Matrix<D>& omega, const Symmetric<D>& s)
   return turned;
 }
 
-/// Adds what the turn of the stress changes in the tangent of a cell.
+/// Adds what the rotation of the stress changes in the tangent of a cell.
 ///
 /// A law that knows no directions gives sigma(R s R^T, e) = R sigma(s, R^T e R) R^T for the start's stress s. So when R
-/// turns by Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega).
-template <int D>
-void add_spin(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
-              const CellStrain<D>& strain, CellTangent<D>& tangent)
+/// turns by Omega while the strain e stays, sigma changes by Omega sigma - sigma Omega - C : (Omega e - e Omega). The
+/// hoop stays what it is.
+template <class G, int D = G::dim>
+void add_spin(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress, const CellStrain<D>& strain,
+              CellTangent<G>& tangent)
 {
-  Symmetric<D> e; // as a tensor
+  Symmetric<D> e, s; // as a tensor; without the hoop
   for (int k = 0; k < n_symmetric<D>; ++k)
-    e[k] = strain.increment[stress_component<D>[k]] * (k < D ? 1.0 : 0.5);
-  const auto spin = spins<D>(strain.rotation);
-  for (std::size_t s = 0; s < spin.size(); ++s)
   {
-    const Symmetric<D> stress_turned = turned_by<D>(spin[s], stress), strain_turned = turned_by<D>(spin[s], e);
-    const auto [b, m] = spin_pairs<D>[s];
-    for (int k = 0; k < n_symmetric<D>; ++k)
+    e[k] = strain.increment[stress_component<D>[k]] * (k < D ? 1.0 : 0.5);
+    s[k] = stress[k];
+  }
+  const auto spin = spins<D>(strain.rotation);
+  for (std::size_t axis = 0; axis < spin.size(); ++axis)
+  {
+    const Symmetric<D> stress_turned = turned_by<D>(spin[axis], s), strain_turned = turned_by<D>(spin[axis], e);
+    const auto [b, m] = spin_pairs<D>[axis];
+    for (int k = 0; k < G::n_working; ++k)
     {
-      double change = stress_turned[k];
+      double change = k < n_symmetric<D> ? stress_turned[k] : 0;
       for (int j = 0; j < n_symmetric<D>; ++j)
         change -= c[k][j] * strain_turned[j] * (j < D ? 1.0 : 2.0);
       tangent.by_gradient[k][b * D + m] += change;
@@ -82,69 +86,81 @@ void add_spin(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric
   }
 }
 
-/// Splits the mean of the normal components in the plane off a column of the tangent.
-template <int D>
-double split_mean(std::array<double*, D> normal)
+/// Entry of the gradient that is the normal strain along axis a; the one after the last axis is the hoop.
+template <class G>
+constexpr int normal_entry(int a)
+{
+  return a < G::dim ? a * G::dim + a : G::dim * G::dim;
+}
+
+/// Splits the mean of the normal components off a column of the tangent.
+template <class G>
+double split_mean(std::array<double*, G::n_normal> normal)
 {
   double mean = 0;
   for (const double* component : normal)
-    mean += *component / D;
+    mean += *component / G::n_normal;
   for (double* component : normal)
     *component -= mean;
   return mean;
 }
 
 /// Volumetric strains are averaged: they count by themselves, not in the gradient.
-template <int D>
-void split_volumetric(const std::array<Symmetric<D>, n_symmetric<D>>& c, CellTangent<D>& tangent)
+template <class G>
+void split_volumetric(const std::array<Working<G>, G::n_working>& c, CellTangent<G>& tangent)
 {
-  for (int k = 0; k < n_symmetric<D>; ++k)
+  for (int k = 0; k < G::n_working; ++k)
   {
-    for (int j = 0; j < D; ++j)
-      tangent.by_volumetric[k] += c[k][j] / D;
-    for (int j = 0; j < D; ++j)
-      tangent.by_gradient[k][j * D + j] -= tangent.by_volumetric[k];
+    for (int j : normal_component<G>)
+      tangent.by_volumetric[k] += c[k][j] / G::n_normal;
+    for (int a = 0; a < G::n_normal; ++a)
+      tangent.by_gradient[k][normal_entry<G>(a)] -= tangent.by_volumetric[k];
   }
 }
 
 /// So do mean stresses.
-template <int D>
-void split_mean_stress(CellTangent<D>& tangent)
+template <class G>
+void split_mean_stress(CellTangent<G>& tangent)
 {
-  std::array<double*, D> normal;
-  for (int m = 0; m < D * D; ++m)
+  std::array<double*, G::n_normal> normal;
+  for (int m = 0; m < n_gradient<G>; ++m)
   {
-    for (int k = 0; k < D; ++k)
-      normal[k] = &tangent.by_gradient[k][m];
-    tangent.mean_by_gradient[m] = split_mean<D>(normal);
+    for (int a = 0; a < G::n_normal; ++a)
+      normal[a] = &tangent.by_gradient[normal_component<G>[a]][m];
+    tangent.mean_by_gradient[m] = split_mean<G>(normal);
   }
-  for (int k = 0; k < D; ++k)
-    normal[k] = &tangent.by_volumetric[k];
-  tangent.mean_by_volumetric = split_mean<D>(normal);
+  for (int a = 0; a < G::n_normal; ++a)
+    normal[a] = &tangent.by_volumetric[normal_component<G>[a]];
+  tangent.mean_by_volumetric = split_mean<G>(normal);
 }
 } // namespace
 
-template <int D>
-CellTangent<D> cell_tangent(const std::array<Symmetric<D>, n_symmetric<D>>& c, const Symmetric<D>& stress,
+template <class G, int D>
+CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
                             const CellStrain<D>& strain, const ImplicitOptions& options)
 {
-  CellTangent<D> tangent{};
-  for (int k = 0; k < n_symmetric<D>; ++k)
+  CellTangent<G> tangent{};
+  for (int k = 0; k < G::n_working; ++k)
+  {
     for (int b = 0; b < D; ++b)
       for (int m = 0; m < D; ++m)
         tangent.by_gradient[k][b * D + m] = c[k][symmetric_index<D>(b, m)];
+    if constexpr (G::has_hoop)
+      tangent.by_gradient[k][D * D] = c[k][n_symmetric<D>];
+  }
   if (!options.hold_positions)
-    add_spin<D>(c, stress, strain, tangent);
+    add_spin(c, stress, strain, tangent);
   if (options.mixed_discretisation)
-    split_volumetric<D>(c, tangent);
+    split_volumetric(c, tangent);
   if (options.average_stress)
-    split_mean_stress<D>(tangent);
+    split_mean_stress(tangent);
   return tangent;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template CellTangent<D> cell_tangent<D>(const std::array<Symmetric<D>, n_symmetric<D>>&, const Symmetric<D>&,        \
-                                          const CellStrain<D>&, const ImplicitOptions&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>&, const Working<G>&,                 \
+                                       const CellStrain<G::dim>&, const ImplicitOptions&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

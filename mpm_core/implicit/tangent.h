@@ -7,11 +7,10 @@
 
 namespace mpm
 {
-/// @param c       sum V dsigma/dstrain over the cell's particles, without zz in plane strain
+/// @param c       sum V dsigma/dstrain over the cell's particles, of the components that do work
 /// @param stress  sum V sigma at the increment's end
 /// @param strain  strain and rotation of the increment
-template <int D>
-CellTangent<D> cell_tangent(const std::array<std::array<double, n_symmetric<D>>, n_symmetric<D>>& c,
-                            const std::array<double, n_symmetric<D>>& stress, const CellStrain<D>& strain,
-                            const ImplicitOptions& options);
+template <class G, int D = G::dim>
+CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
+                            const CellStrain<D>& strain, const ImplicitOptions& options);
 } // namespace mpm

@@ -37,9 +37,6 @@ struct TrialScratch
   LawIncrement<D> increment;
 };
 
-template <int D>
-using Symmetric = std::array<double, n_symmetric<D>>;
-
 /// Volume of a cell after a displacement, relative to that before: det(1 + grad u).
 template <int D>
 double growth(const Matrix<D>& velocity_gradient, double dt)
@@ -55,14 +52,22 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
            f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
 }
 
-template <int D>
-TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, Index cell)
+template <class G, int D = G::dim>
+TrialStrain<D> cell_strain(const Model<G>& model, const ImplicitStep<G>& step, Index cell)
 {
-  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
-  const Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
+  const auto velocity = [&](Index i) -> const Vector<D>& { return model.fields.front().velocity[i]; };
+  const AffineField<D> in_cell = affine_field<D>(model.mesh, cell, velocity);
+  const Matrix<D>& gradient = in_cell.gradient;
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
+  double hoop = 0;
+  if constexpr (G::has_hoop)
+  {
+    hoop = step.dt * in_cell.value[0] / model.mesh.shapes[cell].centre[0];
+    add_hoop(strain, hoop);
+  }
   if (step.options.mixed_discretisation)
-    set_volumetric(strain, mean_volumetric_strain<D>(model.mesh.cells[cell], model.work.volumetric_strain));
+    set_volumetric<G>(strain,
+                      mean_volumetric_strain<D>(model.mesh.cells[cell], model.fields.front().volumetric_strain));
   if (step.options.hold_positions)
   {
     make_small<D>(strain);
@@ -73,12 +78,12 @@ TrialStrain<D> cell_strain(const Model<D>& model, const ImplicitStep<D>& step, I
     for (double& entry : row)
       entry *= step.dt;
   return {displacement_gradient, strain,
-          growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
+          (1 + hoop) * growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
 }
 
 /// Copies a batch's stresses and states to the scratch.
-template <int D>
-void load_batch(const Model<D>& model, const Batch& batch, TrialScratch<D>& scratch)
+template <class G, int D = G::dim>
+void load_batch(const Model<G>& model, const Batch& batch, TrialScratch<D>& scratch)
 {
   const Index size = batch.last - batch.first;
   for (int k = 0; k < n_stress<D>; ++k)
@@ -99,17 +104,17 @@ void strain_run(Index size, const CellStrain<D>& strain, Index at, TrialScratch<
   rotate<D>(columns, at, at + size, strain.rotation);
 }
 
-/// Counts a failure, and keeps the trouble of the first.
-template <int D>
-void note_failure(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle, const SymTensor<D>& increment,
+/// Counts a failure, and keeps the failure of the first.
+template <class G, int D = G::dim>
+void note_failure(const Model<G>& model, typename Failure<D>::Kind kind, Index particle, const SymTensor<D>& increment,
                   TrialCount<D>& count)
 {
   if (count.failed++ == 0)
-    count.trouble = trouble_with(model, kind, particle, increment);
+    count.failure = failure_of<D>(model.particles, kind, particle, increment);
 }
 
-template <int D>
-void note_failed_laws(const Model<D>& model, const Batch& batch, const std::vector<Index>& failed,
+template <class G, int D = G::dim>
+void note_failed_laws(const Model<G>& model, const Batch& batch, const std::vector<Index>& failed,
                       const TrialScratch<D>& scratch, TrialCount<D>& count)
 {
   for (Index i : failed)
@@ -117,12 +122,12 @@ void note_failed_laws(const Model<D>& model, const Batch& batch, const std::vect
     SymTensor<D> increment;
     for (int k = 0; k < n_stress<D>; ++k)
       increment[k] = scratch.strain[k][i];
-    note_failure(model, Trouble<D>::Kind::law_failed, batch.first + i, increment, count);
+    note_failure<G>(model, Failure<D>::Kind::law_failed, batch.first + i, increment, count);
   }
 }
 
-template <int D>
-BatchReport update_scratch(const Model<D>& model, const ImplicitStep<D>& step, const Batch& batch, bool tangents,
+template <class G, int D = G::dim>
+BatchReport update_scratch(const Model<G>& model, const ImplicitStep<G>& step, const Batch& batch, bool tangents,
                            TrialScratch<D>& scratch)
 {
   PointBatch<D> points;
@@ -148,21 +153,21 @@ BatchReport update_scratch(const Model<D>& model, const ImplicitStep<D>& step, c
 }
 
 /// Adds the particles of one run, at `at` in the scratch, to the sums of its cell.
-template <int D>
-void sum_run(const Model<D>& model, ImplicitStep<D>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
+template <class G, int D = G::dim>
+void sum_run(const Model<G>& model, ImplicitStep<G>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
 {
   const double* const volume = model.particles.volume.data() + run.first;
   auto sum = step.stress[run.cell];
   for (Index p = 0; p < run.last - run.first; ++p)
-    for (int k = 0; k < n_symmetric<D>; ++k) // sums side by side, none waits for the other
-      sum[k] += volume[p] * scratch.stress[stress_component<D>[k]][at + p];
+    for (int k = 0; k < G::n_working; ++k) // sums side by side, none waits for the other
+      sum[k] += volume[p] * scratch.stress[working_component<G>[k]][at + p];
   step.stress[run.cell] = sum;
 }
 
-/// Adds V C of one run; rows and columns of zz are not needed in plane strain.
-template <int D>
-void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialScratch<D>& scratch,
-                   std::array<Symmetric<D>, n_symmetric<D>>& stiffness)
+/// Adds V C of one run, of the components that do work.
+template <class G, int D = G::dim>
+void sum_stiffness(const Model<G>& model, const Run& run, Index at, const TrialScratch<D>& scratch,
+                   std::array<Working<G>, G::n_working>& stiffness)
 {
   constexpr int S = n_stress<D>;
   auto sum = stiffness; // not through the reference, which might be to what is read
@@ -170,21 +175,22 @@ void sum_stiffness(const Model<D>& model, const Run& run, Index at, const TrialS
   {
     const double* const c = &scratch.tangent[static_cast<std::size_t>((at + p) * S * S)];
     const double volume = model.particles.volume[run.first + p];
-    for (int k = 0; k < n_symmetric<D>; ++k)
-      for (int j = 0; j < n_symmetric<D>; ++j)
-        sum[k][j] += volume * c[stress_component<D>[k] * S + stress_component<D>[j]];
+    for (int k = 0; k < G::n_working; ++k)
+      for (int j = 0; j < G::n_working; ++j)
+        sum[k][j] += volume * c[working_component<G>[k] * S + working_component<G>[j]];
   }
   stiffness = sum;
 }
 
 /// Full cells integrate the mean of their particles over their own volume.
-template <int D>
-void integrate_cells(const Model<D>& model, ImplicitStep<D>& step)
+template <class G, int D = G::dim>
+void integrate_cells(const Model<G>& model, ImplicitStep<G>& step)
 {
   for (std::size_t c = 0; c < step.stress.size(); ++c)
   {
-    const double filled = model.work.moments[c].volume;
-    const double factor = filled > 0 ? integrated_volume(model, static_cast<Index>(c)) / filled : 0;
+    const double filled = model.fields.front().moments[c].volume;
+    const double factor =
+        filled > 0 ? integrated_volume(model.mesh, model.fields.front(), static_cast<Index>(c)) / filled : 0;
     for (double& component : step.stress[c])
       component *= factor;
     if (!step.stiffness.empty())
@@ -195,8 +201,8 @@ void integrate_cells(const Model<D>& model, ImplicitStep<D>& step)
 }
 } // namespace
 
-template <int D>
-TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents)
+template <class G, int D>
+TrialCount<D> try_stresses(const Model<G>& model, ImplicitStep<G>& step, bool tangents)
 {
   const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
   step.stress.assign(cells, {});
@@ -205,7 +211,7 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
   TrialScratch<D> scratch;
   scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
   TrialCount<D> count;
-  const auto& runs = model.work.runs;
+  const auto& runs = model.order.runs;
   for (std::size_t r = 0; r < runs.size();)
   {
     const Batch batch = next_batch(runs, r);
@@ -216,7 +222,7 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
       step.strains[runs[r].cell] = trial.strain;
       strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
       if (!trial.keeps_volume)
-        note_failure(model, Trouble<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
+        note_failure<G>(model, Failure<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
     }
     const BatchReport report = update_scratch(model, step, batch, tangents, scratch);
     count.plastic += report.plastic;
@@ -233,11 +239,12 @@ TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool ta
   if (tangents)
     step.tangents.resize(cells);
   for (std::size_t c = 0; tangents && c < cells; ++c)
-    if (model.work.moments[c].volume > 0)
-      step.tangents[c] = cell_tangent<D>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
+    if (model.fields.front().moments[c].volume > 0)
+      step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
   return count;
 }
 
-template TrialCount<2> try_stresses(const Model<2>&, ImplicitStep<2>&, bool);
-template TrialCount<3> try_stresses(const Model<3>&, ImplicitStep<3>&, bool);
+template TrialCount<2> try_stresses(const Model<PlaneStrain>&, ImplicitStep<PlaneStrain>&, bool);
+template TrialCount<2> try_stresses(const Model<Axisymmetric>&, ImplicitStep<Axisymmetric>&, bool);
+template TrialCount<3> try_stresses(const Model<Solid>&, ImplicitStep<Solid>&, bool);
 } // namespace mpm

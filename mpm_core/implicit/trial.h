@@ -12,12 +12,12 @@ struct TrialCount
 {
   std::int64_t plastic = 0;
   std::int64_t failed = 0;           ///< particles whose law failed, and runs in cells that would lose their volume
-  std::optional<Trouble<D>> trouble; ///< the first of them
+  std::optional<Failure<D>> failure; ///< the first of them
 };
 
-/// Updates the stresses of all particles over dt with the iterate `work.velocity`, batch by batch on copies, and sums
+/// Updates the stresses of all particles over dt with the iterate `field.velocity`, batch by batch on copies, and sums
 /// V sigma, and the tangents when wanted, over each owned cell.
-/// @pre with nodal mixed discretisation, `work.volumetric_strain` belongs to the iterate
-template <int D>
-TrialCount<D> try_stresses(const Model<D>& model, ImplicitStep<D>& step, bool tangents);
+/// @pre with nodal mixed discretisation, `field.volumetric_strain` belongs to the iterate
+template <class G, int D = G::dim>
+TrialCount<D> try_stresses(const Model<G>& model, ImplicitStep<G>& step, bool tangents);
 } // namespace mpm

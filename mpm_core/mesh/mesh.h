@@ -2,7 +2,7 @@
 /// @file
 /// The background mesh: linear simplices (triangles or tetrahedra) given by arrays. It carries no state of the soil.
 
-#include "base/tensor.h"
+#include "base/geometry.h"
 
 #include <cmath>
 
@@ -17,7 +17,7 @@ struct CellShape
 {
   Vector<D> centre;
   std::array<Vector<D>, D + 1> gradient;
-  double volume;
+  double volume; ///< in two dimensions the area
 };
 
 /// No cell, or no tag.
@@ -73,6 +73,23 @@ struct Mesh
 /// cells that overlap their neighbour (inverted), a facet shared by more than two cells, a tagged facet that is none
 template <int D>
 Mesh<D> make_mesh(const MeshInput<D>& input, int rank);
+
+/// Volume of a cell [m^3 per metre or radian in two dimensions]: the integral of the geometry's thickness.
+template <class G>
+inline double cell_volume(const CellShape<G::dim>& shape)
+{
+  return thickness<G>(shape.centre) * shape.volume;
+}
+
+/// What a radial velocity of one vertex is to the hoop strain rate of its cell: N_k(centre) / r_c [1/m].
+template <class G>
+inline double hoop_gradient(const CellShape<G::dim>& shape)
+{
+  if constexpr (G::has_hoop)
+    return 1 / ((G::dim + 1) * shape.centre[0]);
+  else
+    return 0;
+}
 
 /// Smallest altitude of a cell [m], the length h of (16)
 template <int D>

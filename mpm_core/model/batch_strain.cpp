@@ -22,23 +22,22 @@ inline void prefetch(const T& object)
 }
 } // namespace
 
-template <int D>
-void find_motions(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+template <class G, int D>
+void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
-  const Workspace<D>& work = model.work;
-  const auto change = [&](Index i) -> const Vector<D>& { return work.velocity_change[i]; };
-  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
+  const auto change = [&](Index i) -> const Vector<D>& { return field.velocity_change[i]; };
+  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Index cell = work.runs[r].cell;
-    if (r + ahead < work.runs.size())
+    const Index cell = runs[r].cell;
+    if (r + ahead < runs.size())
     {
-      const Index next = work.runs[r + ahead].cell;
-      prefetch(model.mesh.shapes[next]);
-      prefetch(work.moments[next]);
+      const Index next = runs[r + ahead].cell;
+      prefetch(mesh.shapes[next]);
+      prefetch(field.moments[next]);
     }
-    const AffineField<D> fields[]{affine_field<D>(model.mesh, cell, change),
-                                  affine_field<D>(model.mesh, cell, velocity)};
+    const AffineField<D> fields[]{affine_field<D>(mesh, cell, change), affine_field<D>(mesh, cell, velocity)};
     scratch.motion[r - batch.first_run] = {1 - options.pic_share, fields[0], scaled<D>(fields[1], options.dt)};
   }
 }
@@ -46,8 +45,9 @@ void find_motions(const Model<D>& model, const PassOptions& options, const Batch
 namespace
 {
 /// Strains of the cells of a batch, from the displacements. Beyond the last run the lanes hold what was there before.
-template <int D>
-void find_cell_strains(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+template <class G, int D = G::dim>
+void find_cell_strains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                       const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
   const std::size_t n = batch.last_run - batch.first_run;
   for (std::size_t first = 0; first < n; first += lanes)
@@ -61,13 +61,22 @@ void find_cell_strains(const Model<D>& model, const PassOptions& options, const 
                                motion[2].displacement.gradient[a][b], motion[3].displacement.gradient[a][b]};
     CellStrain<D, Lanes>& strain = scratch.cells[first / lanes];
     strain = strain_increment<D>(gradient, 1);
+    const std::size_t last = std::min(n, first + lanes);
+    if constexpr (G::has_hoop)
+    {
+      Lanes hoop{};
+      for (std::size_t r = first; r < last; ++r)
+        hoop[r - first] =
+            scratch.motion[r].displacement.value[0] / mesh.shapes[runs[batch.first_run + r].cell].centre[0];
+      add_hoop(strain, hoop);
+    }
     if (options.averaged)
     {
       Lanes theta{};
-      for (std::size_t r = first; r < std::min(n, first + lanes); ++r)
-        theta[r - first] = mean_volumetric_strain<D>(model.mesh.cells[model.work.runs[batch.first_run + r].cell],
-                                                     model.work.volumetric_strain);
-      set_volumetric<D>(strain, theta);
+      for (std::size_t r = first; r < last; ++r)
+        theta[r - first] =
+            mean_volumetric_strain<D>(mesh.cells[runs[batch.first_run + r].cell], field.volumetric_strain);
+      set_volumetric<G>(strain, theta);
     }
     if (options.small)
       make_small<D>(strain);
@@ -75,54 +84,62 @@ void find_cell_strains(const Model<D>& model, const PassOptions& options, const 
 }
 
 /// Strains the particles of a batch, those of a cell alike.
-template <int D>
-void strain_cells(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+template <class G, int D = G::dim>
+void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
 {
-  find_cell_strains(model, options, batch, scratch);
+  find_cell_strains(mesh, field, runs, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.work.runs[r];
+    const Run& run = runs[r];
     const CellStrain<D> strain = scratch.cell_strain(r - batch.first_run);
     for (Index i = run.first - batch.first; i < run.last - batch.first;
          i += lanes) // the next run overwrites the excess
-      for (int k : stress_component<D>)
+      for (int k : working_component<G>)
         std::fill_n(scratch.strain[k] + i, lanes, strain.increment[k]);
-    strain_particles<D>(model.particles, run.first, run.last, strain);
+    strain_particles<D>(particles, run.first, run.last, strain);
   }
 }
 
 /// Strains the particles of a batch, each by the gradient at its own place.
-template <int D>
-void strain_dual_domains(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+template <class G, int D = G::dim>
+void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                         const PassOptions& options, const Batch& batch, Particles<D>& particles,
+                         BatchScratch<D>& scratch)
 {
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.work.runs[r];
+    const Run& run = runs[r];
     for (Index p = run.first; p < run.last; ++p)
     {
-      CellStrain<D> strain = strain_increment<D>(dual_gradient(model, p, run.cell), options.dt);
+      const Matrix<D> gradient = dual_gradient(mesh, field, at<D>(particles.position, p), run.cell);
+      CellStrain<D> strain = strain_increment<D>(gradient, options.dt);
       if (options.averaged)
-        set_volumetric<D>(strain, mean_volumetric_strain<D>(model.mesh.cells[run.cell], model.work.volumetric_strain));
+        set_volumetric<G>(strain, mean_volumetric_strain<D>(mesh.cells[run.cell], field.volumetric_strain));
       for (int k = 0; k < n_stress<D>; ++k)
         scratch.strain[k][p - batch.first] = strain.increment[k];
-      strain_particles<D>(model.particles, p, p + 1, strain);
+      strain_particles<D>(particles, p, p + 1, strain);
     }
   }
 }
 } // namespace
 
-template <int D>
-void strain_batch(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+template <class G, int D>
+void strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
 {
-  if (model.integration == Integration::dual_domain)
-    strain_dual_domains(model, options, batch, scratch);
+  if (field.integration.kind == Integration::dual_domain)
+    strain_dual_domains(mesh, field, runs, options, batch, particles, scratch);
   else
-    strain_cells(model, options, batch, scratch);
+    strain_cells(mesh, field, runs, options, batch, particles, scratch);
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void find_motions(const Model<D>&, const PassOptions&, const Batch&, BatchScratch<D>&);                     \
-  template void strain_batch(Model<D>&, const PassOptions&, const Batch&, BatchScratch<D>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void find_motions(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
+                             const PassOptions&, const Batch&, BatchScratch<G::dim>&);                                 \
+  template void strain_batch(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
+                             const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -10,7 +10,7 @@
 
 namespace mpm
 {
-/// Room for a batch, in the first-level cache.
+/// Scratch of a batch, in the first-level cache.
 template <int D>
 struct BatchScratch
 {
@@ -30,13 +30,15 @@ struct BatchScratch
   }
 };
 
-/// What the nodes do to the particles of each run of a batch.
-template <int D>
-void find_motions(const Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
+/// What the nodes of a field do to the particles of each run of a batch.
+template <class G, int D = G::dim>
+void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
 
-/// Strains the particles of a batch: turns their stresses, grows their volumes, and leaves their strain increments in
+/// Strains the particles of a batch: rotates their stresses, grows their volumes, and leaves their strain increments in
 /// the scratch, for the law.
 /// @pre find_motions has been called for the batch
-template <int D>
-void strain_batch(Model<D>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
+template <class G, int D = G::dim>
+void strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch);
 } // namespace mpm

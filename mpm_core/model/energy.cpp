@@ -5,8 +5,8 @@
 
 namespace mpm
 {
-template <int D>
-ParticleEnergy particle_energy(const Model<D>& model, Index p)
+template <class G, int D>
+ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
 {
   const Particles<D>& particles = model.particles;
   const Vector<D> v = at<D>(particles.velocity, p);
@@ -20,8 +20,8 @@ ParticleEnergy particle_energy(const Model<D>& model, Index p)
           particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
 }
 
-template <int D>
-ParticleEnergy particle_energy(const Model<D>& model)
+template <class G, int D>
+ParticleEnergy particle_energy(const Model<G, D>& model)
 {
   ParticleEnergy sum{0, 0};
   for (Index p = 0; p < model.particles.size(); ++p)
@@ -33,8 +33,8 @@ ParticleEnergy particle_energy(const Model<D>& model)
   return sum;
 }
 
-template <int D>
-double energy_balance(const Model<D>& model, double kinetic)
+template <class G, int D>
+double energy_balance(const Model<G, D>& model, double kinetic)
 {
   const Totals& totals = model.totals;
   const EnergyBook& book = model.energy;
@@ -42,8 +42,8 @@ double energy_balance(const Model<D>& model, double kinetic)
          book.pic_loss - kinetic - book.outflow_kinetic;
 }
 
-template <int D>
-void start_energy_balance(Model<D>& model)
+template <class G, int D>
+void start_energy_balance(Model<G, D>& model)
 {
   EnergyBook& book = model.energy;
   const ParticleEnergy energy = particle_energy(model);
@@ -56,11 +56,12 @@ void start_energy_balance(Model<D>& model)
   book.stale = false;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template ParticleEnergy particle_energy(const Model<D>&, Index);                                                     \
-  template ParticleEnergy particle_energy(const Model<D>&);                                                            \
-  template double energy_balance(const Model<D>&, double);                                                             \
-  template void start_energy_balance(Model<D>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template ParticleEnergy particle_energy(const Model<G>&, Index);                                                     \
+  template ParticleEnergy particle_energy(const Model<G>&);                                                            \
+  template double energy_balance(const Model<G>&, double);                                                             \
+  template void start_energy_balance(Model<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

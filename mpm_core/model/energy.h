@@ -30,7 +30,7 @@ struct EnergyBook
   bool stale = true;         ///< the particles have been changed since
 };
 
-template <int D>
+template <class G, int D>
 struct Model;
 
 /// Energies over this rank's particles [J].
@@ -40,18 +40,18 @@ struct ParticleEnergy
   double stored; ///< by elastic strain; NaN where a law does not say
 };
 
-template <int D>
-ParticleEnergy particle_energy(const Model<D>& model);
+template <class G, int D>
+ParticleEnergy particle_energy(const Model<G, D>& model);
 
 /// Energies of one particle.
-template <int D>
-ParticleEnergy particle_energy(const Model<D>& model, Index p);
+template <class G, int D>
+ParticleEnergy particle_energy(const Model<G, D>& model, Index p);
 
 /// Works that came in less those that went out or are stored, at the particles; constant in an exact motion [J].
-template <int D>
-double energy_balance(const Model<D>& model, double kinetic);
+template <class G, int D>
+double energy_balance(const Model<G, D>& model, double kinetic);
 
 /// Begins the balance anew with the particles as they are.
-template <int D>
-void start_energy_balance(Model<D>& model);
+template <class G, int D>
+void start_energy_balance(Model<G, D>& model);
 } // namespace mpm

@@ -9,145 +9,149 @@ namespace mpm
 namespace
 {
 /// Finds the cells that are full, or whose nodes all are among full ones.
-template <int D>
-void find_whole_cells(Model<D>& model)
+template <class G, int D = G::dim>
+void find_whole_cells(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
-  Workspace<D>& work = model.work;
+  auto& [kind, fills, whole, dual_cells, dual_nodes, mean_gradients] = field.integration;
   const auto fill = [&](Index c) // its particles' volume, its own
   {
-    return std::array<double, 2>{work.moments[c].volume, model.mesh.shapes[c].volume};
+    return std::array<double, 2>{field.moments[c].volume, cell_volume<G>(mesh.shapes[c])};
   };
-  work.fills.assign(model.mesh.points.size(), {0.0, 0.0});
-  work.whole.resize(static_cast<std::size_t>(model.mesh.owned_cells));
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
-    for (Index node : model.mesh.cells[c])
+  fills.assign(mesh.points.size(), {0.0, 0.0});
+  whole.resize(static_cast<std::size_t>(mesh.owned_cells));
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+    for (Index node : mesh.cells[c])
       for (std::size_t k = 0; k < 2; ++k)
-        work.fills[node][k] += fill(c)[k];
-  sum_shared(model.exchange, work.fills);
+        fills[node][k] += fill(c)[k];
+  sum_shared(exchange, fills);
   const auto is_full = [](const std::array<double, 2>& f, double share) { return f[0] >= share * f[1]; };
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  for (Index c = 0; c < mesh.owned_cells; ++c)
   {
-    const auto& nodes = model.mesh.cells[c];
-    const bool among_full = std::all_of(nodes.begin(), nodes.end(),
-                                        [&](Index node) { return is_full(work.fills[node], full_share_around); });
-    work.whole[c] = work.moments[c].mass > 0 && (among_full || is_full(fill(c), full_share));
+    const bool among_full =
+        std::ranges::all_of(mesh.cells[c], [&](Index node) { return is_full(fills[node], full_share_around); });
+    whole[c] = field.moments[c].mass > 0 && (among_full || is_full(fill(c), full_share));
   }
 }
 
 /// Sums for the mean stresses of the dual domains, over all ranks.
-template <int D>
-void gather_dual_domains(Model<D>& model)
+template <class G, int D = G::dim>
+void gather_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                         const std::vector<Run>& runs, CellIntegration<D>& integration)
 {
-  Workspace<D>& work = model.work;
-  work.dual_cells.assign(static_cast<std::size_t>(model.mesh.owned_cells), {});
-  work.dual_nodes.assign(model.mesh.points.size(), {});
-  for (const Run& run : work.runs)
+  integration.dual_cells.assign(static_cast<std::size_t>(mesh.owned_cells), {});
+  integration.dual_nodes.assign(mesh.points.size(), {});
+  for (const Run& run : runs)
   {
-    if (!work.whole[run.cell])
+    if (!integration.whole[run.cell])
       continue;
     std::array<DualStress<D>*, D + 1> nodes;
     for (int k = 0; k <= D; ++k)
-      nodes[k] = &work.dual_nodes[model.mesh.cells[run.cell][k]];
-    gather_dual<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.dual_cells[run.cell], nodes);
+      nodes[k] = &integration.dual_nodes[mesh.cells[run.cell][k]];
+    gather_dual<D>(particles, run.first, run.last, mesh.shapes[run.cell], integration.dual_cells[run.cell], nodes);
   }
-  sum_shared(model.exchange, work.dual_nodes);
+  sum_shared(exchange, integration.dual_nodes);
 }
 
 /// What a cell integrates: volume times mean stress.
-template <int D>
-std::array<double, n_symmetric<D>> integrated_stress(const Model<D>& model, Index cell)
+template <class G, int D = G::dim>
+Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
-  const Workspace<D>& work = model.work;
-  std::array<double, n_symmetric<D>> stress = work.moments[cell].stress;
-  if (!work.whole[cell])
+  const CellIntegration<D>& integration = field.integration;
+  Working<G> stress = field.moments[cell].stress;
+  if (!integration.whole[cell])
     return stress;
-  double factor = model.mesh.shapes[cell].volume / work.moments[cell].volume;
-  if (model.integration == Integration::dual_domain)
-  {
-    std::array<const DualStress<D>*, D + 1> nodes;
-    for (int k = 0; k <= D; ++k)
-      nodes[k] = &work.dual_nodes[model.mesh.cells[cell][k]];
-    stress = dual_mean<D>(work.dual_cells[cell], nodes);
-    factor = model.mesh.shapes[cell].volume;
-  }
+  double factor = cell_volume<G>(mesh.shapes[cell]) / field.moments[cell].volume;
+  if constexpr (!G::has_hoop)
+    if (integration.kind == Integration::dual_domain)
+    {
+      std::array<const DualStress<D>*, D + 1> nodes;
+      for (int k = 0; k <= D; ++k)
+        nodes[k] = &integration.dual_nodes[mesh.cells[cell][k]];
+      stress = dual_mean<D>(integration.dual_cells[cell], nodes);
+      factor = cell_volume<G>(mesh.shapes[cell]);
+    }
   for (double& component : stress)
     component *= factor;
   return stress;
 }
 } // namespace
 
-template <int D>
-void integrate_stress(Model<D>& model)
+template <class G, int D>
+void integrate_stress(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                      const std::vector<Run>& runs, VelocityField<G>& field)
 {
-  Workspace<D>& work = model.work;
-  find_whole_cells(model);
-  if (model.integration == Integration::dual_domain)
-    gather_dual_domains(model);
-  for (NodeSums<D>& node : work.nodes)
+  find_whole_cells(mesh, exchange, field);
+  if (field.integration.kind == Integration::dual_domain)
+    gather_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
+  for (NodeSums<D>& node : field.nodes)
     node.internal = {};
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  for (Index c = 0; c < mesh.owned_cells; ++c)
   {
-    if (work.moments[c].mass == 0)
+    if (field.moments[c].mass == 0)
       continue;
-    const auto stress = integrated_stress(model, c);
+    const Working<G> stress = integrated_stress(mesh, field, c);
     for (int k = 0; k <= D; ++k)
     {
-      const Vector<D> force = internal_force<D>(stress, model.mesh.shapes[c].gradient[k]);
+      const Vector<D> force = internal_force<G>(stress, mesh.shapes[c], k);
       for (int a = 0; a < D; ++a)
-        work.nodes[model.mesh.cells[c][k]].internal[a] += force[a];
+        field.nodes[mesh.cells[c][k]].internal[a] += force[a];
     }
   }
 }
 
-template <int D>
-void average_gradients(Model<D>& model)
+template <class G, int D>
+void average_gradients(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
-  Workspace<D>& work = model.work;
-  work.mean_gradients.assign(model.mesh.points.size(), {});
-  const auto velocity = [&](Index i) -> const Vector<D>& { return work.velocity[i]; };
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  auto& means = field.integration.mean_gradients;
+  means.assign(mesh.points.size(), {});
+  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
+  for (Index c = 0; c < mesh.owned_cells; ++c)
   {
-    if (!work.whole[c])
+    if (!field.integration.whole[c])
       continue;
-    const double volume = model.mesh.shapes[c].volume;
-    const Matrix<D> gradient = affine_field<D>(model.mesh, c, velocity).gradient;
-    for (Index node : model.mesh.cells[c])
+    const double volume = cell_volume<G>(mesh.shapes[c]);
+    const Matrix<D> gradient = affine_field<D>(mesh, c, velocity).gradient;
+    for (Index node : mesh.cells[c])
     {
-      work.mean_gradients[node].volume += volume;
+      means[node].volume += volume;
       for (int a = 0; a < D; ++a)
         for (int b = 0; b < D; ++b)
-          work.mean_gradients[node].gradient[a][b] += volume * gradient[a][b];
+          means[node].gradient[a][b] += volume * gradient[a][b];
     }
   }
-  sum_shared(model.exchange, work.mean_gradients);
-  for (MeanGradient<D>& node : work.mean_gradients)
+  sum_shared(exchange, means);
+  for (MeanGradient<D>& node : means)
     for (auto& row : node.gradient)
       for (double& component : row)
         component /= node.volume > 0 ? node.volume : 1;
 }
 
-template <int D>
-Matrix<D> dual_gradient(const Model<D>& model, Index particle, Index cell)
+template <class G>
+Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Vector<G::dim>& position,
+                             Index cell)
 {
-  const auto velocity = [&](Index i) -> const Vector<D>& { return model.work.velocity[i]; };
-  const DualWeights<D> weights = dual_weights<D>(model.mesh.shapes[cell], at<D>(model.particles.position, particle));
-  Matrix<D> gradient = affine_field<D>(model.mesh, cell, velocity).gradient;
-  if (!model.work.whole[cell])
+  constexpr int D = G::dim;
+  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
+  const DualWeights<D> weights = dual_weights<D>(mesh.shapes[cell], position);
+  Matrix<D> gradient = affine_field<D>(mesh, cell, velocity).gradient;
+  if (!field.integration.whole[cell])
     return gradient;
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b)
     {
       gradient[a][b] *= weights.cell;
       for (int k = 0; k <= D; ++k)
-        gradient[a][b] += weights.node[k] * model.work.mean_gradients[model.mesh.cells[cell][k]].gradient[a][b];
+        gradient[a][b] += weights.node[k] * field.integration.mean_gradients[mesh.cells[cell][k]].gradient[a][b];
     }
   return gradient;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void integrate_stress(Model<D>&);                                                                           \
-  template void average_gradients(Model<D>&);                                                                          \
-  template Matrix<D> dual_gradient<D>(const Model<D>&, Index, Index);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void integrate_stress(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                         \
+                                 const std::vector<Run>&, VelocityField<G>&);                                          \
+  template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \
+  template Matrix<G::dim> dual_gradient(const Mesh<G::dim>&, const VelocityField<G>&, const Vector<G::dim>&, Index);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

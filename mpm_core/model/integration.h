@@ -2,8 +2,7 @@
 /// @file
 /// How stresses are integrated over a cell (14), where not as the sum over its particles; see `Integration`.
 
-#include "model/model.h"
-#include "transfer/cell_strain.h"
+#include "model/velocity_field.h"
 
 namespace mpm
 {
@@ -18,26 +17,28 @@ inline constexpr double full_share_around = 0.75;
 /// The volume that a cell integrates its stress over. Cells that are not full, at the free surface, are left to their
 /// particles in all modes: there stresses are small and nodes are light, so that forces from a mean with the cells
 /// below would throw them off.
-template <int D>
-inline double integrated_volume(const Model<D>& model, Index cell)
+template <class G, int D = G::dim>
+inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
-  const bool whole = model.integration != Integration::particles && model.work.whole[cell];
-  return whole ? model.mesh.shapes[cell].volume : model.work.moments[cell].volume;
+  const bool whole = field.integration.kind != Integration::particles && field.integration.whole[cell];
+  return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
 /// Puts the internal force of mixed or dual domain integration in the place of the particles' sum, on this rank.
-/// @post work.whole tells which cells are full
+/// @post field.integration.whole tells which cells are full
 /// @note Collective
-template <int D>
-void integrate_stress(Model<D>& model);
+template <class G, int D = G::dim>
+void integrate_stress(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                      const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Means of the velocity gradient over the full cells that share a node, from the nodes' `velocity`.
 /// @note Collective
-template <int D>
-void average_gradients(Model<D>& model);
+template <class G, int D = G::dim>
+void average_gradients(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field);
 
-/// The velocity gradient at a particle by dual domains.
-/// @pre average_gradients(model) has been called
-template <int D>
-Matrix<D> dual_gradient(const Model<D>& model, Index particle, Index cell);
+/// The velocity gradient at a place in a cell by dual domains.
+/// @pre average_gradients has been called for the field
+template <class G>
+Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Vector<G::dim>& position,
+                             Index cell);
 } // namespace mpm

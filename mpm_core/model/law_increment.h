@@ -15,14 +15,14 @@ struct LawIncrement
 };
 
 /// Gives a batch the sizes of its particles' cells, if its law needs them.
-template <int D>
-void give_cell_sizes(const Model<D>& model, const Batch& batch, LawIncrement<D>& columns, PointBatch<D>& points)
+template <class G, int D = G::dim>
+void give_cell_sizes(const Model<G>& model, const Batch& batch, LawIncrement<D>& columns, PointBatch<D>& points)
 {
   if (!needs(model.laws[batch.material]).cell_size)
     return;
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.work.runs[r];
+    const Run& run = model.order.runs[r];
     const double size = cell_size<D>(model.mesh.shapes[run.cell].volume);
     std::fill_n(columns.cell_size.data() + (run.first - batch.first), run.last - run.first, size);
   }
@@ -30,17 +30,18 @@ void give_cell_sizes(const Model<D>& model, const Batch& batch, LawIncrement<D>&
 }
 
 /// Gives a batch the increments of its particles' deformation gradients, if its law needs them.
+/// @pre not in axial symmetry, which `set_laws` refuses such laws in: there is no place for the hoop
 /// @param gradient  function of the number of a run in the batch that returns its displacement gradient
 /// @param volumetric  the same of its volumetric strain, which takes the place of the gradient's trace
-template <int D, class Gradient, class Volumetric>
-void give_deformation(const Model<D>& model, const Batch& batch, const Gradient& gradient, const Volumetric& volumetric,
+template <class G, class Gradient, class Volumetric, int D = G::dim>
+void give_deformation(const Model<G>& model, const Batch& batch, const Gradient& gradient, const Volumetric& volumetric,
                       LawIncrement<D>& columns, PointBatch<D>& points)
 {
   if (!needs(model.laws[batch.material]).deformation)
     return;
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.work.runs[r];
+    const Run& run = model.order.runs[r];
     Matrix<D> f = gradient(r - batch.first_run);
     double change = volumetric(r - batch.first_run);
     for (int a = 0; a < D; ++a)

@@ -2,89 +2,125 @@
 
 #include "model/integration.h"
 
+#include <utility>
+
 namespace mpm
 {
-template <int D>
-void map_to_nodes(Model<D>& model)
+namespace
 {
-  const PhaseTimer timer(model.phase_seconds, Phase::node_sums);
-  Workspace<D>& work = model.work;
-  shrink_soil(model);
-  scatter<D>(model.mesh, work.soil, work.moments, work.tractions, work.nodes);
-  if (model.integration != Integration::particles)
-    integrate_stress(model);
-  sum_shared(model.exchange, work.nodes);
+/// Leaves the cells that have become empty out of a field's part of the mesh.
+template <class G, int D = G::dim>
+void shrink_part(const Mesh<D>& mesh, const NodeExchange& exchange, VelocityField<G>& field)
+{
+  std::vector<Index> cells;
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+    if (field.moments[c].mass != 0)
+      cells.push_back(c);
+  const std::vector<Index> before = std::move(field.part.nodes);
+  field.part = make_part<D>(mesh, cells, exchange.shared_nodes);
+  for (Index node : before)
+    if (!field.part.has_node[node])
+    {
+      field.nodes[node] = {};
+      field.start_velocity[node] = field.acceleration[node] = field.velocity_change[node] = field.velocity[node] = {};
+    }
+}
+} // namespace
+
+template <class G, int D>
+void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                        const std::vector<Run>& runs, VelocityField<G>& field)
+{
+  if (std::exchange(field.part_shrinks, false))
+    shrink_part(mesh, exchange, field);
+  scatter<G>(mesh, field.part, field.moments, field.tractions, field.nodes);
+  if (field.integration.kind != Integration::particles)
+    integrate_stress(mesh, exchange, particles, runs, field);
 }
 
-template <int D>
-void find_start_velocity(Model<D>& model)
+template <class G>
+void map_to_nodes(Model<G>& model)
 {
-  Workspace<D>& work = model.work;
-  for (Index i : work.soil.nodes)
-    for (int a = 0; a < D; ++a)
-      work.start_velocity[i][a] =
-          work.nodes[i].mass > work.least_mass ? work.nodes[i].momentum[a] / work.nodes[i].mass : 0;
-  for (const Support<D>& support : model.supports)
-    impose<D>(support, work.start_velocity[support.node]);
+  for (VelocityField<G>& field : model.fields)
+  {
+    particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
+    sum_shared(model.exchange, field.nodes);
+  }
 }
 
-template <int D>
-void find_velocity_change(Model<D>& model, double pic_share, double dt)
+template <class G>
+void find_start_velocity(VelocityField<G>& field)
 {
-  Workspace<D>& work = model.work;
-  for (Index i : work.soil.nodes)
-    for (int a = 0; a < D; ++a)
-      work.velocity_change[i][a] = dt * work.acceleration[i][a] + pic_share * work.start_velocity[i][a];
+  for (Index i : field.part.nodes)
+    for (int a = 0; a < G::dim; ++a)
+      field.start_velocity[i][a] =
+          field.nodes[i].mass > field.least_mass ? field.nodes[i].momentum[a] / field.nodes[i].mass : 0;
+  for (const auto& support : field.supports)
+    impose<G::dim>(support, field.start_velocity[support.node]);
 }
 
-template <int D>
-void average_strains(Model<D>& model, double dt)
+template <class G>
+void find_velocity_change(VelocityField<G>& field, double pic_share, double dt)
 {
-  const PhaseTimer timer(model.phase_seconds, Phase::averaging);
-  Workspace<D>& work = model.work;
+  for (Index i : field.part.nodes)
+    for (int a = 0; a < G::dim; ++a)
+      field.velocity_change[i][a] = dt * field.acceleration[i][a] + pic_share * field.start_velocity[i][a];
+}
+
+template <class G, int D>
+void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
+{
   const auto of_cell = [&](Index c) -> VolumetricStrain
   {
     double divergence = 0;
     for (int k = 0; k <= D; ++k)
-      divergence += dot<D>(work.velocity[model.mesh.cells[c][k]], model.mesh.shapes[c].gradient[k]);
-    return {dt * divergence, integrated_volume(model, c)};
+    {
+      const Vector<D>& v = field.velocity[mesh.cells[c][k]];
+      divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
+      if constexpr (G::has_hoop)
+        divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
+    }
+    return {dt * divergence, integrated_volume(mesh, field, c)};
   };
-  average_volumetric_strain(model.mesh, work.soil, of_cell, model.exchange, work.volumetric_strain);
+  average_volumetric_strain(mesh, field.part, of_cell, exchange, field.volumetric_strain);
 }
 
-template <int D>
-void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress)
+template <class G, int D>
+void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                      std::span<Working<G>> stress)
 {
-  Workspace<D>& work = model.work;
   const auto mean = [&](Index c)
   {
     double sum = 0;
-    for (int a = 0; a < D; ++a)
-      sum += stress[c][a];
-    return sum / D;
+    for (int k : normal_component<G>)
+      sum += stress[c][k];
+    return sum / G::n_normal;
   };
   const auto of_cell = [&](Index c) -> VolumetricStrain
   {
-    const double volume = integrated_volume(model, c);
+    const double volume = integrated_volume(mesh, field, c);
     return {volume > 0 ? mean(c) / volume : 0, volume};
   };
-  std::vector<VolumetricStrain> nodes(model.mesh.points.size());
-  average_volumetric_strain<D>(model.mesh, work.soil, of_cell, model.exchange, nodes);
-  for (Index c : work.soil.cells)
+  std::vector<VolumetricStrain> nodes(mesh.points.size());
+  average_volumetric_strain<D>(mesh, field.part, of_cell, exchange, nodes);
+  for (Index c : field.part.cells)
   {
-    const double average = mean_volumetric_strain<D>(model.mesh.cells[c], nodes);
-    const double change = integrated_volume(model, c) * average - mean(c);
-    for (int a = 0; a < D; ++a)
-      stress[c][a] += change;
+    const double average = mean_volumetric_strain<D>(mesh.cells[c], nodes);
+    const double change = integrated_volume(mesh, field, c) * average - mean(c);
+    for (int k : normal_component<G>)
+      stress[c][k] += change;
   }
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void map_to_nodes(Model<D>&);                                                                               \
-  template void find_start_velocity(Model<D>&);                                                                        \
-  template void find_velocity_change(Model<D>&, double, double);                                                       \
-  template void average_strains(Model<D>&, double);                                                                    \
-  template void average_stresses<D>(Model<D>&, std::span<std::array<double, n_symmetric<D>>>);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void particles_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                       \
+                                   const std::vector<Run>&, VelocityField<G>&);                                        \
+  template void map_to_nodes(Model<G>&);                                                                               \
+  template void find_start_velocity(VelocityField<G>&);                                                                \
+  template void find_velocity_change(VelocityField<G>&, double, double);                                               \
+  template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \
+  template void average_stresses(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, std::span<Working<G>>);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -9,35 +9,44 @@
 
 namespace mpm
 {
-/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes, over all ranks.
+/// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes of a field, of this rank's
+/// particles.
+/// @post cells that have become empty are left out of the field's part of the mesh, where it is to shrink
+/// @note Collective where stresses are integrated over whole cells
+template <class G, int D = G::dim>
+void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                        const std::vector<Run>& runs, VelocityField<G>& field);
+
+/// The same for all fields of a model, over all ranks.
 /// @pre prepare(model) has been called
 /// @note Collective
-template <int D>
-void map_to_nodes(Model<D>& model);
+template <class G>
+void map_to_nodes(Model<G>& model);
 
-/// v_i at the start of the step, from the sums at nodes, with supports.
-template <int D>
-void find_start_velocity(Model<D>& model);
+/// v_i at the start of the step, from the sums at nodes, under the boundary conditions.
+template <class G>
+void find_start_velocity(VelocityField<G>& field);
 
 /// What the nodes add to the velocities of particles over dt [s]: dt a_i, and with a PIC share that much of the grid's
 /// velocity, which takes the place of the particles' own.
-template <int D>
-void find_velocity_change(Model<D>& model, double pic_share, double dt);
+template <class G>
+void find_velocity_change(VelocityField<G>& field, double pic_share, double dt);
 
-/// Volumetric strains of the nodes over dt [s] from the nodes' `velocity`, averages over the cells around them
-/// (nodal mixed discretisation).
+/// Volumetric strains of the nodes over dt [s] from the field's `velocity`, averages over the cells around them (nodal
+/// mixed discretisation).
 /// @note Collective
-template <int D>
-void average_strains(Model<D>& model, double dt);
+template <class G, int D = G::dim>
+void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt);
 
-/// Averages the mean of the normal components in the plane of the cells' stress times volume, as strains are averaged.
+/// Averages the mean of the normal components of the cells' stress times volume, as strains are averaged.
 ///
 /// The forces of these stresses do the work of the particles' stresses on averaged strains: with volume weights the
 /// average is its own transpose.
 /// @param stress  of each owned cell [N m]
 /// @note Collective
-template <int D>
-void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<D>>> stress);
+template <class G, int D = G::dim>
+void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                      std::span<Working<G>> stress);
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
 ///
@@ -45,7 +54,7 @@ void average_stresses(Model<D>& model, std::span<std::array<double, n_symmetric<
 /// speeds it up, with (1 - alpha) |R|. Taking the velocity's sign at the step's start for the whole step would throw a
 /// slow node back past its start: its velocity would change sign step by step, and differences of round-off would grow.
 /// With the mean, the new velocity rises with the old one at a slope between (1 - alpha) / (1 + alpha) and 1, so that
-/// differences never grow by the damping. The implicit scheme has the same law, solved for R (implicit_inertia.h).
+/// differences never grow by the damping. The implicit scheme has the same law, solved for R (implicit/inertia.h).
 /// @param momentum  m v at the step's start [N s]
 /// @param dt        [s]
 inline double local_damping(double alpha, double residual, double momentum, double dt)

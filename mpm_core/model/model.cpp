@@ -29,65 +29,86 @@ void check_particles(const Particles<D>& particles)
 }
 } // namespace
 
-template <int D>
-void sort_particles(Model<D>& model)
+template <class G>
+void set_laws(Model<G>& model, std::vector<Law> laws, std::vector<Index> field_of_law)
 {
-  sort_by_cell<D>(model.particles, model.mesh.owned_cells, static_cast<Index>(model.laws.size()));
+  if (field_of_law.empty())
+    field_of_law.assign(laws.size(), 0);
+  if (field_of_law.size() != laws.size())
+    throw InputError("velocity_fields has " + std::to_string(field_of_law.size()) +
+                     " numbers, expected one for each of " + std::to_string(laws.size()) + " laws");
+  const Index most = *std::ranges::max_element(field_of_law);
+  for (Index field = 0; field <= most; ++field)
+    if (std::ranges::count(field_of_law, field) == 0 || *std::ranges::min_element(field_of_law) < 0)
+      throw InputError("velocity_fields has no law in the field " + std::to_string(field) +
+                       ", expected numbers from 0 without gaps");
+  int states = 0;
+  for (const Law& law : laws)
+  {
+    states = std::max(states, n_state(law));
+    if (G::has_hoop && needs(law).deformation)
+      throw InputError("the law " + law_name(law) +
+                       " needs deformation gradients, which it is not given in axial symmetry");
+  }
+  model.particles.state.resize(static_cast<std::size_t>(states));
+  model.laws = std::move(laws);
+  model.field_of_law = std::move(field_of_law);
+  model.fields.resize(static_cast<std::size_t>(most) + 1);
+}
+
+template <class G>
+void sort_particles(Model<G>& model)
+{
+  sort_by_cell(model.particles, model.mesh.owned_cells, static_cast<Index>(model.laws.size()));
   find_cell_runs(model, false);
-  model.work.soil_shrinks = true;
-  model.work.strays = 0;
-  model.work.stray_steps = 0;
+  for (VelocityField<G>& field : model.fields)
+    field.part_shrinks = true;
+  model.order.out_of_order = 0;
+  model.order.cost = 0;
   ++model.totals.sorts;
 }
 
-template <int D>
-void find_cell_runs(Model<D>& model, bool again)
+namespace
 {
-  Workspace<D>& work = model.work;
+/// Marks the first run of a field in each cell, and empties the cells that its last particle has left.
+template <class G>
+void find_first_runs(Model<G>& model, VelocityField<G>& field)
+{
+  auto& marks = model.order.marks;
+  for (Run& run : model.order.runs)
+    if (&field_of(model, run.material) == &field)
+    {
+      run.first_in_cell = !marks[run.cell];
+      marks[run.cell] = 1;
+    }
+  for (Index c : field.left)
+    if (!marks[c])
+    {
+      field.moments[c] = {};
+      if (!field.tractions.empty())
+        field.tractions[c] = {};
+    }
+  field.left.clear();
+  for (const Run& run : model.order.runs)
+    marks[run.cell] = 0;
+}
+} // namespace
+
+template <class G>
+void find_cell_runs(Model<G>& model, bool again)
+{
+  CellOrder& order = model.order;
   if (again)
-    find_runs_again<D>(model.particles, batch_size, work.runs);
+    find_runs_again(model.particles, batch_size, order.runs);
   else
-    find_runs<D>(model.particles, batch_size, work.runs);
-  work.cell_marks.resize(model.mesh.cells.size(), 0);
-  for (Run& run : work.runs)
-  {
-    run.first_in_cell = !work.cell_marks[run.cell];
-    work.cell_marks[run.cell] = 1;
-  }
-  for (Index c : work.left)
-    if (!work.cell_marks[c])
-    {
-      work.moments[c] = {};
-      if (!work.tractions.empty())
-        work.tractions[c] = {};
-    }
-  work.left.clear();
-  for (const Run& run : work.runs)
-    work.cell_marks[run.cell] = 0;
+    find_runs(model.particles, batch_size, order.runs);
+  order.marks.resize(model.mesh.cells.size(), 0);
+  for (VelocityField<G>& field : model.fields)
+    find_first_runs(model, field);
 }
 
-template <int D>
-void shrink_soil(Model<D>& model)
-{
-  Workspace<D>& work = model.work;
-  if (!work.soil_shrinks)
-    return;
-  std::vector<Index> cells;
-  for (const Run& run : work.runs)
-    cells.push_back(run.cell);
-  const std::vector<Index> before = std::move(work.soil.nodes);
-  work.soil = make_part<D>(model.mesh, cells, model.exchange.shared_nodes);
-  for (Index node : before)
-    if (!work.soil.has_node[node])
-    {
-      work.nodes[node] = {};
-      work.start_velocity[node] = work.acceleration[node] = work.velocity_change[node] = work.velocity[node] = {};
-    }
-  work.soil_shrinks = false;
-}
-
-template <int D>
-Inventory taken_inventory(const Model<D>& model)
+template <class G>
+Inventory taken_inventory(const Model<G>& model)
 {
   std::array<double, 2> sums{static_cast<double>(model.particles.size() + model.totals.outflow_particles),
                              model.totals.outflow_mass};
@@ -97,55 +118,82 @@ Inventory taken_inventory(const Model<D>& model)
   return {sums[0], sums[1]};
 }
 
-template <int D>
-void prepare(Model<D>& model)
+namespace
 {
-  Workspace<D>& work = model.work;
-  if (work.ready)
+/// Nodes and cells of a field at rest and empty, as many as the mesh has.
+template <class G>
+void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
+{
+  const auto nodes = mesh.points.size(), cells = static_cast<std::size_t>(mesh.owned_cells);
+  field.nodes.assign(nodes, {});
+  for (auto* values : {&field.start_velocity, &field.acceleration, &field.velocity_change, &field.velocity})
+    values->assign(nodes, {});
+  field.volumetric_strain.resize(nodes);
+  field.part = {};
+  field.left.clear();
+  field.moments.assign(cells, CellMoments<G>{});
+  field.tractions.assign(loaded ? cells : 0, TractionMoments<G::dim>{});
+}
+
+/// Only particles within round-off of the opposite facet touch a node with less than this share of the mass of a whole
+/// particle.
+/// @note Collective
+template <class G>
+void find_least_masses(Model<G>& model)
+{
+  for (VelocityField<G>& field : model.fields)
+    field.least_mass = 0;
+  for (Index p = 0; p < model.particles.size(); ++p)
+  {
+    double& least = field_of(model, model.particles.material[p]).least_mass;
+    least = std::max(least, 1e-12 * model.particles.mass[p]);
+  }
+  for (VelocityField<G>& field : model.fields)
+    MPI_Allreduce(MPI_IN_PLACE, &field.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+}
+} // namespace
+
+template <class G>
+void prepare(Model<G>& model)
+{
+  if (model.ready)
     return;
   collectively(model.exchange.comm, [&] { check_particles(model.particles); });
-  const auto nodes = model.mesh.points.size(), cells = static_cast<std::size_t>(model.mesh.owned_cells);
-  work.nodes.assign(nodes, {});
-  for (auto* values : {&work.start_velocity, &work.acceleration, &work.velocity_change, &work.velocity})
-    values->assign(nodes, {});
-  work.volumetric_strain.resize(nodes);
-  work.soil = {};
-  work.owned_cells = owned_cell_numbers(model.mesh);
-
-  sort_particles(model);
-  work.moments.assign(cells, CellMoments<D>{});
   agree_on_fields(model.particles, model.exchange.comm);
   const bool loaded = model.particles.traction.present;
-  work.tractions.assign(loaded ? cells : 0, TractionMoments<D>{});
-  for (const Run& run : work.runs)
+  for (VelocityField<G>& field : model.fields)
+    clear_field(model.mesh, loaded, field);
+  model.migration.owned_cells = owned_cell_numbers(model.mesh);
+  sort_particles(model);
+  for (const Run& run : model.order.runs)
   {
-    gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.moments[run.cell]);
+    VelocityField<G>& field = field_of(model, run.material);
+    const auto& shape = model.mesh.shapes[run.cell];
+    gather<G>(model.particles, run.first, run.last, shape, field.moments[run.cell]);
     if (loaded)
-      gather<D>(model.particles, run.first, run.last, model.mesh.shapes[run.cell], work.tractions[run.cell]);
+      gather(model.particles, run.first, run.last, shape, field.tractions[run.cell]);
   }
-  // Only particles within round-off of the opposite facet touch a node with less than this share of a whole particle's
-  // mass.
-  const auto heaviest = std::max_element(model.particles.mass.begin(), model.particles.mass.end());
-  work.least_mass = heaviest == model.particles.mass.end() ? 0 : 1e-12 * *heaviest;
-  MPI_Allreduce(MPI_IN_PLACE, &work.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+  find_least_masses(model);
   model.inventory = taken_inventory(model);
-  work.ready = true;
+  model.ready = true;
   if (model.energy.stale)
     start_energy_balance(model);
 
   map_to_nodes(model); // what nodes are at the start may be looked at before a step
-  find_start_velocity(model);
-  work.velocity = work.start_velocity;
+  for (VelocityField<G>& field : model.fields)
+  {
+    find_start_velocity(field);
+    field.velocity = field.start_velocity;
+  }
 }
 
-template void prepare(Model<2>&);
-template void prepare(Model<3>&);
-template Inventory taken_inventory(const Model<2>&);
-template Inventory taken_inventory(const Model<3>&);
-template void sort_particles(Model<2>&);
-template void sort_particles(Model<3>&);
-template void find_cell_runs(Model<2>&, bool);
-template void find_cell_runs(Model<3>&, bool);
-template void shrink_soil(Model<2>&);
-template void shrink_soil(Model<3>&);
+#define INSTANTIATE(G)                                                                                                 \
+  template void set_laws(Model<G>&, std::vector<Law>, std::vector<Index>);                                             \
+  template void prepare(Model<G>&);                                                                                    \
+  template Inventory taken_inventory(const Model<G>&);                                                                 \
+  template void sort_particles(Model<G>&);                                                                             \
+  template void find_cell_runs(Model<G>&, bool);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -1,17 +1,14 @@
 #pragma once
 /// @file
-/// All that a run consists of, as plain data: mesh, particles, laws, loads, supports, and the room that steps work in.
+/// All that a run consists of, as plain data: mesh, particles, laws, loads, and the velocity fields that move them.
 
 #include "base/phases.h"
 #include "materials/laws/law.h"
 #include "model/energy.h"
+#include "model/velocity_field.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
-#include "transfer/dual_domain.h"
 #include "transfer/kinematics.h"
-#include "transfer/mixed_discretisation.h"
-#include "transfer/nodes.h"
-#include "transfer/supports.h"
 
 #include <optional>
 
@@ -20,25 +17,9 @@ namespace mpm
 /// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
 inline constexpr Index batch_size = 256;
 
-/// How the stresses of a cell become forces at its nodes (14).
-enum class Integration
-{
-  particles,  ///< the sum over its particles: the material point method as it is
-  mixed,      ///< a full cell integrates the mean stress of its particles over its volume; others as above
-  dual_domain ///< gradients that are continuous over the sides of cells; see transfer/dual_domain.h
-};
-
-/// Mean of the velocity gradient over the cells that share a node; plain doubles.
-template <int D>
-struct MeanGradient
-{
-  double volume;
-  Matrix<D> gradient;
-};
-
 /// What stops a run, with its place.
 template <int D>
-struct Trouble
+struct Failure
 {
   enum class Kind
   {
@@ -84,64 +65,81 @@ struct Inventory
   double mass = 0; ///< [kg]
 };
 
-/// Room that steps work in; valid between steps only as far as said.
-template <int D>
-struct Workspace
+/// The order of the particles by cells.
+struct CellOrder
 {
-  bool ready = false;                    ///< runs and moments agree with the particles
-  std::vector<Run> runs;                 ///< of the particles as they are now
-  std::vector<unsigned char> cell_marks; ///< room, one per cell; all zero
-  Array<CellMoments<D>> moments;         ///< of the particles as they are now; zero outside of `soil`
-  Array<TractionMoments<D>> tractions;   ///< likewise; empty where no particle carries any
-  MeshPart soil;                         ///< where particles are, or have been since the last sort
-  bool soil_shrinks = false;             ///< cells that have become empty are to be left out
-  Array<NodeSums<D>> nodes;
-  std::vector<Vector<D>> start_velocity;             ///< v_i at the start of the step
-  std::vector<Vector<D>> acceleration;               ///< a_i
-  std::vector<Vector<D>> velocity_change;            ///< of the nodes, as the particles take it
-  std::vector<Vector<D>> velocity;                   ///< v_i that moves and strains the particles
-  std::vector<VolumetricStrain> volumetric_strain;   ///< of the nodes; used with nodal mixed discretisation
-  std::vector<DualStress<D>> dual_cells, dual_nodes; ///< used with dual domains, as are the mean gradients of nodes
-  std::vector<MeanGradient<D>> mean_gradients;
-  std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it
-  std::vector<unsigned char> whole;         ///< per owned cell, at the step's start: 1 where full; not with particles
-  std::vector<Index> strayed;               ///< particles that entered another cell of this rank in this pass
-  std::vector<Index> left;                  ///< cells that some particle left in this pass
-  std::vector<Leaver> leavers;
+  std::vector<Run> runs;            ///< of the particles as they are now
+  std::vector<unsigned char> marks; ///< scratch, one per cell; all zero
+  Index out_of_order = 0;           ///< particles that changed cell since the last sort
+  std::int64_t cost = 0;            ///< their sum over the steps since
+};
+
+/// What changes cells or ranks in a step.
+struct Migration
+{
+  std::unordered_map<GlobalIndex, Index> owned_cells; ///< local number by that over all ranks
+  std::vector<Index> entered;                         ///< particles that entered another cell of this rank
+  std::vector<MigratingParticle> migrating;
   std::vector<Index> outflow;
   std::vector<Index> lost;       ///< particles that no cell known to this rank's neighbourhood holds
   std::vector<int> far_partners; ///< ranks beyond the neighbours that exchange particles after this pass
-  std::unordered_map<GlobalIndex, Index> owned_cells;
-  std::optional<Trouble<D>> trouble;
-  double least_mass = 0;        ///< nodes below this mass are not moved [kg]
-  Index strays = 0;             ///< particles that changed cell since the last sort
-  std::int64_t stray_steps = 0; ///< their sum over the steps since
 };
 
-template <int D>
+template <class G, int D = G::dim>
 struct Model
 {
   Mesh<D> mesh;
   NodeExchange exchange;
   Particles<D> particles;
   std::vector<Law> laws;
-  std::vector<Support<D>> supports;
+  std::vector<VelocityField<G>> fields = std::vector<VelocityField<G>>(1);
+  std::vector<Index> field_of_law; ///< number of the velocity field of the particles that follow each law
   std::vector<Index> outflow_tags;
-  Integration integration = Integration::particles; ///< of the run under way
-  Vector<D> gravity{};                              ///< [m/s2]
-  double gravity_ramp = 0;                          ///< time over which gravity rises from zero [s]
-  double time = 0;                                  ///< [s]
+  Vector<D> gravity{};     ///< [m/s2]
+  double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
+  double time = 0;         ///< [s]
   Totals totals;
   EnergyBook energy;
   PhaseSeconds phase_seconds{}; ///< of the explicit steps on this rank since the model was made
   Inventory inventory;          ///< when the particles were last changed by anything but a step
   LastStep last;
-  Workspace<D> work;
+  CellOrder order;
+  Migration migration;
+  std::optional<Failure<D>> failure; ///< what stopped the run, on all ranks after a step
+  bool ready = false;                ///< order and velocity fields agree with the particles
 };
 
+/// The velocity field that moves the particles of a law.
+template <class G>
+inline VelocityField<G>& field_of(Model<G>& model, Index material)
+{
+  return model.fields[static_cast<std::size_t>(model.field_of_law[static_cast<std::size_t>(material)])];
+}
+template <class G>
+inline const VelocityField<G>& field_of(const Model<G>& model, Index material)
+{
+  return model.fields[static_cast<std::size_t>(model.field_of_law[static_cast<std::size_t>(material)])];
+}
+
+/// Gives the model its laws, with room for their state variables, and the number of the velocity field of each.
+/// @param field_of_law  from 0, without gaps; empty for one field
+/// @throws InputError numbers with gaps, or not one for each law
+template <class G>
+void set_laws(Model<G>& model, std::vector<Law> laws, std::vector<Index> field_of_law = {});
+
+/// Gives all velocity fields these boundary conditions, in the place of those they had.
+/// @note Collective
+template <class G, int D = G::dim>
+void set_supports(Model<G>& model, const std::vector<SupportRequest<D>>& requests)
+{
+  const auto supports = make_supports<G>(model.mesh, model.exchange, requests);
+  for (VelocityField<G>& field : model.fields)
+    field.supports = supports;
+}
+
 /// Gravity at a time, with its ramp.
-template <int D>
-inline Vector<D> gravity_at(const Model<D>& model, double time)
+template <class G, int D = G::dim>
+inline Vector<D> gravity_at(const Model<G>& model, double time)
 {
   Vector<D> g = model.gravity;
   if (time < model.gravity_ramp)
@@ -150,58 +148,47 @@ inline Vector<D> gravity_at(const Model<D>& model, double time)
   return g;
 }
 
-/// Gravity at the model's time.
-template <int D>
-inline Vector<D> current_gravity(const Model<D>& model)
-{
-  return gravity_at(model, model.time);
-}
-
 /// Sorts the particles, gathers runs and moments, and gives nodes the sums and velocities at the start; needed after
 /// anything but a step has changed the particles. Does nothing when they are up to date.
 /// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive
 /// @note Collective
-template <int D>
-void prepare(Model<D>& model);
+template <class G>
+void prepare(Model<G>& model);
 
-/// Trouble with a particle.
+/// The failure of a particle.
 template <int D>
-Trouble<D> trouble_with(const Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
-                        const SymTensor<D>& strain_increment);
+Failure<D> failure_of(const Particles<D>& particles, typename Failure<D>::Kind kind, Index particle,
+                      const SymTensor<D>& strain_increment);
 
 /// Notes what stops the run and where, unless something was noted before.
 template <int D>
-void note_trouble(Model<D>& model, typename Trouble<D>::Kind kind, Index particle,
-                  const SymTensor<D>& strain_increment);
+void note_failure(std::optional<Failure<D>>& failure, const Particles<D>& particles, typename Failure<D>::Kind kind,
+                  Index particle, const SymTensor<D>& strain_increment);
 
-/// The trouble of the lowest rank that has one, on all ranks.
+/// The failure of the lowest rank that has one, on all ranks.
 /// @note Collective
 template <int D>
-std::optional<Trouble<D>> shared_trouble(const NodeExchange& exchange, const std::optional<Trouble<D>>& own);
+std::optional<Failure<D>> shared_failure(const NodeExchange& exchange, const std::optional<Failure<D>>& own);
 
-/// Settles with all ranks what became of the particles in `work.lost`: they are in a cell of some rank and leave for
-/// it, went through an outflow facet, or are trouble. Then makes `work.trouble` known to all: that of the lowest rank
-/// that has one.
+/// Agrees with all ranks what became of the lost particles: they are in a cell of some rank and migrate to it, went
+/// through an outflow facet, or are a failure. Then makes `model.failure` known to all: that of the lowest rank that
+/// has one.
 /// @note Collective
-template <int D>
-void agree_on_trouble(Model<D>& model);
+template <class G>
+void agree_on_failure(Model<G>& model);
 
 /// The particles on all ranks, those that flowed out included.
 /// @note Collective
-template <int D>
-Inventory taken_inventory(const Model<D>& model);
+template <class G>
+Inventory taken_inventory(const Model<G>& model);
 
 /// Puts the particles back in cell order and finds their runs.
-template <int D>
-void sort_particles(Model<D>& model);
+template <class G>
+void sort_particles(Model<G>& model);
 
-/// Finds the runs of the particles as they are now, and which of them are the first ones in their cells. Cells that the
-/// last particle has left get moments of exactly zero.
+/// Finds the runs of the particles as they are now, and which of them are the first ones of their field in their cells.
+/// Cells that the last particle of a field has left get moments of exactly zero.
 /// @param again  the order of the particles is as before, and only those of scattered runs have changed cells
-template <int D>
-void find_cell_runs(Model<D>& model, bool again);
-
-/// Leaves out of `work.soil` the cells that have become empty, if it is to shrink.
-template <int D>
-void shrink_soil(Model<D>& model);
+template <class G>
+void find_cell_runs(Model<G>& model, bool again);
 } // namespace mpm

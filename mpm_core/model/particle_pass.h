@@ -13,20 +13,21 @@ struct PassOptions
   bool move;          ///< velocities (18) and positions (20)
   bool stress;        ///< strain increment and stress update
   double pic_share;   ///< share of the grid's velocity in the particle's, 0 is FLIP
-  bool averaged;      ///< take volumetric strains from `work.volumetric_strain` (nodal mixed discretisation)
+  bool averaged;      ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
   double law_dt;      ///< duration of the increment for laws [s]; infinite where they are given all time
-  bool small = false; ///< small displacements: the strain changes stresses only, not volumes, and turns nothing
+  bool small = false; ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal
-/// `velocity_change` and `velocity` of the workspace, updates their stresses, finds their cells, and gathers the
-/// moments of the particles as they are then. Particles in ghost cells are put on the list of leavers, those that are
-/// in no local cell on the list of lost ones, and neither is gathered.
-template <int D>
-void particle_pass(Model<D>& model, const PassOptions& options);
+/// `velocity_change` and `velocity` of their field, updates their stresses, finds their cells, and gathers the moments
+/// of the particles as they are then. Particles in ghost cells are put on the list of migrating ones, those that are in
+/// no local cell on the list of lost ones, and neither is gathered.
+template <class G>
+void particle_pass(Model<G>& model, const PassOptions& options);
 
-/// Takes outflow particles out, sends leavers to their ranks and gathers arrivals; sorts when order has been lost.
+/// Takes outflow particles out, sends migrating ones to their ranks and gathers arrivals; sorts when order has been
+/// lost.
 /// @note Collective
-template <int D>
-void settle_particles(Model<D>& model);
+template <class G>
+void migrate_particles(Model<G>& model);
 } // namespace mpm

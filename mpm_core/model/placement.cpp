@@ -22,8 +22,8 @@ struct Destination
 
 /// Destinations of this rank's particles, and the ranks beyond its neighbours with which it will exchange particles.
 /// Points in cells that this rank knows are found here; only the others are looked for with all ranks.
-template <int D>
-std::vector<int> find_destinations(const Model<D>& model, const std::unordered_map<GlobalIndex, Index>& owned,
+template <class G, int D = G::dim>
+std::vector<int> find_destinations(const Model<G>& model, const std::unordered_map<GlobalIndex, Index>& owned,
                                    std::vector<Destination<D>>& destinations)
 {
   const Mesh<D>& mesh = model.mesh;
@@ -52,8 +52,8 @@ std::vector<int> find_destinations(const Model<D>& model, const std::unordered_m
 }
 
 /// @throws InputError naming the first particle without a cell
-template <int D>
-void require_cells(const Model<D>& model, const std::vector<Destination<D>>& destinations)
+template <class G, int D = G::dim>
+void require_cells(const Model<G>& model, const std::vector<Destination<D>>& destinations)
 {
   const auto outside =
       std::find_if(destinations.begin(), destinations.end(), [](const auto& to) { return to.cell == none; });
@@ -70,9 +70,10 @@ void require_cells(const Model<D>& model, const std::vector<Destination<D>>& des
 }
 } // namespace
 
-template <int D>
-void place_particles(Model<D>& model, std::span<const double> positions)
+template <class G>
+void place_particles(Model<G>& model, std::span<const double> positions)
 {
+  constexpr int D = G::dim;
   Particles<D>& particles = model.particles;
   const auto n = static_cast<std::size_t>(particles.size());
   std::vector<Destination<D>> destinations(n);
@@ -82,7 +83,7 @@ void place_particles(Model<D>& model, std::span<const double> positions)
   const std::vector<int> partners = find_destinations(model, owned, destinations);
   collectively(model.exchange.comm, [&] { require_cells(model, destinations); });
 
-  std::vector<Leaver> leavers;
+  std::vector<MigratingParticle> migrating;
   for (std::size_t p = 0; p < n; ++p)
   {
     for (int i = 0; i < D; ++i)
@@ -90,12 +91,13 @@ void place_particles(Model<D>& model, std::span<const double> positions)
     if (destinations[p].rank == model.exchange.rank)
       particles.cell[p] = owned.at(destinations[p].cell);
     else
-      leavers.push_back({static_cast<Index>(p), destinations[p].cell, destinations[p].rank});
+      migrating.push_back({static_cast<Index>(p), destinations[p].cell, destinations[p].rank});
   }
-  migrate<D>(owned, model.exchange, {leavers, {}, partners}, particles);
-  model.work.ready = false;
+  migrate<D>(owned, model.exchange, {migrating, {}, partners}, particles);
+  model.ready = false;
 }
 
-template void place_particles(Model<2>&, std::span<const double>);
-template void place_particles(Model<3>&, std::span<const double>);
+template void place_particles(Model<PlaneStrain>&, std::span<const double>);
+template void place_particles(Model<Axisymmetric>&, std::span<const double>);
+template void place_particles(Model<Solid>&, std::span<const double>);
 } // namespace mpm

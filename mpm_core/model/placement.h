@@ -12,6 +12,6 @@ namespace mpm
 /// @throws InputError on all ranks, naming a particle that would be outside of the mesh; then no particle is changed
 /// @post Particles may have another order, and other ranks
 /// @note Collective
-template <int D>
-void place_particles(Model<D>& model, std::span<const double> positions);
+template <class G>
+void place_particles(Model<G>& model, std::span<const double> positions);
 } // namespace mpm

@@ -5,8 +5,8 @@
 
 namespace mpm
 {
-template <int D>
-void set_partition(Model<D>& model, const Mesh<D>& mesh)
+template <class G, int D>
+void set_partition(Model<G>& model, const Mesh<D>& mesh)
 {
   prepare(model); // so that ranks agree on which columns there are
   std::vector<GlobalIndex> cells;
@@ -14,13 +14,17 @@ void set_partition(Model<D>& model, const Mesh<D>& mesh)
     cells.push_back(model.mesh.global_cells[cell]);
   model.mesh = mesh;
   model.exchange = make_node_exchange(mesh, model.exchange.comm);
-  model.supports.clear();
   redistribute<D>(mesh, model.exchange, cells, model.particles);
-  model.work = {};
+  for (VelocityField<G>& field : model.fields)
+    field = {};
+  model.order = {};
+  model.migration = {};
+  model.ready = false;
   prepare(model);
   map_to_nodes(model);
 }
 
-template void set_partition(Model<2>&, const Mesh<2>&);
-template void set_partition(Model<3>&, const Mesh<3>&);
+template void set_partition(Model<PlaneStrain>&, const Mesh<2>&);
+template void set_partition(Model<Axisymmetric>&, const Mesh<2>&);
+template void set_partition(Model<Solid>&, const Mesh<3>&);
 } // namespace mpm

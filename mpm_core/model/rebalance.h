@@ -9,8 +9,8 @@ namespace mpm
 /// Replaces the model's mesh by the same one cut otherwise, and sends each particle to the rank that owns its cell now.
 /// Sums over cells are gathered anew.
 /// @param mesh  with the same cells, by their numbers over all ranks
-/// @post There are no supports; they must be set again, for the new nodes
+/// @post There are no boundary conditions; they must be set again, for the new nodes
 /// @note Collective
-template <int D>
-void set_partition(Model<D>& model, const Mesh<D>& mesh);
+template <class G, int D = G::dim>
+void set_partition(Model<G>& model, const Mesh<D>& mesh);
 } // namespace mpm

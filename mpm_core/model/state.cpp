@@ -18,6 +18,12 @@ enum class Kind
   own     ///< of one rank only; begins anew
 };
 
+/// A name with the number of a velocity field; that of the first one goes without.
+std::string numbered(const std::string& name, std::size_t field)
+{
+  return field == 0 ? name : name + "_" + std::to_string(field);
+}
+
 /// The one list of numbers: calls f(name, kind, number).
 template <class M, class F>
 void for_each_number(M& model, F&& f)
@@ -25,7 +31,8 @@ void for_each_number(M& model, F&& f)
   f("time", Kind::common, model.time);
   f("steps", Kind::common, model.totals.steps);
   f("last_dt", Kind::common, model.last.dt);
-  f("least_mass", Kind::common, model.work.least_mass);
+  for (std::size_t k = 0; k < model.fields.size(); ++k)
+    f(numbered("least_mass", k), Kind::common, model.fields[k].least_mass);
   f("seeded_particles", Kind::common, model.inventory.particles);
   f("seeded_mass", Kind::common, model.inventory.mass);
   f("particle_steps", Kind::sum, model.totals.particle_steps);
@@ -47,45 +54,47 @@ void for_each_number(M& model, F&& f)
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   f("sorts", Kind::own, model.totals.sorts);
-  f("strays", Kind::own, model.work.strays);
-  f("stray_steps", Kind::own, model.work.stray_steps);
+  f("strays", Kind::own, model.order.out_of_order);
+  f("stray_steps", Kind::own, model.order.cost);
 }
 
 template <class Moments>
 constexpr int moments_width = sizeof(Moments) / sizeof(double);
 
-template <int D, class Moments>
-Table table_of(const Model<D>& model, const char* name, const Array<Moments>& moments)
+/// Moments of the filled cells.
+template <class G, class Moments, int D = G::dim>
+Table table_of(const Mesh<D>& mesh, const VelocityField<G>& field, const std::string& name,
+               const Array<Moments>& moments)
 {
   constexpr std::size_t width = moments_width<Moments>;
   Table table{name, moments_width<Moments> + 1, {}};
   for (std::size_t c = 0; c < moments.size(); ++c)
-    if (model.work.moments[c].mass != 0)
+    if (field.moments[c].mass != 0)
     {
-      table.values.push_back(static_cast<double>(model.mesh.global_cells[c]));
+      table.values.push_back(static_cast<double>(mesh.global_cells[c]));
       table.values.resize(table.values.size() + width);
       std::memcpy(&table.values[table.values.size() - width], &moments[c], sizeof(Moments));
     }
   return table;
 }
 
-template <int D, class Moments>
-void take(const Model<D>& model, const Table& table, Array<Moments>& moments)
+template <class Moments>
+void take(const Migration& migration, const Table& table, Array<Moments>& moments)
 {
   std::fill(moments.begin(), moments.end(), Moments{});
   const auto width = static_cast<std::size_t>(table.width);
   for (std::size_t k = 0; k < table.values.size(); k += width)
   {
-    const Index cell = model.work.owned_cells.at(static_cast<GlobalIndex>(table.values[k]));
+    const Index cell = migration.owned_cells.at(static_cast<GlobalIndex>(table.values[k]));
     std::memcpy(&moments[static_cast<std::size_t>(cell)], &table.values[k + 1], sizeof(Moments));
   }
 }
 
-template <int D>
-void set_number(Model<D>& model, const Table& table, double value)
+template <class G>
+void set_number(Model<G>& model, const Table& table, double value)
 {
   for_each_number(model,
-                  [&](const char* name, Kind, auto& number)
+                  [&](const std::string& name, Kind, auto& number)
                   {
                     if (table.name == name)
                       number = static_cast<std::remove_cvref_t<decltype(number)>>(value);
@@ -93,10 +102,10 @@ void set_number(Model<D>& model, const Table& table, double value)
 }
 
 /// Files of before the energy balance do not have its numbers.
-template <int D>
-void begin_balance_where_unknown(Model<D>& model, const std::vector<Table>& ranks)
+template <class G>
+void begin_balance_where_unknown(Model<G>& model, const std::vector<Table>& ranks)
 {
-  if (std::none_of(ranks.begin(), ranks.end(), [](const Table& table) { return is_of_energy(table.name); }))
+  if (std::ranges::none_of(ranks, [](const Table& table) { return is_of_energy(table.name); }))
     start_energy_balance(model);
   model.energy.stale = false;
 }
@@ -104,12 +113,12 @@ void begin_balance_where_unknown(Model<D>& model, const std::vector<Table>& rank
 
 bool is_of_energy(std::string_view name) { return name.starts_with("energy_"); }
 
-template <int D>
-std::vector<Table> rank_state(const Model<D>& model)
+template <class G, int D>
+std::vector<Table> rank_state(const Model<G>& model)
 {
   std::vector<Table> tables;
   for_each_number(model,
-                  [&](const char* name, Kind, const auto& number)
+                  [&](const std::string& name, Kind, const auto& number)
                   {
                     using Limits = std::numeric_limits<std::remove_cvref_t<decltype(number)>>;
                     const double most_count = Limits::is_integer ? static_cast<double>(Limits::max()) : 0.0;
@@ -118,57 +127,71 @@ std::vector<Table> rank_state(const Model<D>& model)
   return tables;
 }
 
-template <int D>
-std::vector<Table> cell_state(const Model<D>& model)
+template <class G, int D>
+std::vector<Table> cell_state(const Model<G>& model)
 {
-  std::vector<Table> tables{table_of<D>(model, "moments", model.work.moments)};
-  if (!model.work.tractions.empty())
-    tables.push_back(table_of<D>(model, "traction_moments", model.work.tractions));
+  std::vector<Table> tables;
+  for (std::size_t k = 0; k < model.fields.size(); ++k)
+  {
+    const VelocityField<G>& field = model.fields[k];
+    tables.push_back(table_of(model.mesh, field, numbered("moments", k), field.moments));
+    if (!field.tractions.empty())
+      tables.push_back(table_of(model.mesh, field, numbered("traction_moments", k), field.tractions));
+  }
   return tables;
 }
 
-template <int D>
-std::vector<Table> empty_cell_state()
+template <class G, int D>
+std::vector<Table> empty_cell_state(const Model<G>& model)
 {
-  return {{"moments", moments_width<CellMoments<D>> + 1, {}},
-          {"traction_moments", moments_width<TractionMoments<D>> + 1, {}}};
+  std::vector<Table> tables;
+  for (std::size_t k = 0; k < model.fields.size(); ++k)
+  {
+    tables.push_back({numbered("moments", k), moments_width<CellMoments<G>> + 1, {}});
+    tables.push_back({numbered("traction_moments", k), moments_width<TractionMoments<D>> + 1, {}});
+  }
+  return tables;
 }
 
-template <int D>
-void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<Table>& ranks,
+template <class G, int D>
+void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<Table>& ranks,
                   const std::vector<Table>& cells)
 {
   model.particles = particles;
   model.totals = {};
   model.energy = {};
-  model.work.ready = false;
-  model.work.trouble.reset();
-  prepare(model); // makes room, and sorts; the order comes back below
+  model.ready = false;
+  model.failure.reset();
+  prepare(model); // takes memory, and sorts; the order comes back below
   model.particles = std::move(particles);
   find_cell_runs(model, false);
-  model.work.soil_shrinks = true;
-  for (const Table& table : cells)
-    if (table.name == "moments")
-      take<D>(model, table, model.work.moments);
-    else
-      take<D>(model, table, model.work.tractions);
+  for (std::size_t k = 0; k < model.fields.size(); ++k)
+  {
+    VelocityField<G>& field = model.fields[k];
+    field.part_shrinks = true;
+    for (const Table& table : cells)
+      if (table.name == numbered("moments", k))
+        take(model.migration, table, field.moments);
+      else if (table.name == numbered("traction_moments", k))
+        take(model.migration, table, field.tractions);
+  }
   for (const Table& table : ranks)
     set_number(model, table, table.values.front());
   begin_balance_where_unknown(model, ranks);
   map_to_nodes(model); // so that nodal sums are there before the first step
 }
 
-template <int D>
-void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<Table>& ranks)
+template <class G, int D>
+void restore_other(Model<G>& model, Particles<D>&& particles, const std::vector<Table>& ranks)
 {
   model.particles = std::move(particles);
   model.totals = {};
   model.energy = {};
-  model.work.ready = false;
-  model.work.trouble.reset();
+  model.ready = false;
+  model.failure.reset();
   prepare(model);
   for_each_number(model,
-                  [&](const char* name, Kind kind, auto& number)
+                  [&](const std::string& name, Kind kind, auto& number)
                   {
                     for (const Table& table : ranks)
                     {
@@ -186,12 +209,13 @@ void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<
   map_to_nodes(model);
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template std::vector<Table> rank_state(const Model<D>&);                                                             \
-  template std::vector<Table> cell_state(const Model<D>&);                                                             \
-  template std::vector<Table> empty_cell_state<D>();                                                                   \
-  template void restore_same(Model<D>&, Particles<D>&&, const std::vector<Table>&, const std::vector<Table>&);         \
-  template void restore_other(Model<D>&, Particles<D>&&, const std::vector<Table>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template std::vector<Table> rank_state(const Model<G>&);                                                             \
+  template std::vector<Table> cell_state(const Model<G>&);                                                             \
+  template std::vector<Table> empty_cell_state(const Model<G>&);                                                       \
+  template void restore_same(Model<G>&, Particles<G::dim>&&, const std::vector<Table>&, const std::vector<Table>&);    \
+  template void restore_other(Model<G>&, Particles<G::dim>&&, const std::vector<Table>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -9,8 +9,8 @@ namespace mpm
 {
 /// Numbers that each rank has one of: time, totals, and what decides when particles are sorted.
 /// @post each table has one row
-template <int D>
-std::vector<Table> rank_state(const Model<D>& model);
+template <class G, int D = G::dim>
+std::vector<Table> rank_state(const Model<G>& model);
 
 /// Whether a number of `rank_state` belongs to the energy balance, which files of before it do not have.
 bool is_of_energy(std::string_view name);
@@ -19,23 +19,23 @@ bool is_of_energy(std::string_view name);
 /// their last bits, and a run that goes on with them would be another one. The first number of a row is the cell over
 /// all ranks.
 /// @pre prepare(model) has been called
-template <int D>
-std::vector<Table> cell_state(const Model<D>& model);
+template <class G, int D = G::dim>
+std::vector<Table> cell_state(const Model<G>& model);
 
 /// The tables that `cell_state` may give, without rows.
-template <int D>
-std::vector<Table> empty_cell_state();
+template <class G, int D = G::dim>
+std::vector<Table> empty_cell_state(const Model<G>& model);
 
 /// Puts particles and state of a run into the model, as they were on the same rank; the next step is then the same to
 /// the last bit.
 /// @note Collective
-template <int D>
-void restore_same(Model<D>& model, Particles<D>&& particles, const std::vector<Table>& ranks,
+template <class G, int D = G::dim>
+void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<Table>& ranks,
                   const std::vector<Table>& cells);
 
 /// The same from a run on another partition.
 /// @param ranks  a row for each rank of that run
 /// @note Collective
-template <int D>
-void restore_other(Model<D>& model, Particles<D>&& particles, const std::vector<Table>& ranks);
+template <class G, int D = G::dim>
+void restore_other(Model<G>& model, Particles<D>&& particles, const std::vector<Table>& ranks);
 } // namespace mpm

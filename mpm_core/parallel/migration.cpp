@@ -12,19 +12,19 @@ using Bytes = std::vector<std::byte>;
 /// Appends a particle's columns in the order of the schedule, and ahead of them its cell by its global number. The
 /// initial value stands for an optional column that is absent.
 template <int D>
-void pack(const Particles<D>& particles, const Leaver& leaver, Bytes& bytes)
+void pack(const Particles<D>& particles, const MigratingParticle& migrant, Bytes& bytes)
 {
   auto put = [&bytes](const auto& value)
   {
     const auto* data = reinterpret_cast<const std::byte*>(&value);
     bytes.insert(bytes.end(), data, data + sizeof(value));
   };
-  put(leaver.cell);
+  put(migrant.cell);
   for_each_field(particles,
                  [&](const Field& field, const auto& columns)
                  {
                    for (const auto& column : columns_of(columns))
-                     put(is_present(columns) ? column[leaver.particle]
+                     put(is_present(columns) ? column[migrant.particle]
                                              : static_cast<std::remove_cvref_t<decltype(column[0])>>(field.initial));
                  });
 }
@@ -109,11 +109,11 @@ Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const 
   const std::vector<int> partners = partners_of(exchange, departures.far_partners);
   std::vector<Bytes> send(partners.size());
   std::vector<Index> numbers(departures.outflow.begin(), departures.outflow.end());
-  for (const Leaver& leaver : departures.leavers)
+  for (const MigratingParticle& migrant : departures.migrating)
   {
-    const auto to = std::lower_bound(partners.begin(), partners.end(), leaver.rank) - partners.begin();
-    pack<D>(particles, leaver, send[static_cast<std::size_t>(to)]);
-    numbers.push_back(leaver.particle);
+    const auto to = std::lower_bound(partners.begin(), partners.end(), migrant.rank) - partners.begin();
+    pack<D>(particles, migrant, send[static_cast<std::size_t>(to)]);
+    numbers.push_back(migrant.particle);
   }
   std::vector<MPI_Request> requests(partners.size());
   const int tag = 2;

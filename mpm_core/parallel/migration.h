@@ -10,7 +10,7 @@
 namespace mpm
 {
 /// A particle that now lies in a cell of another rank.
-struct Leaver
+struct MigratingParticle
 {
   Index particle;
   GlobalIndex cell; ///< over all ranks
@@ -20,7 +20,7 @@ struct Leaver
 /// All that leaves this rank at once.
 struct Departures
 {
-  std::span<const Leaver> leavers;
+  std::span<const MigratingParticle> migrating;
   std::span<const Index> outflow; ///< particles to take out without sending them
   /// Ranks beyond the neighbours with which particles are exchanged; they must name each other. By rising rank.
   std::span<const int> far_partners;
@@ -35,10 +35,10 @@ void agree_on_fields(Particles<D>& particles, MPI_Comm comm);
 template <int D>
 std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh);
 
-/// Sends leavers, with all their columns, to the ranks that own their cells, takes them out here, and appends those
+/// Sends migrating, with all their columns, to the ranks that own their cells, takes them out here, and appends those
 /// that arrive, by rising rank. One packed message per neighbour and far partner.
 /// @param cell_numbers  of this rank's owned cells, as `owned_cell_numbers` gives them
-/// @pre The ranks of leavers are neighbours or far partners
+/// @pre The ranks of migrating are neighbours or far partners
 /// @returns number of particles that arrived; they are the last ones
 /// @note Collective over neighbours and far partners
 template <int D>

@@ -44,11 +44,11 @@ std::vector<int> owners(const Mesh<D>& mesh, const NodeExchange& exchange, std::
 }
 
 /// Ranks that send particles to this one or take some from it, by rising rank.
-std::vector<int> partners(const NodeExchange& exchange, const std::vector<Leaver>& leavers)
+std::vector<int> partners(const NodeExchange& exchange, const std::vector<MigratingParticle>& migrating)
 {
   Lists counts(static_cast<std::size_t>(exchange.size));
-  for (const Leaver& leaver : leavers)
-    counts[static_cast<std::size_t>(leaver.rank)].resize(1, 1);
+  for (const MigratingParticle& migrant : migrating)
+    counts[static_cast<std::size_t>(migrant.rank)].resize(1, 1);
   const Lists received = exchanged(counts, exchange.comm);
   std::vector<int> ranks;
   for (std::size_t r = 0; r < counts.size(); ++r)
@@ -72,14 +72,14 @@ void redistribute(const Mesh<D>& mesh, const NodeExchange& exchange, std::span<c
   if (const std::string text = shared_failure(exchange.comm, failure); !text.empty())
     throw RunError(text);
 
-  std::vector<Leaver> leavers;
+  std::vector<MigratingParticle> migrating;
   for (std::size_t p = 0; p < ranks.size(); ++p)
     if (ranks[p] != exchange.rank)
-      leavers.push_back({static_cast<Index>(p), cells[p], ranks[p]});
+      migrating.push_back({static_cast<Index>(p), cells[p], ranks[p]});
     else
       particles.cell[p] = numbers.at(cells[p]);
-  const std::vector<int> far = partners(exchange, leavers);
-  migrate<D>(numbers, exchange, {leavers, {}, far}, particles);
+  const std::vector<int> far = partners(exchange, migrating);
+  migrate<D>(numbers, exchange, {migrating, {}, far}, particles);
 
   std::vector<Index> order(particles.id.size());
   std::iota(order.begin(), order.end(), 0);

@@ -139,7 +139,7 @@ std::vector<std::array<double, D + 1>> even_points(int count)
   return points;
 }
 
-template <int D>
+template <class G, int D>
 Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, SeedMaterial soil, GlobalIndex first_id,
                  Particles<D>& particles)
 {
@@ -159,7 +159,7 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
         for (int i = 0; i < D; ++i)
           x[i] += points[static_cast<std::size_t>(k)][v] * mesh.points[mesh.cells[c][v]][i];
       set_particle<D>(particles, p, first_id + mesh.global_cells[c] * per_cell + k, x, c,
-                      mesh.shapes[c].volume / per_cell, soil);
+                      thickness<G>(x) * mesh.shapes[c].volume / per_cell, soil);
     }
   return static_cast<Index>(cells.size()) * per_cell;
 }
@@ -185,9 +185,11 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
   return added;
 }
 
-template <int D>
-double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& traction, Particles<D>& particles)
+template <class G>
+double load_facets(const Mesh<G::dim>& mesh, Index facet_tag, const Vector<G::dim>& traction,
+                   Particles<G::dim>& particles)
 {
+  constexpr int D = G::dim;
   require(particles.traction,
           particles.id.size()); // on ranks without such facets, too, so that all have the same columns
   std::vector<std::vector<Index>> of_cell(static_cast<std::size_t>(mesh.owned_cells));
@@ -205,23 +207,39 @@ double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& tracti
       for (Index p : inside)
         distance.push_back(shape_functions<D>(mesh.shapes[c], at<D>(particles.position, p))[k]);
       const double nearest = *std::min_element(distance.begin(), distance.end());
-      const auto count = std::count_if(distance.begin(), distance.end(), [&](double d) { return d < nearest + 1e-6; });
-      const double area = D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
+      Vector<D> middle{};
+      for (Index node : facet_nodes<D>(mesh.cells[c], k))
+        for (int i = 0; i < D; ++i)
+          middle[i] += mesh.points[node][i] / D;
+      const double area = thickness<G>(middle) * D * mesh.shapes[c].volume * norm<D>(mesh.shapes[c].gradient[k]);
+      double weights = 0; // by the particles' own radius in axial symmetry
       for (std::size_t j = 0; j < inside.size(); ++j)
         if (distance[j] < nearest + 1e-6)
+          weights += thickness<G>(at<D>(particles.position, inside[j]));
+      for (std::size_t j = 0; j < inside.size(); ++j)
+        if (distance[j] < nearest + 1e-6)
+        {
+          const double part = thickness<G>(at<D>(particles.position, inside[j])) / weights;
           for (int i = 0; i < D; ++i)
-            particles.traction[i][inside[j]] += traction[i] * area / static_cast<double>(count);
+            particles.traction[i][inside[j]] += traction[i] * area * part;
+        }
       total += area;
     }
   return total;
 }
 
+#define INSTANTIATE(G)                                                                                                 \
+  template Index seed_cells<G>(const Mesh<G::dim>&, std::optional<Index>, int, SeedMaterial, GlobalIndex,              \
+                               Particles<G::dim>&);                                                                    \
+  template double load_facets<G>(const Mesh<G::dim>&, Index, const Vector<G::dim>&, Particles<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+#undef INSTANTIATE
 #define INSTANTIATE(D)                                                                                                 \
   template std::vector<std::array<double, D + 1>> even_points<D>(int);                                                 \
-  template Index seed_cells(const Mesh<D>&, std::optional<Index>, int, SeedMaterial, GlobalIndex, Particles<D>&);      \
   template Index seed_points(const Mesh<D>&, std::span<const double>, std::span<const double>, SeedMaterial,           \
-                             GlobalIndex, Particles<D>&);                                                              \
-  template double load_facets<D>(const Mesh<D>&, Index, const Vector<D>&, Particles<D>&);
+                             GlobalIndex, Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
 } // namespace mpm

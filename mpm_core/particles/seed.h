@@ -28,7 +28,7 @@ struct SeedMaterial
 /// `global cell number * per_cell + k + first_id`, so they do not depend on the partition.
 /// @returns number of particles added on this rank
 /// @throws InputError per_cell, density
-template <int D>
+template <class G, int D = G::dim>
 Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, SeedMaterial soil, GlobalIndex first_id,
                  Particles<D>& particles);
 
@@ -44,6 +44,7 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
 /// `traction * facet area` is shared evenly by the particles nearest to it. The force is dead: it moves with its
 /// particles and keeps its direction.
 /// @returns area [m^(D-1)] of the loaded facets on this rank
-template <int D>
-double load_facets(const Mesh<D>& mesh, Index facet_tag, const Vector<D>& traction, Particles<D>& particles);
+template <class G>
+double load_facets(const Mesh<G::dim>& mesh, Index facet_tag, const Vector<G::dim>& traction,
+                   Particles<G::dim>& particles);
 } // namespace mpm

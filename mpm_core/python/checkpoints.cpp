@@ -10,8 +10,8 @@ namespace
 {
 namespace py = pybind11;
 
-template <int D>
-void save(Model<D>& model, const std::string& path, const std::string& description, bool with_partition)
+template <class G, int D = G::dim>
+void save(Model<G>& model, const std::string& path, const std::string& description, bool with_partition)
 {
   prepare(model);
   StateTables state{rank_state(model), cell_state(model)};
@@ -20,10 +20,10 @@ void save(Model<D>& model, const std::string& path, const std::string& descripti
   write_checkpoint<D>(model.exchange.comm, path, model.mesh, model.particles, state, description);
 }
 
-template <int D>
-void restore(Model<D>& model, const std::string& path)
+template <class G, int D = G::dim>
+void restore(Model<G>& model, const std::string& path)
 {
-  const StateTables expected{rank_state(model), empty_cell_state<D>()};
+  const StateTables expected{rank_state(model), empty_cell_state(model)};
   Checkpoint<D> checkpoint =
       read_checkpoint<D>(model.exchange, path, model.mesh, model.particles, model.laws.size(), expected);
   if (checkpoint.same_parts)
@@ -32,12 +32,12 @@ void restore(Model<D>& model, const std::string& path)
     restore_other(model, std::move(checkpoint.particles), checkpoint.state.ranks);
 }
 
-template <int D>
+template <class G, int D = G::dim>
 void bind(py::module_& m)
 {
-  m.def("save", &save<D>);
-  m.def("restore", &restore<D>);
-  m.def("mesh_fingerprint", [](const Model<D>& model) { return mesh_fingerprint<D>(model.exchange.comm, model.mesh); });
+  m.def("save", &save<G>);
+  m.def("restore", &restore<G>);
+  m.def("mesh_fingerprint", [](const Model<G>& model) { return mesh_fingerprint<D>(model.exchange.comm, model.mesh); });
 }
 } // namespace
 
@@ -47,7 +47,8 @@ void bind_checkpoints(py::module_& m)
         { return py::bytes(checkpoint_description(communicator(comm), path)); }); // bytes: it may be no text
   m.def("checkpoint_cells", [](std::uintptr_t comm, const std::string& path)
         { return copied(checkpoint_cells(communicator(comm), path)); });
-  bind<2>(m);
-  bind<3>(m);
+  bind<PlaneStrain>(m);
+  bind<Axisymmetric>(m);
+  bind<Solid>(m);
 }
 } // namespace mpm::python

@@ -9,43 +9,43 @@ namespace mpm::python
 namespace
 {
 /// An implicit step of a model, with its linear system.
-template <int D>
+template <class G, int D = G::dim>
 struct Implicit
 {
-  Model<D>& model;
-  ImplicitStep<D> step;
+  Model<G>& model;
+  ImplicitStep<G> step;
   ImplicitSystem<D> system;
   CooEntries stiffness, volumetric_force, volumetric_strain, mean_stress, mean_stress_by_strain;
   Relaxation<D> relaxation;
 };
 
 /// What a trial says; where it failed, with what stopped it in words.
-template <int D>
-py::dict as_dict(const Implicit<D>& implicit, const TrialReport& report)
+template <class G, int D = G::dim>
+py::dict as_dict(const Implicit<G>& implicit, const TrialReport& report)
 {
   using namespace py::literals;
-  const auto& trouble = implicit.step.trouble;
+  const auto& failure = implicit.step.failure;
   return py::dict("residual"_a = report.residual, "scale"_a = report.scale, "plastic"_a = report.plastic,
-                  "failed"_a = report.failed, "reason"_a = trouble ? trouble_text(implicit.model, *trouble) : "");
+                  "failed"_a = report.failed, "reason"_a = failure ? failure_text(implicit.model, *failure) : "");
 }
 
 py::tuple places(const CooEntries& entries) { return py::make_tuple(copied(entries.rows), copied(entries.columns)); }
 
 /// Coordinates of this rank's nodes of the system, (n, D).
-template <int D>
-py::array_t<double> owned_points(const Implicit<D>& implicit)
+template <class G, int D = G::dim>
+py::array_t<double> owned_points(const Implicit<G>& implicit)
 {
   const auto values = owned_values<D>(implicit.system, implicit.model.mesh.points);
   return copied(values).reshape({-1, D});
 }
 
-template <int D>
+template <class G, int D = G::dim>
 void bind_implicit_step(py::module_& m, const std::string& suffix)
 {
-  using I = Implicit<D>;
+  using I = Implicit<G>;
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init([](Model<D>& model) { return I{model, {}, {}, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(py::init([](Model<G>& model) { return I{model, {}, {}, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
@@ -106,21 +106,21 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           [](I& i)
           {
             const bool done = finish_step(i.model, i.step);
-            const std::string why = done ? "" : trouble_text(i.model, *i.model.work.trouble);
-            i.model.work.trouble.reset();
+            const std::string why = done ? "" : failure_text(i.model, *i.model.failure);
+            i.model.failure.reset();
             return why;
           },
           Release())
       .def_property_readonly("owned_nodes", [](const I& i) { return i.system.owned.size(); })
       .def_property_readonly("total_nodes", [](const I& i) { return i.system.total; })
-      .def_property_readonly("points", &owned_points<D>)
+      .def_property_readonly("points", &owned_points<G>)
       .def_property_readonly("residual", [](const I& i) { return copied(owned_values<D>(i.system, i.step.residual)); })
       .def_property(
-          "velocity", [](const I& i) { return copied(owned_values<D>(i.system, i.model.work.velocity)); },
+          "velocity", [](const I& i) { return copied(owned_values<D>(i.system, i.model.fields.front().velocity)); },
           [](I& i, const py::array& array)
           {
             check_array<double>("velocity", array, {static_cast<py::ssize_t>(i.system.owned.size() * D)});
-            set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.work.velocity);
+            set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.fields.front().velocity);
             impose_supports(i.model, i.step);
           })
       .def("stiffness_places", [](const I& i) { return places(i.stiffness); })
@@ -161,7 +161,8 @@ void bind_implicit(py::module_& m)
       .def_readwrite("load_share", &ImplicitOptions::load_share)
       .def_readwrite("second_order", &ImplicitOptions::second_order)
       .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);
-  bind_implicit_step<2>(m, "2");
-  bind_implicit_step<3>(m, "3");
+  bind_implicit_step<PlaneStrain>(m, "2");
+  bind_implicit_step<Axisymmetric>(m, "Axisymmetric");
+  bind_implicit_step<Solid>(m, "3");
 }
 } // namespace mpm::python

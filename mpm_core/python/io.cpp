@@ -45,8 +45,8 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 
 /// Nodal fields of a model by name.
 /// @param carrier  to the nodes of the mesh as it is written; null if the model's is cut in the same way
-template <int D>
-std::vector<OutputField> nodal_fields(const Model<D>& model, const std::vector<std::string>& names, RowCarrier* carrier)
+template <class G, int D = G::dim>
+std::vector<OutputField> nodal_fields(const Model<G>& model, const std::vector<std::string>& names, RowCarrier* carrier)
 {
   std::vector<OutputField> fields;
   for (const std::string& name : names)
@@ -66,8 +66,8 @@ struct ModelFields
 };
 
 /// @throws InputError on all ranks for a field that does not exist, or names that are not the same on all
-template <int D>
-ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector<std::string> particles,
+template <class G, int D = G::dim>
+ModelFields model_fields(std::uintptr_t comm, const Model<G>& model, std::vector<std::string> particles,
                          std::vector<std::string> nodes)
 {
   ModelFields names{std::move(particles), std::move(nodes)};
@@ -93,8 +93,8 @@ ModelFields model_fields(std::uintptr_t comm, const Model<D>& model, std::vector
 /// @param mesh       null if it is not written
 /// @param carrier    as `nodal_fields` takes it
 /// @param more       further fields of the particles
-template <int D>
-void write_model(std::uintptr_t comm, const Model<D>& model, const ModelFields& names, ParticleSeries* particles,
+template <class G, int D = G::dim>
+void write_model(std::uintptr_t comm, const Model<G>& model, const ModelFields& names, ParticleSeries* particles,
                  MeshSeries* mesh, RowCarrier* carrier, const RealFields& more, const IntegerFields& more_integers,
                  const std::string& failure)
 {
@@ -172,9 +172,13 @@ void bind_io(py::module_& m)
       .def("close", [](MeshSeries& series) { series.file().close(); });
 
   py::class_<ModelFields>(m, "ModelFields");
-  m.def("model_fields", &model_fields<2>);
-  m.def("model_fields", &model_fields<3>);
-  m.def("write_model", &write_model<2>);
-  m.def("write_model", &write_model<3>);
+  const auto bind_output = [&m]<class G>(G)
+  {
+    m.def("model_fields", &model_fields<G>);
+    m.def("write_model", &write_model<G>);
+  };
+  bind_output(PlaneStrain{});
+  bind_output(Axisymmetric{});
+  bind_output(Solid{});
 }
 } // namespace mpm::python

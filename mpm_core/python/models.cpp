@@ -76,22 +76,32 @@ py::array_t<Index> cell_rows(const std::vector<std::array<Index, N>>& rows)
   return array;
 }
 
-template <int D>
-std::unique_ptr<Model<D>> new_model(const Mesh<D>& mesh, std::vector<Law> laws, std::uintptr_t comm)
+/// @throws InputError in axial symmetry, a node to the left of the axis
+template <class G>
+void require_radii(const Mesh<G::dim>& mesh)
 {
-  auto model = std::make_unique<Model<D>>();
+  if constexpr (G::has_hoop)
+    for (const auto& point : mesh.points)
+      if (point[0] < 0)
+        throw InputError("points has a node at the radius x = " + std::to_string(point[0]) +
+                         " m, expected 0 or more in axial symmetry, where the axis is x = 0");
+}
+
+template <class G, int D = G::dim>
+std::unique_ptr<Model<G>> new_model(const Mesh<D>& mesh, std::vector<Law> laws, std::vector<Index> velocity_fields,
+                                    std::uintptr_t comm)
+{
+  require_radii<G>(mesh);
+  auto model = std::make_unique<Model<G>>();
   model->mesh = mesh;
   model->exchange = make_node_exchange(mesh, communicator(comm));
-  int states = 0;
-  for (const Law& law : laws)
-    states = std::max(states, n_state(law));
-  model->particles.state.resize(static_cast<std::size_t>(states));
-  model->laws = std::move(laws);
+  set_laws(*model, std::move(laws), std::move(velocity_fields));
+  set_supports(*model, {});
   return model;
 }
 
 template <int D>
-void bind_model(py::module_& m, const std::string& suffix)
+void bind_mesh(py::module_& m, const std::string& suffix)
 {
   py::class_<Mesh<D>, std::shared_ptr<Mesh<D>>>(m, ("Mesh" + suffix).c_str())
       .def(py::init(&mesh_from_arrays<D>))
@@ -120,15 +130,19 @@ void bind_model(py::module_& m, const std::string& suffix)
                volumes.push_back(shape.volume);
              return copied(volumes);
            });
+}
 
-  using M = Model<D>;
+template <class G, int D = G::dim>
+void bind_model(py::module_& m, const std::string& suffix)
+{
+  using M = Model<G>;
   py::class_<M>(m, ("Model" + suffix).c_str())
-      .def(py::init(&new_model<D>))
+      .def(py::init(&new_model<G>))
       .def("seed_cells",
            [](M& model, std::optional<Index> tag, int per_cell, Index material, double density, GlobalIndex first_id)
            {
              changed(model);
-             return seed_cells<D>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
+             return seed_cells<G>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
            })
       .def("seed_points",
            [](M& model, const py::array& points, const py::array& volumes, Index material, double density,
@@ -143,18 +157,18 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def("load_facets",
            [](M& model, Index facet_tag, const Vector<D>& traction)
            {
-             model.work.ready = false;
-             return load_facets<D>(model.mesh, facet_tag, traction, model.particles);
+             model.ready = false;
+             return load_facets<G>(model.mesh, facet_tag, traction, model.particles);
            })
       .def("set_supports",
-           [](M& model, const std::vector<std::tuple<Index, bool, Vector<D>>>& wishes)
+           [](M& model, const std::vector<std::tuple<Index, bool, Vector<D>>>& conditions)
            {
              std::vector<SupportRequest<D>> requests;
-             for (const auto& [tag, whole, vector] : wishes)
+             for (const auto& [tag, whole, vector] : conditions)
                requests.push_back({tag, whole, vector});
-             model.supports = make_supports<D>(model.mesh, model.exchange, requests);
+             set_supports(model, requests);
            })
-      .def("set_partition", &set_partition<D>)
+      .def("set_partition", &set_partition<G>)
       .def_readwrite("outflow_tags", &M::outflow_tags)
       .def_readwrite("gravity", &M::gravity)
       .def_readwrite("gravity_ramp", &M::gravity_ramp)
@@ -174,7 +188,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              prepare(model);
              map_to_nodes(model);
-             return out_of_balance<D>(model, gravity);
+             return out_of_balance(model, gravity);
            })
       .def("run_explicit",
            [](M& model, const ExplicitOptions& options, const RunOptions& run)
@@ -199,21 +213,21 @@ void bind_model(py::module_& m, const std::string& suffix)
                   []
                   {
                     py::list entries;
-                    for_each_nodal_field(M{},
+                    for_each_nodal_field(VelocityField<G>{},
                                          [&](const Field& field, const double*, std::size_t components, std::size_t)
                                          { entries.append(described(field, components, false)); });
                     return entries;
                   })
-      .def("column", &column<D>)
-      .def("single_precision", &single_precision<D>)
-      .def("row_numbers", &row_numbers<D>)
-      .def("find_rows", &find_rows<D>)
-      .def("set_column", &set_column<D>)
+      .def("column", &column<G>)
+      .def("single_precision", &single_precision<G>)
+      .def("row_numbers", &row_numbers<G>)
+      .def("find_rows", &find_rows<G>)
+      .def("set_column", &set_column<G>)
       .def("place_particles",
            [](M& model, const py::array& positions)
            {
              check_array<double>("position", positions, {static_cast<py::ssize_t>(model.particles.size()), D});
-             place_particles<D>(model, values<double>(positions));
+             place_particles<G>(model, values<double>(positions));
            })
       .def("remove_particles",
            [](M& model, const py::array& rows)
@@ -230,8 +244,8 @@ void bind_model(py::module_& m, const std::string& suffix)
              model.particles.material.assign(in.begin(), in.end());
              changed(model);
            })
-      .def("nodal",
-           [](const M& model, const std::string& name) { return copied_field<double>(nodal_field(model, name)); })
+      .def("nodal", [](const M& model, const std::string& name, std::size_t velocity_field)
+           { return copied_field<double>(nodal_field(model, name, velocity_field)); })
       .def("phase_seconds",
            [](const M& model)
            {
@@ -246,6 +260,20 @@ void bind_model(py::module_& m, const std::string& suffix)
 
 void bind_models(py::module_& m)
 {
+  enum class Geometry
+  {
+    plane_strain,
+    axisymmetric,
+    solid
+  };
+  py::enum_<Geometry>(m, "Geometry", R"(What a mesh stands for.
+
+PLANE_STRAIN: two dimensions, one metre thick, without strain out of the plane. AXISYMMETRIC: half a section of a body of revolution; x
+is the radius from the axis x = 0, y the height along it; masses, volumes, forces and energies are those of one radian. SOLID: three
+dimensions.)")
+      .value("PLANE_STRAIN", Geometry::plane_strain)
+      .value("AXISYMMETRIC", Geometry::axisymmetric)
+      .value("SOLID", Geometry::solid);
   py::enum_<StressUpdate>(m, "StressUpdate")
       .value("MODIFIED_LAST", StressUpdate::modified_last)
       .value("LAST", StressUpdate::last)
@@ -273,7 +301,10 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def_readwrite("allow_unstable", &RunOptions::allow_unstable)
       .def_readwrite("max_steps", &RunOptions::max_steps);
   m.attr("control_interval") = control_interval;
-  bind_model<2>(m, "2");
-  bind_model<3>(m, "3");
+  bind_mesh<2>(m, "2");
+  bind_mesh<3>(m, "3");
+  bind_model<PlaneStrain>(m, "2");
+  bind_model<Axisymmetric>(m, "Axisymmetric");
+  bind_model<Solid>(m, "3");
 }
 } // namespace mpm::python

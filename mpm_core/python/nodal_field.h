@@ -7,21 +7,21 @@
 
 namespace mpm::python
 {
-/// The one schedule of nodal fields: calls f(field, first value of a node, components, bytes from node to node).
-template <int D, class F>
-void for_each_nodal_field(const Model<D>& model, F&& f)
+/// The one schedule of the nodal fields of a velocity field: calls f(field, first value of a node, components, bytes
+/// from node to node).
+template <class G, class F, int D = G::dim>
+void for_each_nodal_field(const VelocityField<G>& velocity_field, F&& f)
 {
   static const Vector<D> no_vector{};
   static const NodeSums<D> no_sums{};
-  const auto& work = model.work;
   const auto first = [](const auto& values, const auto& none) -> const auto&
   {
     return values.empty() ? none : values[0];
   };
-  const NodeSums<D>& sums = first(work.nodes, no_sums);
+  const NodeSums<D>& sums = first(velocity_field.nodes, no_sums);
   f(Field{"velocity", "m/s", "Velocity v_i that moves and strains the particles"},
-    first(work.velocity, no_vector).data(), D, sizeof(Vector<D>));
-  f(Field{"acceleration", "m/s2", "Acceleration a_i"}, first(work.acceleration, no_vector).data(), D,
+    first(velocity_field.velocity, no_vector).data(), D, sizeof(Vector<D>));
+  f(Field{"acceleration", "m/s2", "Acceleration a_i"}, first(velocity_field.acceleration, no_vector).data(), D,
     sizeof(Vector<D>));
   f(Field{"internal_force", "N", "f_int,i of (14), per metre of thickness in plane strain"}, sums.internal.data(), D,
     sizeof(NodeSums<D>));
@@ -30,12 +30,12 @@ void for_each_nodal_field(const Model<D>& model, F&& f)
 }
 
 /// @throws InputError for a name that no nodal field has
-template <int D>
-void require_nodal_field(const Model<D>& model, const std::string& name)
+template <class G, int D = G::dim>
+void require_nodal_field(const Model<G>& model, const std::string& name)
 {
   bool exists = false;
   std::string known;
-  for_each_nodal_field(model,
+  for_each_nodal_field(model.fields.front(),
                        [&](const Field& field, auto...)
                        {
                          exists = exists || field.name == name;
@@ -47,14 +47,18 @@ void require_nodal_field(const Model<D>& model, const std::string& name)
 
 /// A nodal field of the last step, where it is.
 /// @throws InputError for a name that no nodal field has, and before the first step
-template <int D>
-OutputField nodal_field(const Model<D>& model, const std::string& name)
+template <class G, int D = G::dim>
+OutputField nodal_field(const Model<G>& model, const std::string& name, std::size_t velocity_field = 0)
 {
   require_nodal_field(model, name);
-  if (!model.work.ready)
+  if (velocity_field >= model.fields.size())
+    throw InputError("velocity_field is " + std::to_string(velocity_field) + ", expected 0 to " +
+                     std::to_string(model.fields.size() - 1));
+  const VelocityField<G>& nodes = model.fields[velocity_field];
+  if (!model.ready)
     throw InputError("nodal values of '" + name + "' are there only after a step or a report");
-  OutputField found{name, model.work.nodes.size(), {}};
-  for_each_nodal_field(model,
+  OutputField found{name, nodes.nodes.size(), {}};
+  for_each_nodal_field(nodes,
                        [&](const Field& field, const double* first, std::size_t components, std::size_t bytes_apart)
                        {
                          if (field.name == name)

@@ -29,8 +29,8 @@ inline void require_rows(const RowNumbers& rows, std::size_t size)
 
 /// @param rows  numbers of rows, or whether each row is chosen
 /// @throws InputError for other arrays, or a row that is not there
-template <int D>
-RowNumbers row_numbers(const Model<D>& model, const py::array& rows)
+template <class G, int D = G::dim>
+RowNumbers row_numbers(const Model<G>& model, const py::array& rows)
 {
   const std::size_t size = model.particles.id.size();
   const char kind = rows.dtype().kind();
@@ -56,8 +56,8 @@ RowNumbers row_numbers(const Model<D>& model, const py::array& rows)
 }
 
 /// The row of each of some particles; -1 for those that are not on this rank.
-template <int D>
-py::array_t<std::int64_t> find_rows(const Model<D>& model, const std::vector<std::int64_t>& ids)
+template <class G, int D = G::dim>
+py::array_t<std::int64_t> find_rows(const Model<G>& model, const std::vector<std::int64_t>& ids)
 {
   std::vector<std::pair<std::int64_t, std::size_t>> wanted; // by rising number, and the place among `ids`
   wanted.reserve(ids.size());
@@ -141,8 +141,8 @@ bool is_scalar(const Field& field, const Columns& columns)
 
 /// A copy of a field, of all particles or of the chosen ones.
 /// @throws InputError for a field that does not exist, or a row that is not there
-template <int D>
-py::object column(const Model<D>& model, const std::string& name, const ChosenRows& chosen)
+template <class G, int D = G::dim>
+py::object column(const Model<G>& model, const std::string& name, const ChosenRows& chosen)
 {
   const Particles<D>& particles = model.particles;
   const std::size_t n = particles.id.size();
@@ -164,8 +164,8 @@ py::object column(const Model<D>& model, const std::string& name, const ChosenRo
 
 /// Copies of fields by name, real ones in single precision; the position is always there.
 /// @throws InputError for a field that does not exist
-template <int D>
-py::dict single_precision(const Model<D>& model, const std::vector<std::string>& names)
+template <class G, int D = G::dim>
+py::dict single_precision(const Model<G>& model, const std::vector<std::string>& names)
 {
   const ParticleFields fields = particle_fields<D>(model.particles, names);
   py::dict copies;
@@ -185,16 +185,16 @@ py::dict single_precision(const Model<D>& model, const std::vector<std::string>&
 
 /// Notes that the particles are no longer as a step left them: sums are to be gathered, and the energy balance begins
 /// anew.
-template <int D>
-void changed(Model<D>& model)
+template <class G>
+void changed(Model<G>& model)
 {
-  model.work.ready = false;
+  model.ready = false;
   model.energy.stale = true;
 }
 
 /// @throws InputError for a field that cannot be set, or another shape
-template <int D>
-void set_column(Model<D>& model, const std::string& name, const py::array& array)
+template <class G, int D = G::dim>
+void set_column(Model<G>& model, const std::string& name, const py::array& array)
 {
   Particles<D>& particles = model.particles;
   const std::size_t n = particles.id.size();

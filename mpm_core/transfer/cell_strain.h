@@ -2,7 +2,7 @@
 /// @file
 /// The strain increment that a cell's particles share; for one cell, T = double, or for several at once, T = Lanes.
 
-#include "base/tensor.h"
+#include "base/geometry.h"
 #include "transfer/lanes.h"
 
 namespace mpm
@@ -66,13 +66,22 @@ inline CellStrain<D, T> strain_increment(const std::array<std::array<T, D>, D>& 
   return strain;
 }
 
-/// Replaces the volumetric part: d is 2 in plane strain, where it is spread over the in-plane components, so that
-/// the strain out of plane stays zero; 3 in three dimensions.
-template <int D, class T>
+/// Adds the strain of rings about the axis: that of the radius, u_r / r.
+template <class T>
+inline void add_hoop(CellStrain<2, T>& strain, const T& hoop)
+{
+  strain.increment[2] = hoop;
+  strain.volumetric += hoop;
+  strain.deviatoric = deviatoric_size<2>(strain.increment, strain.volumetric);
+}
+
+/// Replaces the volumetric part, spread over the normal components that the geometry has: in plane strain those in the
+/// plane, so that the strain out of plane stays zero.
+template <class G, int D = G::dim, class T>
 inline void set_volumetric(CellStrain<D, T>& strain, const T& volumetric)
 {
-  const T change = (volumetric - strain.volumetric) / D;
-  for (int i = 0; i < D; ++i)
+  const T change = (volumetric - strain.volumetric) / G::n_normal;
+  for (int i = 0; i < G::n_normal; ++i)
     strain.increment[i] += change;
   strain.volumetric = volumetric;
   strain.deviatoric = deviatoric_size<D>(strain.increment, volumetric);

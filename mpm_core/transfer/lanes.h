@@ -41,7 +41,7 @@ inline Piece<N> load(const std::array<T*, N>& columns, Index first)
   return piece;
 }
 
-/// Fewer entries than lanes, such as those of a stray: the lanes beyond the last repeat it.
+/// Fewer entries than lanes, such as a particle out of cell order: the lanes beyond the last repeat it.
 template <std::size_t N, class T>
 inline Piece<N> load_few(const std::array<T*, N>& columns, Index first, Index last)
 {

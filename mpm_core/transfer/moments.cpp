@@ -6,8 +6,8 @@ namespace mpm
 {
 namespace
 {
-template <int D>
-void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& shape, CellMoments<D>& moments)
+template <class G, int D = G::dim>
+void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& shape, CellMoments<G>& moments)
 {
   const double mass = particles.mass[p], volume = particles.volume[p];
   Vector<D> xi, mass_xi;
@@ -20,10 +20,9 @@ void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& sh
   moments.volume += volume;
   moments.mass += mass;
   for (int k = 0; k < n_symmetric<D>; ++k)
-  {
     moments.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
-    moments.stress[k] += volume * particles.stress[stress_component<D>[k]][p];
-  }
+  for (int k = 0; k < G::n_working; ++k)
+    moments.stress[k] += volume * particles.stress[working_component<G>[k]][p];
   for (int a = 0; a < D; ++a)
   {
     const double velocity = particles.velocity[a][p];
@@ -34,10 +33,10 @@ void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& sh
 }
 } // namespace
 
-template <int D>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<D>& moments)
+template <class G, int D>
+void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<G>& moments)
 {
-  constexpr int S = n_symmetric<D>;
+  constexpr int S = G::n_working;
   std::array<const double*, 2 * D + S + 2> columns;
   for (int i = 0; i < D; ++i)
   {
@@ -45,22 +44,22 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
     columns[D + i] = particles.velocity[i].data();
   }
   for (int k = 0; k < S; ++k)
-    columns[2 * D + k] = particles.stress[stress_component<D>[k]].data();
+    columns[2 * D + k] = particles.stress[working_component<G>[k]].data();
   columns[2 * D + S] = particles.mass.data();
   columns[2 * D + S + 1] = particles.volume.data();
 
   if (last - first < lanes) // such as a particle that has changed cells; vectors would not be filled
   {
     for (Index p = first; p < last; ++p)
-      add_particle<D>(particles, p, shape, moments);
+      add_particle<G>(particles, p, shape, moments);
     return;
   }
-  constexpr std::size_t members = sizeof(CellMoments<D>) / sizeof(double);
+  constexpr std::size_t members = sizeof(CellMoments<G>) / sizeof(double);
   struct Sums // as the moments, lane by lane
   {
     Lanes volume, mass;
     std::array<Lanes, D> mass_xi;
-    std::array<Lanes, S> mass_xixi;
+    std::array<Lanes, n_symmetric<D>> mass_xixi;
     std::array<Lanes, D> momentum;
     std::array<std::array<Lanes, D>, D> momentum_xi;
     std::array<Lanes, S> stress;
@@ -77,11 +76,10 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
       mass_xi[i] = mass * xi[i];
       sums.mass_xi[i] += mass_xi[i];
     }
-    for (int k = 0; k < S; ++k)
-    {
+    for (int k = 0; k < n_symmetric<D>; ++k)
       sums.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+    for (int k = 0; k < S; ++k)
       sums.stress[k] += volume * piece[2 * D + k];
-    }
     for (int a = 0; a < D; ++a)
     {
       sums.momentum[a] += mass * piece[D + a];
@@ -94,7 +92,7 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
   auto numbers = std::bit_cast<std::array<double, members>>(moments);
   for (std::size_t k = 0; k < members; ++k)
     numbers[k] += sum(by_lane[k]);
-  moments = std::bit_cast<CellMoments<D>>(numbers);
+  moments = std::bit_cast<CellMoments<G>>(numbers);
 }
 
 template <int D>
@@ -111,8 +109,8 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
     }
 }
 
-template <int D>
-void move(CellMoments<D>& moments, const CellMotion<D>& motion)
+template <class G, int D>
+void move(CellMoments<G>& moments, const CellMotion<D>& motion)
 {
   // xi becomes A xi + u with A = 1 + grad u; first the velocities at the old places, then the places. All in vectors of
   // components: twice as fast in plane strain as the compiler's own choice of vectors, which goes through memory.
@@ -176,13 +174,13 @@ void move(CellMoments<D>& moments, const CellMotion<D>& motion)
   }
 }
 
-template <int D>
-std::array<double, n_symmetric<D>> stress_sum(const Particles<D>& particles, Index first, Index last)
+template <class G, int D>
+Working<G> stress_sum(const Particles<D>& particles, Index first, Index last)
 {
-  constexpr int S = n_symmetric<D>;
+  constexpr int S = G::n_working;
   std::array<const double*, S + 1> columns;
   for (int k = 0; k < S; ++k)
-    columns[k] = particles.stress[stress_component<D>[k]].data();
+    columns[k] = particles.stress[working_component<G>[k]].data();
   columns[S] = particles.volume.data();
   Piece<S> sums;
   for (int k = 0; k < S; ++k) // one by one: an array set to zero at once goes through memory
@@ -194,17 +192,19 @@ std::array<double, n_symmetric<D>> stress_sum(const Particles<D>& particles, Ind
               for (int k = 0; k < S; ++k)
                 sums[k] += volume * piece[k];
             });
-  std::array<double, S> result;
+  Working<G> result;
   for (int k = 0; k < S; ++k)
     result[k] = sum(sums[k]);
   return result;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void gather(const Particles<D>&, Index, Index, const CellShape<D>&, CellMoments<D>&);                       \
-  template void gather(const Particles<D>&, Index, Index, const CellShape<D>&, TractionMoments<D>&);                   \
-  template void move(CellMoments<D>&, const CellMotion<D>&);                                                           \
-  template std::array<double, n_symmetric<D>> stress_sum(const Particles<D>&, Index, Index);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void gather(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&, CellMoments<G>&);             \
+  template void move(CellMoments<G>&, const CellMotion<G::dim>&);                                                      \
+  template Working<G> stress_sum<G>(const Particles<G::dim>&, Index, Index);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+template void gather(const Particles<2>&, Index, Index, const CellShape<2>&, TractionMoments<2>&);
+template void gather(const Particles<3>&, Index, Index, const CellShape<3>&, TractionMoments<3>&);
 } // namespace mpm

@@ -15,16 +15,17 @@
 namespace mpm
 {
 /// Moments of the particles in one cell; xi is the position from the cell's centre.
-template <int D>
+template <class G>
 struct CellMoments
 {
+  static constexpr int D = G::dim;
   double volume;                                ///< sum V_p
   double mass;                                  ///< sum m_p
   Vector<D> mass_xi;                            ///< sum m_p xi
   std::array<double, n_symmetric<D>> mass_xixi; ///< sum m_p xi (x) xi
   Vector<D> momentum;                           ///< sum m_p v_p
   Matrix<D> momentum_xi;                        ///< sum m_p v_p (x) xi; [component of v][component of xi]
-  std::array<double, n_symmetric<D>> stress;    ///< sum V_p sigma_p, without zz in plane strain
+  Working<G> stress;                            ///< sum V_p sigma_p
 };
 
 /// Moments of the tractions in one cell.
@@ -65,8 +66,8 @@ struct CellMotion
 };
 
 /// Adds the particles [first, last), all in this cell, to its moments.
-template <int D>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<D>& moments);
+template <class G, int D = G::dim>
+void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<G>& moments);
 
 /// The same for the tractions they carry.
 template <int D>
@@ -87,12 +88,12 @@ inline void take_out(const Moments& part, Moments& moments)
 
 /// What the moments become when all particles of the cell move; stresses and volumes stay. The particles are not
 /// visited.
-template <int D>
-void move(CellMoments<D>& moments, const CellMotion<D>& motion);
+template <class G, int D = G::dim>
+void move(CellMoments<G>& moments, const CellMotion<D>& motion);
 
 /// sum V_p sigma_p of the particles [first, last), as in the moments
-template <int D>
-std::array<double, n_symmetric<D>> stress_sum(const Particles<D>& particles, Index first, Index last);
+template <class G, int D = G::dim>
+Working<G> stress_sum(const Particles<D>& particles, Index first, Index last);
 
 /// sum over particles of (scalar or vector) q_p N_k(x_p), from its zeroth and first moment
 template <int D>

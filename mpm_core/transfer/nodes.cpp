@@ -44,12 +44,16 @@ ByVertex<D> at_vertices(double zeroth, const Vector<D>& first, const std::array<
   return sums;
 }
 
-/// f_int of all vertices of a cell in a direction
-template <int D>
-ByVertex<D> internal_forces(const std::array<double, n_symmetric<D>>& stress, int a,
-                            const std::array<ByVertex<D>, D>& gradients)
+/// f_int of all vertices of a cell in a direction; by the hoop stress it is the same for all, and radial
+template <class G>
+ByVertex<G::dim> internal_forces(const Working<G>& stress, int a, const std::array<ByVertex<G::dim>, G::dim>& gradients,
+                                 const CellShape<G::dim>& shape)
 {
+  constexpr int D = G::dim;
   ByVertex<D> forces{};
+  if constexpr (G::has_hoop)
+    if (a == 0)
+      forces.fill(stress[n_symmetric<D>] * hoop_gradient<G>(shape));
   for (int b = 0; b < D; ++b)
     add<D>(stress[symmetric_index<D>(a, b)], gradients[b], forces);
   return forces;
@@ -65,15 +69,16 @@ void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMoments<D>
 }
 } // namespace
 
-template <int D>
-void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
-             std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes)
+template <class G>
+void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
+             std::span<const TractionMoments<G::dim>> tractions, std::span<NodeSums<G::dim>> nodes)
 {
+  constexpr int D = G::dim;
   for (Index node : part.nodes)
     nodes[node] = {};
   for (Index c : part.cells)
   {
-    const CellMoments<D>& moments = cells[c];
+    const CellMoments<G>& moments = cells[c];
     if (moments.mass == 0)
       continue;
     const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
@@ -82,7 +87,7 @@ void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMome
     for (int a = 0; a < D; ++a)
     {
       momentum[a] = at_vertices<D>(moments.momentum[a], moments.momentum_xi[a], gradients);
-      internal[a] = internal_forces<D>(moments.stress, a, gradients);
+      internal[a] = internal_forces<G>(moments.stress, a, gradients, mesh.shapes[c]);
     }
     for (int k = 0; k <= D; ++k)
     {
@@ -99,10 +104,11 @@ void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMome
   }
 }
 
-template <int D>
-void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
-                      std::span<const Vector<D>> change, std::span<Vector<D>> momentum)
+template <class G>
+void scatter_momentum(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
+                      std::span<const Vector<G::dim>> change, std::span<Vector<G::dim>> momentum)
 {
+  constexpr int D = G::dim;
   for (Index node : part.nodes)
     momentum[node] = {};
   const auto nodal = [change](Index node) -> const Vector<D>& { return change[node]; };
@@ -131,11 +137,12 @@ void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const
   }
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template void scatter<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>,                           \
-                           std::span<const TractionMoments<D>>, std::span<NodeSums<D>>);                               \
-  template void scatter_momentum<D>(const Mesh<D>&, const MeshPart&, std::span<const CellMoments<D>>,                  \
-                                    std::span<const Vector<D>>, std::span<Vector<D>>);
-INSTANTIATE(2)
-INSTANTIATE(3)
+#define INSTANTIATE(G)                                                                                                 \
+  template void scatter<G>(const Mesh<G::dim>&, const MeshPart&, std::span<const CellMoments<G>>,                      \
+                           std::span<const TractionMoments<G::dim>>, std::span<NodeSums<G::dim>>);                     \
+  template void scatter_momentum<G>(const Mesh<G::dim>&, const MeshPart&, std::span<const CellMoments<G>>,             \
+                                    std::span<const Vector<G::dim>>, std::span<Vector<G::dim>>);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -19,30 +19,33 @@ struct NodeSums
   Vector<D> traction; ///< the part of f_ext,i (15) that boundary particles carry
 };
 
-/// f_int of a vertex of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function
-template <int D>
-inline Vector<D> internal_force(const std::array<double, n_symmetric<D>>& stress, const Vector<D>& gradient)
+/// f_int of vertex k of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function
+template <class G, int D = G::dim>
+inline Vector<D> internal_force(const Working<G>& stress, const CellShape<D>& shape, int k)
 {
+  const Vector<D>& gradient = shape.gradient[k];
   Vector<D> force{};
-  for (int k = 0; k < n_symmetric<D>; ++k)
+  for (int c = 0; c < n_symmetric<D>; ++c)
   {
-    const auto [i, j] = symmetric_pairs<D>[k];
-    force[i] += stress[k] * gradient[j];
+    const auto [i, j] = symmetric_pairs<D>[c];
+    force[i] += stress[c] * gradient[j];
     if (i != j)
-      force[j] += stress[k] * gradient[i];
+      force[j] += stress[c] * gradient[i];
   }
+  if constexpr (G::has_hoop)
+    force[0] += stress[n_symmetric<D>] * hoop_gradient<G>(shape);
   return force;
 }
 
 /// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
 /// @param tractions  one per cell, or empty
-template <int D>
-void scatter(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
-             std::span<const TractionMoments<D>> tractions, std::span<NodeSums<D>> nodes);
+template <class G>
+void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
+             std::span<const TractionMoments<G::dim>> tractions, std::span<NodeSums<G::dim>> nodes);
 
 /// The momentum `sum m_p N_i sum_j N_j change_j` of particles that all had the velocity of the nodal field `change` at
 /// their place: the consistent mass matrix times `change`. The particles are not visited.
-template <int D>
-void scatter_momentum(const Mesh<D>& mesh, const MeshPart& part, std::span<const CellMoments<D>> cells,
-                      std::span<const Vector<D>> change, std::span<Vector<D>> momentum);
+template <class G>
+void scatter_momentum(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
+                      std::span<const Vector<G::dim>> change, std::span<Vector<G::dim>> momentum);
 } // namespace mpm

@@ -37,10 +37,11 @@ void add(Support<D>& support, Vector<D> normal, double value, Index facet_tag)
 }
 } // namespace
 
-template <int D>
-std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchange,
-                                      std::span<const SupportRequest<D>> requests)
+template <class G>
+std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchange& exchange,
+                                           std::span<const SupportRequest<G::dim>> requests)
 {
+  constexpr int D = G::dim;
   std::map<Index, Support<D>> by_node;
   for (const auto& request : requests)
   {
@@ -73,6 +74,13 @@ std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchang
       }
     }
   }
+  if constexpr (G::has_hoop)
+    for (Index node = 0; node < mesh.n_nodes(); ++node)
+      if (mesh.points[node][0] == 0)
+      {
+        by_node[node].node = node;
+        add<D>(by_node[node], {1, 0}, 0, none);
+      }
   std::vector<Support<D>> supports;
   supports.reserve(by_node.size());
   for (const auto& [node, support] : by_node)
@@ -80,6 +88,10 @@ std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchang
   return supports;
 }
 
-template std::vector<Support<2>> make_supports(const Mesh<2>&, NodeExchange&, std::span<const SupportRequest<2>>);
-template std::vector<Support<3>> make_supports(const Mesh<3>&, NodeExchange&, std::span<const SupportRequest<3>>);
+template std::vector<Support<2>> make_supports<PlaneStrain>(const Mesh<2>&, NodeExchange&,
+                                                            std::span<const SupportRequest<2>>);
+template std::vector<Support<2>> make_supports<Axisymmetric>(const Mesh<2>&, NodeExchange&,
+                                                             std::span<const SupportRequest<2>>);
+template std::vector<Support<3>> make_supports<Solid>(const Mesh<3>&, NodeExchange&,
+                                                      std::span<const SupportRequest<3>>);
 } // namespace mpm

@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// Supports: velocities prescribed at nodes, whole or along a direction.
+/// Boundary conditions: velocities prescribed at nodes, whole or along a direction.
 
 #include "parallel/node_exchange.h"
 
@@ -18,7 +18,7 @@ struct Support
   std::array<double, D> value; ///< [m/s]
 };
 
-/// One wish of the user for all nodes on facets with a tag: v . normal = value, or the whole velocity.
+/// One boundary condition for all nodes on facets with a tag: v . normal = value, or the whole velocity.
 template <int D>
 struct SupportRequest
 {
@@ -27,13 +27,14 @@ struct SupportRequest
   Vector<D> vector;
 };
 
-/// Merges the wishes into one support per node, sorted by node. Directions at a node are made orthonormal; a wish that
-/// follows from the others adds nothing.
-/// @throws InputError wishes that contradict each other at a node, a normal without length
+/// Merges the boundary conditions into one per node, sorted by node. Directions at a node are made orthonormal; a
+/// condition that follows from the others adds nothing. In axial symmetry the nodes on the axis have no radial
+/// velocity.
+/// @throws InputError conditions that contradict each other at a node, a normal without length
 /// @note Collective
-template <int D>
-std::vector<Support<D>> make_supports(const Mesh<D>& mesh, NodeExchange& exchange,
-                                      std::span<const SupportRequest<D>> requests);
+template <class G>
+std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchange& exchange,
+                                           std::span<const SupportRequest<G::dim>> requests);
 
 /// Makes v satisfy the support, changing it only along the supported directions.
 template <int D>

@@ -18,19 +18,19 @@ from pathlib import Path
 BUDGET = Path(__file__).with_name("budget.json")
 TOLERANCE = 0.03
 PHASES = {
-    "explicit step, 2D": "explicit_step<2>",
-    "sums at nodes, 2D": "map_to_nodes<2>",
-    "pass over the particles, 2D": "particle_pass<2>",
+    "explicit step, 2D": "explicit_step<mpm::PlaneStrain>",
+    "sums at nodes, 2D": "particles_to_nodes<mpm::PlaneStrain, 2>",
+    "pass over the particles, 2D": "particle_pass<mpm::PlaneStrain>",
     "motion of particles, 2D": "move_particles<2>",
     "strain of particles, 2D": "strain_particles<2>",
-    "stress sums, 2D": "stress_sum<2>",
+    "stress sums, 2D": "stress_sum<mpm::PlaneStrain, 2>",
     "Mohr-Coulomb, 2D": "update<2>(mpm::MohrCoulomb const&",
-    "averaged volumetric strain, 2D": "average_strains<2>",
-    "explicit step, 3D": "explicit_step<3>",
-    "pass over the particles, 3D": "particle_pass<3>",
+    "averaged volumetric strain, 2D": "average_strains<mpm::PlaneStrain, 2>",
+    "explicit step, 3D": "explicit_step<mpm::Solid>",
+    "pass over the particles, 3D": "particle_pass<mpm::Solid>",
     "Mohr-Coulomb, 3D": "update<3>(mpm::MohrCoulomb const&",
-    "residual and tangents of an implicit step, 2D": "find_residual<2>",
-    "entries of the stiffness matrix, 2D": "stiffness_entries<2>",
+    "residual and tangents of an implicit step, 2D": "find_residual<mpm::PlaneStrain, 2>",
+    "entries of the stiffness matrix, 2D": "stiffness_entries<mpm::PlaneStrain, 2>",
 }
 """What is counted: the functions, with all that they call"""
 

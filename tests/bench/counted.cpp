@@ -13,7 +13,7 @@ namespace
 {
 /// A heap of soil in a box, that slides: the cells below the diagonal are filled.
 template <int D>
-Model<D> heap(int n, int per_cell)
+Model<Cartesian<D>> heap(int n, int per_cell)
 {
   const auto arrays = test::box<D>(n);
   std::vector<Index> tags;
@@ -27,23 +27,22 @@ Model<D> heap(int n, int per_cell)
   }
   MeshInput<D> input = arrays.input();
   input.cell_tags = tags;
-  Model<D> model;
+  Model<Cartesian<D>> model;
   model.mesh = make_mesh<D>(input, 0);
   model.exchange = make_node_exchange<D>(model.mesh, MPI_COMM_SELF);
-  model.laws = {MohrCoulomb{200e3, 0.33, 1e3, 25.0}};
-  model.particles.state.resize(1);
-  seed_cells<D>(model.mesh, 1, per_cell, {0, 2000.0}, 0, model.particles);
+  set_laws(model, {MohrCoulomb{200e3, 0.33, 1e3, 25.0}});
+  seed_cells<Cartesian<D>>(model.mesh, 1, per_cell, {0, 2000.0}, 0, model.particles);
   std::vector<SupportRequest<D>> requests;
   for (Index axis = 0; axis < D; ++axis)
     requests.push_back({2 * axis + 1, true, Vector<D>{}});
-  model.supports = make_supports<D>(model.mesh, model.exchange, requests);
+  set_supports(model, requests);
   model.gravity[D - 1] = -40;
   prepare(model);
   return model;
 }
 
 template <int D>
-void run_explicit(Model<D> model, bool mixed, int steps)
+void run_explicit(Model<Cartesian<D>> model, bool mixed, int steps)
 {
   ExplicitOptions options;
   options.damping = 0.75;
@@ -54,9 +53,9 @@ void run_explicit(Model<D> model, bool mixed, int steps)
 }
 
 template <int D>
-void assemble(Model<D> model)
+void assemble(Model<Cartesian<D>> model)
 {
-  ImplicitStep<D> step;
+  ImplicitStep<Cartesian<D>> step;
   ImplicitSystem<D> system;
   CooEntries entries;
   start_step(model, step, ImplicitOptions{}, 20 * critical_time_step(model));

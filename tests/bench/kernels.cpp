@@ -64,7 +64,7 @@ struct Filled
   explicit Filled(int n) : mesh(test::box<D>(n).mesh())
   {
     particles.state.resize(1);
-    seed_cells<D>(mesh, {}, D == 2 ? 10 : 8, {0, 2000.0}, 0, particles);
+    seed_cells<Cartesian<D>>(mesh, {}, D == 2 ? 10 : 8, {0, 2000.0}, 0, particles);
     find_runs<D>(particles, 256, runs);
   }
 };
@@ -78,10 +78,10 @@ template <int D>
 void gather_moments(benchmark::State& state)
 {
   Filled<D> box(static_cast<int>(state.range(0)));
-  std::vector<CellMoments<D>> moments(box.mesh.cells.size());
+  std::vector<CellMoments<Cartesian<D>>> moments(box.mesh.cells.size());
   for (auto _ : state)
     for (const Run& run : box.runs)
-      gather<D>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], moments[run.cell]);
+      gather<Cartesian<D>>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], moments[run.cell]);
   count_particles(state, box.particles.size());
 }
 BENCHMARK(gather_moments<2>)->Arg(18)->Arg(112);
@@ -119,7 +119,7 @@ void stress_sums(benchmark::State& state)
   Filled<D> box(static_cast<int>(state.range(0)));
   for (auto _ : state)
     for (const Run& run : box.runs)
-      benchmark::DoNotOptimize(stress_sum<D>(box.particles, run.first, run.last));
+      benchmark::DoNotOptimize(stress_sum<Cartesian<D>>(box.particles, run.first, run.last));
   count_particles(state, box.particles.size());
 }
 BENCHMARK(stress_sums<2>)->Arg(18)->Arg(112);
@@ -129,7 +129,7 @@ BENCHMARK(stress_sums<3>)->Arg(5)->Arg(24);
 template <int D>
 struct Gathered : Filled<D>
 {
-  std::vector<CellMoments<D>> moments;
+  std::vector<CellMoments<Cartesian<D>>> moments;
   MeshPart part;
   std::vector<NodeSums<D>> nodes;
   std::vector<Vector<D>> change, momentum;
@@ -141,7 +141,7 @@ struct Gathered : Filled<D>
     std::vector<Index> cells;
     for (const Run& run : this->runs)
     {
-      gather<D>(this->particles, run.first, run.last, this->mesh.shapes[run.cell], moments[run.cell]);
+      gather<Cartesian<D>>(this->particles, run.first, run.last, this->mesh.shapes[run.cell], moments[run.cell]);
       cells.push_back(run.cell);
     }
     part = make_part<D>(this->mesh, cells, {});
@@ -154,8 +154,8 @@ void move_moments(benchmark::State& state)
   Gathered<D> box(static_cast<int>(state.range(0)));
   const CellMotion<D> rest{1, {}, {}};
   for (auto _ : state)
-    for (CellMoments<D>& moments : box.moments)
-      move<D>(moments, rest);
+    for (CellMoments<Cartesian<D>>& moments : box.moments)
+      move<Cartesian<D>>(moments, rest);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(move_moments<2>)->Arg(18)->Arg(112);
@@ -166,7 +166,7 @@ void scatter_to_nodes(benchmark::State& state)
 {
   Gathered<D> box(static_cast<int>(state.range(0)));
   for (auto _ : state)
-    scatter<D>(box.mesh, box.part, box.moments, {}, box.nodes);
+    scatter<Cartesian<D>>(box.mesh, box.part, box.moments, {}, box.nodes);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(scatter_to_nodes<2>)->Arg(18)->Arg(112);
@@ -177,7 +177,7 @@ void scatter_changes(benchmark::State& state)
 {
   Gathered<D> box(static_cast<int>(state.range(0)));
   for (auto _ : state)
-    scatter_momentum<D>(box.mesh, box.part, box.moments, box.change, box.momentum);
+    scatter_momentum<Cartesian<D>>(box.mesh, box.part, box.moments, box.change, box.momentum);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(scatter_changes<2>)->Arg(18)->Arg(112);

@@ -212,7 +212,7 @@ TYPED_TEST(StrainTest, SettingTheVolumetricPartKeepsTheDeviator)
   std::mt19937 random(5);
   const auto before = strain_increment<D>(random_matrix<D>(random), 0.1);
   auto after = before;
-  set_volumetric(after, 0.07);
+  set_volumetric<Cartesian<D>>(after, 0.07);
   double trace = 0;
   for (int k = 0; k < 3; ++k)
     trace += after.increment[k];

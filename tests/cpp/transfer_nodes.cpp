@@ -55,15 +55,15 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
 {
   std::vector<Run> runs;
   find_runs(particles, particles.size(), runs);
-  std::vector<CellMoments<D>> moments(mesh.cells.size(), CellMoments<D>{});
+  std::vector<CellMoments<Cartesian<D>>> moments(mesh.cells.size(), CellMoments<Cartesian<D>>{});
   std::vector<TractionMoments<D>> tractions(mesh.cells.size(), TractionMoments<D>{});
   for (const Run& run : runs)
   {
-    gather<D>(particles, run.first, run.last, mesh.shapes[run.cell], moments[run.cell]);
+    gather<Cartesian<D>>(particles, run.first, run.last, mesh.shapes[run.cell], moments[run.cell]);
     gather<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
-  scatter<D>(mesh, test::whole(mesh), moments, tractions, nodes);
+  scatter<Cartesian<D>>(mesh, test::whole(mesh), moments, tractions, nodes);
   return nodes;
 }
 
@@ -167,8 +167,8 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
   while (last < particles.size() && particles.cell[last] == cell)
     ++last;
   const CellShape<D>& shape = mesh.shapes[cell];
-  CellMoments<D> moments{}, expected{};
-  gather<D>(particles, 0, last, shape, moments);
+  CellMoments<Cartesian<D>> moments{}, expected{};
+  gather<Cartesian<D>>(particles, 0, last, shape, moments);
   const std::vector<Vector<D>> change = random_vectors<D>(mesh.points.size(), 22, 1);
   const std::vector<Vector<D>> displacement = random_vectors<D>(mesh.points.size(), 23, 0.1);
   const auto field = [&](const auto& nodal)
@@ -176,7 +176,7 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
     return affine_field<D>(mesh, cell, [&](Index i) -> const Vector<D>& { return nodal[i]; });
   };
   const CellMotion<D> motion{0.7, field(change), field(displacement)};
-  move<D>(moments, motion);
+  move<Cartesian<D>>(moments, motion);
   for (Index p = 0; p < last; ++p)
   {
     const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
@@ -190,12 +190,12 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
       }
     }
   }
-  gather<D>(particles, 0, last, shape, expected);
+  gather<Cartesian<D>>(particles, 0, last, shape, expected);
   using Numbers = std::array<double, sizeof(moments) / sizeof(double)>;
   const auto got = std::bit_cast<Numbers>(moments), wanted = std::bit_cast<Numbers>(expected);
   for (std::size_t k = 0; k < got.size(); ++k)
     EXPECT_NEAR(got[k], wanted[k], 1e-12);
-  const auto stress = stress_sum<D>(particles, 0, last);
+  const auto stress = stress_sum<Cartesian<D>>(particles, 0, last);
   for (int k = 0; k < n_symmetric<D>; ++k)
     EXPECT_NEAR(stress[k], wanted[got.size() - n_symmetric<D> + static_cast<std::size_t>(k)], 1e-12);
   take_out(expected, moments);
@@ -208,13 +208,13 @@ TYPED_TEST(NodesTest, SumsOfFewAndManyParticlesAreThoseOneByOne)
   constexpr int D = TypeParam::value;
   const Mesh<D> mesh = test::box<D>(1).mesh();
   const Particles<D> particles = random_particles(mesh, 60);
-  using Numbers = std::array<double, sizeof(CellMoments<D>) / sizeof(double)>;
+  using Numbers = std::array<double, sizeof(CellMoments<Cartesian<D>>) / sizeof(double)>;
   for (Index count = 1; count <= 13; ++count)
   {
-    CellMoments<D> together{}, one_by_one{};
-    gather<D>(particles, 3, 3 + count, mesh.shapes[0], together);
+    CellMoments<Cartesian<D>> together{}, one_by_one{};
+    gather<Cartesian<D>>(particles, 3, 3 + count, mesh.shapes[0], together);
     for (Index p = 3; p < 3 + count; ++p)
-      gather<D>(particles, p, p + 1, mesh.shapes[0], one_by_one);
+      gather<Cartesian<D>>(particles, p, p + 1, mesh.shapes[0], one_by_one);
     const auto got = std::bit_cast<Numbers>(together), wanted = std::bit_cast<Numbers>(one_by_one);
     for (std::size_t k = 0; k < got.size(); ++k)
       EXPECT_NEAR(got[k], wanted[k], 1e-13) << count;

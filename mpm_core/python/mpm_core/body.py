@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, partition
-from ._core import InputError
+from ._core import Geometry, InputError
 from .checks import positive
 from .collective import collectively
 from .mesh import Mesh, Tag, floats
@@ -19,10 +19,38 @@ from .particles import Particles
 from .space import SpaceWatch
 
 
+def _geometry(mesh: Mesh, geometry: Geometry | None) -> Geometry:
+    """The geometry, where the mesh can have it."""
+    if geometry is None:
+        return Geometry.PLANE_STRAIN if mesh.dim == 2 else Geometry.SOLID
+    if not isinstance(geometry, Geometry):
+        raise InputError(f"geometry is {geometry!r}, expected Geometry.PLANE_STRAIN, AXISYMMETRIC or SOLID")
+    if (geometry == Geometry.SOLID) != (mesh.dim == 3):
+        raise InputError(f"geometry is {geometry.name}, but the mesh has {mesh.dim} dimensions")
+    if geometry == Geometry.AXISYMMETRIC and len(mesh.points) and mesh.points[:, 0].min() < 0:
+        radius = mesh.points[:, 0].min()
+        raise InputError(f"mesh has a node at x = {radius:g} m, expected radii from 0 on in axial symmetry")
+    return geometry
+
+
+def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+            raise InputError(f"{name} has {value!r}, expected whole numbers")
+    return [int(value) for value in values]
+
+
 class Body:
     """The part of a model that does not know how it is run; see `Model`."""
 
-    def __init__(self, mesh: Mesh, laws: Any | Sequence[Any]) -> None:
+    def __init__(
+        self,
+        mesh: Mesh,
+        laws: Any | Sequence[Any],
+        *,
+        geometry: Geometry | None = None,
+        velocity_fields: Sequence[int] | None = None,
+    ) -> None:
         if not isinstance(mesh, Mesh):
             kind = f"{type(mesh).__module__}.{type(mesh).__name__}"
             raise InputError(
@@ -37,8 +65,12 @@ class Body:
                 raise InputError(f"laws has {law!r}, expected constitutive laws such as MohrCoulomb(...)")
         if not self.laws:
             raise InputError("laws is empty, expected at least one constitutive law")
-        core_type = _core.Model2 if mesh.dim == 2 else _core.Model3
-        self._core = core_type(mesh._core, self.laws, MPI._addressof(self.comm))
+        self.geometry = collectively(self.comm, lambda: _geometry(mesh, geometry))
+        """What the mesh stands for."""
+        fields = collectively(self.comm, lambda: _whole_numbers("velocity_fields", velocity_fields or ()))
+        suffix = {Geometry.PLANE_STRAIN: "2", Geometry.AXISYMMETRIC: "Axisymmetric", Geometry.SOLID: "3"}[self.geometry]
+        self._core = getattr(_core, f"Model{suffix}")(mesh._core, self.laws, fields, MPI._addressof(self.comm))
+        self._velocity_fields = fields or [0] * len(self.laws)
         self._conditions: list[tuple[int, bool, list[float]]] = []
         self._space_watch: SpaceWatch | None = None
         self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}

@@ -66,13 +66,30 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     _take(model, there)
 
 
+_COMPARED = {
+    "dimension": "dimension",
+    "geometry": "geometry",
+    "materials": "materials",
+    "velocity_fields": "division into velocity fields",
+    "mesh": "background mesh",
+}
+
+
 def _compare(path: str, there: dict[str, Any], here: dict[str, Any]) -> None:
-    """Refuse a checkpoint of another dimension, mesh or materials."""
-    for key, what in (("dimension", "dimension"), ("materials", "materials"), ("mesh", "background mesh")):
-        if there.get(key) != here[key]:
+    """Refuse a checkpoint of another dimension, geometry, mesh or materials."""
+    for key, what in _COMPARED.items():
+        was = there.get(key, _default(key, here))
+        if was != here[key]:
             raise InputError(
-                f"checkpoint {path} is of another {what}: it has {_shown(there.get(key))}, the model has {_shown(here[key])}"
+                f"checkpoint {path} is of another {what}: it has {_shown(was)}, the model has {_shown(here[key])}"
             )
+
+
+def _default(key: str, here: dict[str, Any]) -> Any:
+    """What a checkpoint that does not say it was of: there was nothing else when it was written."""
+    if key == "geometry":
+        return "PLANE_STRAIN" if here["dimension"] == 2 else "SOLID"
+    return [0] * len(here["materials"]) if key == "velocity_fields" else None
 
 
 def _shown(value: Any) -> str:
@@ -84,12 +101,14 @@ def _description(model: Model) -> dict[str, Any]:
     core = model._core
     return {
         "program": f"talus {_core.version}",
-        "units": "SI: m, kg, s, N, Pa; per metre of thickness in two dimensions; tension positive",
+        "units": "SI: m, kg, s, N, Pa; per metre of thickness in plane strain, per radian in axial symmetry; tension positive",
         "components": "xx yy zz xy" if model.mesh.dim == 2 else "xx yy zz xy yz xz",
         "ranks": model.comm.size,
         "time": model.time,
         "steps": core.steps,
         "dimension": model.mesh.dim,
+        "geometry": model.geometry.name,
+        "velocity_fields": model._velocity_fields,
         "mesh": f"fingerprint {_core.mesh_fingerprint(core):016x}",
         "materials": [_material(law) for law in model.laws],
         "gravity": list(core.gravity),

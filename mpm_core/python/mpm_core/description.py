@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from ._core import RunError
+from ._core import Geometry, RunError
 
 
 def parsed(path: str, text: bytes) -> dict[str, Any]:
@@ -86,7 +86,7 @@ def _is_control(value: Any) -> bool:
     )
 
 
-_OPTIONAL = ("added_fields", "cuts", "left_imbalance", "implicit", "notes")
+_OPTIONAL = ("added_fields", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
 _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),
@@ -101,6 +101,8 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "prescribed": (lambda v: isinstance(v, dict), "a table"),
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
+    "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),
+    "velocity_fields": (lambda v: _are(_is_count, v), "a list of whole numbers from 0 on"),
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
     "implicit": (_is_control, "null, or the state of an implicit run"),

@@ -107,7 +107,7 @@ class Stepper:
     def begin_anew(self) -> None:
         """Forget what belongs to the nodes of this rank, after they have changed."""
         dim = self._model.mesh.dim
-        self._step = (_core.ImplicitStep2 if dim == 2 else _core.ImplicitStep3)(self._core)
+        self._step = getattr(_core, type(self._core).__name__.replace("Model", "ImplicitStep"))(self._core)
         self._solver = self._method.solver(self._model.comm, dim)
         self._changed = True
 

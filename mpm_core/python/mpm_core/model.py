@@ -37,9 +37,16 @@ class Model(Body):
     Args:
         mesh: the background mesh.
         laws: one constitutive law, or several that seeding chooses by number.
+        geometry: what the mesh stands for: plane strain by default in two dimensions, `Geometry.AXISYMMETRIC` on
+            request. In axial symmetry x is the radius; nodes on the axis x = 0 have no radial velocity; masses, forces and
+            energies are per radian.
+        velocity_fields: number of the velocity field of each law, from 0 without gaps; by default all particles move
+            with one. Bodies in different fields of one mesh do not see each other. Explicit runs only, where there are
+            several.
 
     Raises:
-        InputError: no law, or something that is none.
+        InputError: no law, or something that is none; a geometry that the mesh cannot have, a node at a negative
+            radius; numbers of velocity fields with gaps, or not one for each law.
 
     Note:
         Collective, as all methods are unless they say otherwise.
@@ -116,9 +123,9 @@ class Model(Body):
         values["particle_steps"] = int(values["particle_steps"])
         return Report(time=self.time, steps=self._core.steps, dt=self._core.last_dt, **values)
 
-    def nodal(self, name: str) -> Any:
+    def nodal(self, name: str, velocity_field: int = 0) -> Any:
         """A copy of a nodal field of the last step: velocity, acceleration, internal_force (nodes, D) or mass (nodes,)."""
-        return self._core.nodal(name)
+        return self._core.nodal(name, velocity_field)
 
     def explicit(
         self,

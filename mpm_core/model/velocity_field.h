@@ -1,0 +1,64 @@
+#pragma once
+/// @file
+/// One velocity on the nodes: what the particles that move with it give them, and how they move.
+
+#include "transfer/dual_domain.h"
+#include "transfer/mixed_discretisation.h"
+#include "transfer/nodes.h"
+#include "transfer/supports.h"
+
+namespace mpm
+{
+/// How the stresses of a cell become forces at its nodes (14).
+enum class Integration
+{
+  particles,  ///< the sum over its particles: the material point method as it is
+  mixed,      ///< a full cell integrates the mean stress of its particles over its volume; others as above
+  dual_domain ///< gradients that are continuous over the sides of cells; see transfer/dual_domain.h
+};
+
+/// Mean of the velocity gradient over the cells that share a node; plain doubles.
+template <int D>
+struct MeanGradient
+{
+  double volume;
+  Matrix<D> gradient;
+};
+
+/// Integration over cells, and what it needs where it is not the sum over particles.
+template <int D>
+struct CellIntegration
+{
+  Integration kind = Integration::particles; ///< of the run under way
+  std::vector<std::array<double, 2>> fills;  ///< per node: volumes of particles and of cells around it
+  std::vector<unsigned char> whole;          ///< per owned cell, at the step's start: 1 where full; not with particles
+  std::vector<DualStress<D>> dual_cells, dual_nodes; ///< with dual domains, as are the mean gradients of nodes
+  std::vector<MeanGradient<D>> mean_gradients;
+};
+
+/// The particles of some laws move with one velocity field: with one velocity per node, its own masses, forces and
+/// boundary conditions. Fields of the same mesh do not see each other.
+template <class G, int D = G::dim>
+struct VelocityField
+{
+  // Where it lives
+  MeshPart part;             ///< cells where its particles are, or have been since the last sort, and their nodes
+  bool part_shrinks = false; ///< cells that have become empty are to be left out
+  std::vector<Index> left;   ///< cells that some particle has left in this pass
+
+  // From its particles
+  Array<CellMoments<G>> moments;       ///< of the particles as they are now; zero outside of `part`
+  Array<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
+  Array<NodeSums<D>> nodes;
+  CellIntegration<D> integration;
+  double least_mass = 0; ///< nodes below this mass are not moved [kg]
+
+  // How its nodes move
+  std::vector<Support<D>> supports;                ///< its boundary conditions
+  std::vector<Vector<D>> start_velocity;           ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;             ///< a_i
+  std::vector<Vector<D>> velocity_change;          ///< of the nodes, as the particles take it
+  std::vector<Vector<D>> velocity;                 ///< v_i that moves and strains the particles
+  std::vector<VolumetricStrain> volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
+};
+} // namespace mpm
