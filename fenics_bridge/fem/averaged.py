@@ -27,7 +27,7 @@ class AveragedKinematics:
         self._increment, self._points, self._constraints = increment, points, constraints
         self._space, comm = increment.function_space, increment.function_space.mesh.comm
         dim, rows = increment.function_space.mesh.geometry.dim, points.n
-        nodes, gradients, self._volumes, radii = self._cells(geometry is Geometry.AXISYMMETRIC)
+        nodes, gradients, self._volumes, radii = self._cells(geometry == Geometry.AXISYMMETRIC)
         dofs = (dim * nodes[:, :, None] + np.arange(dim)).reshape(rows, -1)
         self._n_dofs = dim * self._space.dofmap.index_map.size_local
         cell = comm.scan(rows) - rows + np.arange(rows)

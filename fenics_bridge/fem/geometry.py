@@ -1,27 +1,18 @@
-"""The geometries of a body of two dimensions: plane strain, or a half section of an axisymmetric body."""
+"""The geometries of a body of two dimensions: plane strain, or a half section of an axisymmetric body.
+
+In an axisymmetric body the first coordinate is the radius r from the axis and the second one runs along the axis; the components of
+stress and strain are rr, yy, theta theta, ry. Volumes, forces and energies are those of one radian: times 2 pi they are those of the
+whole body.
+"""
 
 from __future__ import annotations
-
-from enum import Enum
 
 import numpy as np
 import ufl
 from mpi4py import MPI
 
 from fenics_bridge.errors import agree
-
-
-class Geometry(Enum):
-    """What the coordinates of a mesh stand for.
-
-    In an axisymmetric body the first coordinate is the radius r from the axis and the second one runs along the axis; the
-    components of stress and strain are rr, yy, theta theta, ry. Volumes, forces and energies are those of one radian: times
-    2 pi they are those of the whole body.
-    """
-
-    PLANE_STRAIN = "plane strain"
-    AXISYMMETRIC = "axisymmetric"
-    SOLID = "three dimensions"
+from mpm_core import Geometry
 
 
 def geometry_of(domain, given=None):
@@ -32,9 +23,9 @@ def geometry_of(domain, given=None):
     dim = domain.geometry.dim
     usual = Geometry.PLANE_STRAIN if dim == 2 else Geometry.SOLID
     geometry = usual if given is None else given
-    fits = geometry is usual or (geometry is Geometry.AXISYMMETRIC and dim == 2)
+    fits = geometry == usual or (geometry == Geometry.AXISYMMETRIC and dim == 2)
     agree(domain.comm, None if fits else f"geometry: got {given!r}, which a mesh of {dim} dimensions cannot have")
-    if geometry is Geometry.AXISYMMETRIC:
+    if geometry == Geometry.AXISYMMETRIC:
         least = float(domain.geometry.x[:, 0].min(initial=np.inf))
         good = least >= 0
         agree(domain.comm, None if good else f"domain: it has the radius {least:g} m, expected radii from 0 on")
@@ -43,7 +34,7 @@ def geometry_of(domain, given=None):
 
 def radius_of(domain, geometry):
     """The radius as a UFL expression in an axisymmetric body; None in others."""
-    return ufl.SpatialCoordinate(domain)[0] if geometry is Geometry.AXISYMMETRIC else None
+    return ufl.SpatialCoordinate(domain)[0] if geometry == Geometry.AXISYMMETRIC else None
 
 
 def weighted(integrand, radius):
@@ -53,7 +44,7 @@ def weighted(integrand, radius):
 
 def require_axis_held(space, geometry, constraints):
     """Raise InputError, on all ranks, unless nodes on the axis are held along the radius. Collective."""
-    if geometry is not Geometry.AXISYMMETRIC:
+    if geometry != Geometry.AXISYMMETRIC:
         return
     x = space.tabulate_dof_coordinates()[:, 0]
     size = space.mesh.comm.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX)

@@ -121,7 +121,7 @@ def _returned(laws, material, stress, state):
 def _require_usable(model, fem, move):
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
-    plane = not isinstance(fem, QuasiStatic) or fem.geometry is not Geometry.AXISYMMETRIC
+    plane = not isinstance(fem, QuasiStatic) or fem.geometry != Geometry.AXISYMMETRIC
     agree(model.comm, None if plane else "fem: it is axisymmetric, the particles are in plane strain")
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")

@@ -56,7 +56,7 @@ void find_mapped_velocity(double keep, VelocityField<G>& field)
 
 template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
-              double damping, double dt, Totals& totals)
+                double damping, double dt, Totals& totals)
 {
   constexpr int D = G::dim;
   double at_end = 0;
@@ -91,8 +91,8 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
   template void find_acceleration(const Vector<G::dim>&, double, double, VelocityField<G>&);                           \
   template void find_advanced_velocity(double, VelocityField<G>&);                                                     \
   template void find_mapped_velocity(double, VelocityField<G>&);                                                       \
-  template double add_work(const VelocityField<G>&, std::span<const unsigned char>, const Vector<G::dim>&, double,       \
-                         double, Totals&);
+  template double add_work(const VelocityField<G>&, std::span<const unsigned char>, const Vector<G::dim>&, double,     \
+                           double, Totals&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

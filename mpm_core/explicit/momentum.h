@@ -26,5 +26,5 @@ void find_mapped_velocity(double keep, VelocityField<G>& field);
 /// @returns work of the internal forces over the step by the velocities at its end
 template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
-              double damping, double dt, Totals& totals);
+                double damping, double dt, Totals& totals);
 } // namespace mpm

@@ -101,7 +101,8 @@ void find_external(const Model<G>& model, ImplicitStep<G>& step)
     for (int a = 0; a < D; ++a)
     {
       const double load = field.nodes[i].traction[a] + field.nodes[i].mass * gravity[a];
-      step.external[i][a] = share == 1 ? load : field.nodes[i].internal[a] + share * (load - field.nodes[i].internal[a]);
+      step.external[i][a] =
+          share == 1 ? load : field.nodes[i].internal[a] + share * (load - field.nodes[i].internal[a]);
     }
 }
 
@@ -138,8 +139,8 @@ Inertia stage_inertia(const Model<G>& model, const ImplicitStep<G>& step, Index 
 {
   const double x = step.frequency[node] * step.length;
   const double resolved = step.options.second_order ? left_by_second_order(x) : left_by_backward_euler(x);
-  Inertia inertia = damped_inertia(model.fields.front().nodes[node].mass, start, end, step.stage.dt, step.options.damping,
-                                   step.frequency[node], resolved);
+  Inertia inertia = damped_inertia(model.fields.front().nodes[node].mass, start, end, step.stage.dt,
+                                   step.options.damping, step.frequency[node], resolved);
   inertia.derivative /= step.stage.weight;
   return inertia;
 }
@@ -302,7 +303,7 @@ bool finish_step(Model<G>& model, const ImplicitStep<G>& step)
     pic = pic_share_of_step(options.pic, step.dt, critical_time_step(model));
   find_velocity_change(field, pic, step.dt);
   particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation, law_dt(step),
-                           options.hold_positions}); // (18), (20), stresses
+                        options.hold_positions}); // (18), (20), stresses
   agree_on_failure(model);
   if (model.failure)
   {

@@ -79,8 +79,9 @@ std::vector<double> tangent_rows(Model<G>& model, const ImplicitStep<G>& step)
   }
   sum_shared(model.exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] += step.options.quasi_static ? 0
-                                         : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
+    rows[i] += step.options.quasi_static
+                   ? 0
+                   : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
   return rows;
 }
 
