@@ -41,8 +41,8 @@ Model<Cartesian<D>> heap(int n, int per_cell)
   return model;
 }
 
-template <int D>
-void run_explicit(Model<Cartesian<D>> model, bool mixed, int steps)
+template <class G>
+void run_explicit(Model<G> model, bool mixed, int steps)
 {
   ExplicitOptions options;
   options.damping = 0.75;
@@ -52,11 +52,11 @@ void run_explicit(Model<Cartesian<D>> model, bool mixed, int steps)
     explicit_step(model, options, dt);
 }
 
-template <int D>
-void assemble(Model<Cartesian<D>> model)
+template <class G>
+void assemble(Model<G> model)
 {
-  ImplicitStep<Cartesian<D>> step;
-  ImplicitSystem<D> system;
+  ImplicitStep<G> step;
+  ImplicitSystem<G::dim> system;
   CooEntries entries;
   start_step(model, step, ImplicitOptions{}, 20 * critical_time_step(model));
   number_nodes(model, step, system);
