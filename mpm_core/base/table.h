@@ -12,6 +12,7 @@ struct Table
   std::string name;
   int width = 1;
   std::vector<double> values;
-  double most_count = 0; ///< where above 0, the numbers are counts: whole numbers from 0 to this one
+  double most_count = 0;       ///< where above 0, the numbers are counts: whole numbers from 0 to this one
+  bool may_be_unknown = false; ///< a number may be NaN, such as an energy that a law does not say
 };
 } // namespace mpm

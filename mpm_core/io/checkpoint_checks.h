@@ -113,8 +113,10 @@ inline void check_totals(Hdf5Input& file, const Table& table, std::size_t rows)
     return file.reject("/ranks/" + table.name, "it is too short");
   const double most = std::min(table.most_count, most_exact);
   const auto is_count = [most](double value) { return value >= 0 && value <= most && value == std::floor(value); };
+  const auto is_total = [&table](double value)
+  { return std::abs(value) < most_total || (table.may_be_unknown && std::isnan(value)); };
   for (double value : table.values)
-    if (table.most_count > 0 ? !is_count(value) : !(std::abs(value) < most_total))
+    if (table.most_count > 0 ? !is_count(value) : !is_total(value))
       return file.reject("/ranks/" + table.name, "it has the value " + std::to_string(value));
 }
 

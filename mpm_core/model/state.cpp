@@ -101,6 +101,12 @@ void set_number(Model<G>& model, const Table& table, double value)
                   });
 }
 
+/// Whether a number has stored energy in it, which some laws do not say.
+bool is_of_stored_energy(std::string_view name)
+{
+  return name == "energy_outflow_stored" || name == "energy_start_plastic_work";
+}
+
 /// Files of before the energy balance do not have its numbers.
 template <class G>
 void begin_balance_where_unknown(Model<G>& model, const std::vector<Table>& ranks)
@@ -122,7 +128,7 @@ std::vector<Table> rank_state(const Model<G>& model)
                   {
                     using Limits = std::numeric_limits<std::remove_cvref_t<decltype(number)>>;
                     const double most_count = Limits::is_integer ? static_cast<double>(Limits::max()) : 0.0;
-                    tables.push_back({name, 1, {static_cast<double>(number)}, most_count});
+                    tables.push_back({name, 1, {static_cast<double>(number)}, most_count, is_of_stored_energy(name)});
                   });
   return tables;
 }
