@@ -31,6 +31,7 @@ from mpm_core.output import MeshOutput
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.compat import cell_dofs
 
 comm = MPI.COMM_WORLD
 FEW_ITERATIONS, SHORTEST = 7, 1e-6
@@ -77,10 +78,10 @@ class Files:
         """Add pressure, head and velocity to the files for ParaView. Collective."""
         flow = self._flow
         head = bridge.evaluate_at(self._points, p=flow.pressure_head)["p"][:, 0]
-        velocity = flow.velocity().x.array.reshape(-1, flow.domain.geometry.dim)
-        per_cell = len(velocity) // max(len(bridge.original_cells(flow.domain)), 1) or 1
+        velocity = flow.velocity()
+        dofs = cell_dofs(velocity.function_space)[: self._n_cells]
+        means = velocity.x.array.reshape(-1, flow.domain.geometry.dim)[dofs].mean(axis=1)
         fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self._points[:, -1]}
-        means = velocity[: per_cell * self._n_cells].reshape(self._n_cells, per_cell, -1).mean(axis=1)
         self._output.write(flow.time, fields, {"velocity": means})
 
     def __enter__(self) -> Files:

@@ -11,7 +11,7 @@ zero, and one of the two is zero. PETSc solves it together with the flow, so tha
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -77,6 +77,22 @@ class PorousSoil:
         return k if k.ndim == 2 else np.diag(np.broadcast_to(k, k.shape or (dim,)))
 
 
+class _Held(NamedTuple):
+    """A boundary condition where it holds.
+
+    tags: numbers of its facets; dofs: of this rank; rate: prescribed inflow over k [-] as a constant, None where there is none
+    density, ds: of that inflow over the facets, UFL; total: compiled form of its integral
+    """
+
+    condition: Any
+    tags: tuple
+    dofs: np.ndarray
+    rate: Any = None
+    density: Any = None
+    ds: Any = None
+    total: Any = None
+
+
 class Seepage:
     """Flow of water through a body of soil.
 
@@ -106,14 +122,15 @@ class Seepage:
         space = compat.function_space(domain, "Lagrange", degree)
         self.pressure_head = fem.Function(space, name="pressure_head")
         self._old = fem.Function(space)
+        self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         self._dt, self._sharpness = fem.Constant(domain, 1.0), fem.Constant(domain, 1.0)
         self._soils, self._measures, self._cells = self._soils_by_tag(soil, cell_tags)
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
         self._height = space.tabulate_dof_coordinates()[:, self._dim - 1]
         self._steady, self._transient, self._prefix = None, None, options_prefix
+        self._stored, self._held = None, []
         self.boundary = list(boundary)
-        self._rates = {}
-        self._check_boundary()
+        self._take_boundary()
         self.iterations = 0
         self._reaction = np.zeros(len(self._height))
 
@@ -124,6 +141,7 @@ class Seepage:
         heads = any(isinstance(c, (Head, Reservoir, SeepageFace, Rain)) for c in self.boundary)
         missing = "boundary: no head, reservoir, seepage face or rain; without one the steady pressure is undetermined"
         agree(self.domain.comm, None if heads else missing)
+        self._take_boundary()
         if self._steady is None:
             self._steady = self._problem(transient=False)
         failure = self._solve(self._steady)
@@ -153,6 +171,7 @@ class Seepage:
     def advance(self, dt):
         """One step of dt [s] by backward Euler. Returns whether it converged; the state is as before where not. Collective."""
         agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
+        self._take_boundary()
         if self._transient is None:
             self._transient = self._problem(transient=True)
         self._dt.value = dt
@@ -164,8 +183,9 @@ class Seepage:
         return not failure
 
     def _solve(self, problem):
-        for condition, rate in self._rates.items():
-            rate.value = value_at(condition.rate, self.time) / self._largest
+        for held in self._held:
+            if held.rate is not None:
+                held.rate.value = value_at(held.condition.rate, self.time) / self._largest
         fixed, values, upper = self._bounds()
         heads = np.concatenate([values[fixed] + self._height[fixed], self._height])
         low, high = heads.min(initial=np.inf), heads.max(initial=-np.inf)
@@ -175,31 +195,28 @@ class Seepage:
             size = min(size, self.stored_water() / (self._largest * float(self._dt.value)))
         failure = problem.solve(fixed, values, upper, size)
         self.iterations = problem.iterations
-        self._reaction = self._largest * problem.residual()
+        if not failure:
+            self._reaction = self._largest * problem.residual()
         return failure
 
     def _problem(self, transient):
         psi, test = self.pressure_head, ufl.TestFunction(self.pressure_head.function_space)
         trial = ufl.TrialFunction(self.pressure_head.function_space)
         form, lagged = 0, 0
-        up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         for soil, dx in zip(self._soils, self._measures):
             k = ufl.as_matrix((soil.tensor(soil.conductivity, self._dim) / self._largest).tolist())
             permeability = soil.retention.relative_permeability(-self._sharpness * self.unit_weight * psi)
             flow = dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
-            form += permeability * ufl.inner(k * (ufl.grad(psi) + up), ufl.grad(test)) * flow
+            form += permeability * ufl.inner(k * (ufl.grad(psi) + self._up), ufl.grad(test)) * flow
             lagged += permeability * ufl.inner(k * ufl.grad(trial), ufl.grad(test)) * flow
             if transient:
                 now, before = (self._water_content(soil, p) for p in (psi, self._old))
                 form += (now - before) / (self._largest * self._dt) * test * self._lumped(dx)
                 slope = ufl.derivative(now, psi, trial)
                 lagged += slope / (self._largest * self._dt) * test * self._lumped(dx)
-        for condition, rate in self._rates.items():
-            ds = ufl.Measure("ds", domain=self.domain, subdomain_data=self._facet_tags)
-            numbers = tag_numbers(self.domain.comm, self._facet_tags, condition.facet_tag, "boundary")
-            normal = ufl.FacetNormal(self.domain)
-            level = abs(normal[self._dim - 1]) if isinstance(condition, Rain) else 1.0
-            form -= rate * level * test * ds(numbers)
+        for held in self._held:
+            if held.rate is not None:
+                form -= held.density * test * held.ds
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
 
     def _lumped(self, dx):
@@ -214,29 +231,38 @@ class Seepage:
 
     # --- boundary conditions and soils -------------------------------------------------------------------------------
 
-    def _check_boundary(self):
+    def _take_boundary(self):
+        """Check the boundary conditions and find where they hold, unless they are those of the last time. Collective."""
+        held = [one.condition for one in self._held]
+        if held and len(held) == len(self.boundary) and all(a is b for a, b in zip(held, self.boundary)):
+            return
         comm = self.domain.comm
         for condition in self.boundary:
             known = isinstance(condition, (Head, Reservoir, SeepageFace, Flux, Rain))
             problem = mistake_in(condition) if known else "expected Head, Reservoir, SeepageFace, Flux or Rain"
             agree(comm, f"boundary: {condition!r}: {problem}" if problem else None)
-            tag_numbers(comm, self._facet_tags, condition.facet_tag, "boundary")
-            if isinstance(condition, (Flux, Rain)):
-                self._rates[condition] = fem.Constant(self.domain, 0.0)
+        self._held = [self._where(condition) for condition in self.boundary]
+        self._steady = self._transient = None
 
-    def _dofs(self, condition):
-        """Dofs of this rank on the facets of a boundary condition."""
-        space, dim = self.pressure_head.function_space, self._dim
-        self.domain.topology.create_connectivity(dim - 1, dim)
-        facets = tagged_facets(self.domain.comm, self._facet_tags, condition.facet_tag, "boundary")
-        return fem.locate_dofs_topological(space, dim - 1, facets)
+    def _where(self, condition):
+        """Where a boundary condition holds."""
+        space, dim, domain = self.pressure_head.function_space, self._dim, self.domain
+        tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
+        domain.topology.create_connectivity(dim - 1, dim)
+        facets = tagged_facets(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
+        dofs = fem.locate_dofs_topological(space, dim - 1, facets)
+        if not isinstance(condition, (Flux, Rain)):
+            return _Held(condition, tags, dofs)
+        rate = fem.Constant(domain, 0.0)
+        level = abs(ufl.FacetNormal(domain)[dim - 1]) if isinstance(condition, Rain) else 1.0
+        ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)(tags)
+        return _Held(condition, tags, dofs, rate, rate * level, ds, fem.form(rate * level * ds))
 
     def _bounds(self):
         """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at the present time."""
         n = len(self._height)
         fixed, values, upper = np.zeros(n, dtype=bool), np.zeros(n), np.full(n, np.inf)
-        for condition in self.boundary:
-            dofs = self._dofs(condition)
+        for condition, dofs in ((held.condition, held.dofs) for held in self._held):
             if isinstance(condition, (Head, Reservoir)):
                 level = value_at(condition.level, self.time)
                 below = dofs if isinstance(condition, Head) else dofs[self._height[dofs] <= level]
@@ -285,41 +311,31 @@ class Seepage:
         numbers = tag_numbers(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
         counted = np.zeros(len(self._height), dtype=bool)
         n, total = self.pressure_head.function_space.dofmap.index_map.size_local, 0.0
-        for condition in self.boundary:
-            own = set(tag_numbers(self.domain.comm, self._facet_tags, condition.facet_tag, "boundary"))
-            dofs = self._dofs(condition)
-            new = dofs[~counted[dofs] & (dofs < n)]
-            counted[dofs] = True
-            if own.isdisjoint(numbers):
+        for held in self._held:
+            new = held.dofs[~counted[held.dofs] & (held.dofs < n)]
+            counted[held.dofs] = True
+            if set(held.tags).isdisjoint(numbers):
                 continue
-            total += self._reaction[new].sum() + self._prescribed(condition)
+            total += self._reaction[new].sum()
+            if held.rate is not None:
+                total += self._largest * fem.assemble_scalar(held.total)
         return self.domain.comm.allreduce(float(total))
-
-    def _prescribed(self, condition):
-        """Water that a prescribed rate brings on this rank [m3/s]."""
-        if condition not in self._rates:
-            return 0.0
-        ds = ufl.Measure("ds", domain=self.domain, subdomain_data=self._facet_tags)
-        numbers = tag_numbers(self.domain.comm, self._facet_tags, condition.facet_tag, "boundary")
-        normal = ufl.FacetNormal(self.domain)
-        level = abs(normal[self._dim - 1]) if isinstance(condition, Rain) else 1.0
-        return fem.assemble_scalar(fem.form(self._largest * self._rates[condition] * level * ds(numbers)))
 
     def stored_water(self):
         """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
-        content = [self._water_content(soil, self.pressure_head) for soil in self._soils]
-        form = sum(water * self._lumped(dx) for water, dx in zip(content, self._measures))
-        return self.domain.comm.allreduce(fem.assemble_scalar(fem.form(form)))
+        if self._stored is None:
+            content = [self._water_content(soil, self.pressure_head) for soil in self._soils]
+            self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))
+        return self.domain.comm.allreduce(fem.assemble_scalar(self._stored))
 
     def velocity(self):
         """Darcy velocity q [m/s] as a function that is polynomial in each cell."""
         psi = self.pressure_head
-        up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         space = compat.function_space(self.domain, "DG", self._degree - 1, self._dim)
-        result, cells = fem.Function(space, name="velocity"), self._cells
-        for soil, own in zip(self._soils, cells):
+        result = fem.Function(space, name="velocity")
+        for soil, own in zip(self._soils, self._cells):
             k = ufl.as_matrix(soil.tensor(soil.conductivity, self._dim).tolist())
-            flow = -soil.retention.relative_permeability(-self.unit_weight * psi) * k * (ufl.grad(psi) + up)
+            flow = -soil.retention.relative_permeability(-self.unit_weight * psi) * k * (ufl.grad(psi) + self._up)
             result.interpolate(fem.Expression(flow, compat.interpolation_points(space)), own)
         return result
 
@@ -346,8 +362,8 @@ class Seepage:
 
     def _pressure(self, effective):
         """Pore pressure [Pa]: continuous and cut off at zero or, with effective saturations, with that part of the suction."""
-        name, psi = "pore_pressure", self.pressure_head
-        result = fem.Function(psi.function_space, name=name)
+        psi = self.pressure_head
+        result = fem.Function(psi.function_space, name="pore_pressure")
         result.x.array[:] = self.unit_weight * np.maximum(psi.x.array, 0.0)
         if effective is None:
             return result

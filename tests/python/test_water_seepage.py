@@ -184,6 +184,33 @@ def test_pressure_in_a_saturated_layer_diffuses_as_terzaghi_says():
     assert [fell[99], fell[199], fell[499]] == pytest.approx([0.3568, 0.5041, 0.7640], abs=4e-3)
 
 
+def test_conditions_may_be_changed_between_steps():
+    # A column drained at its base takes the rain that falls now, not the one before; the balance holds under each.
+    domain, facet_tags = box((0.5, 2.0), (2, 16))
+    soil = water.PorousSoil(1e-5, retention=water.VanGenuchten(2.0 / WEIGHT, 2.0))
+    flow = water.Seepage(domain, soil, facet_tags, [water.Head(BASE, 0.0), water.Rain(TOP, 1e-6)])
+    flow.solve()
+    assert flow.inflow(TOP) == pytest.approx(0.5e-6, rel=1e-9)
+    flow.boundary[1] = water.Rain(TOP, [[0.0, 3e-6], [1e4, 3e-6]])
+    before = flow.stored_water()
+    assert flow.advance(100.0)
+    assert flow.inflow(TOP) == pytest.approx(1.5e-6, rel=1e-9)
+    assert flow.stored_water() - before == pytest.approx(100.0 * (flow.inflow(TOP) + flow.inflow(BASE)), abs=1e-10)
+    flow.boundary[1] = water.Rain(TOP, -1e-6)
+    with pytest.raises(InputError, match="rate is -1e-06"):
+        flow.advance(100.0)
+
+
+def test_a_step_that_fails_leaves_the_flow_as_it_was(monkeypatch):
+    flow = dam()
+    before = flow.time, flow.inflow(LEFT), flow.pressure_head.x.array.copy()
+    monkeypatch.setattr(water.complementarity, "MOST_ITERATIONS", 1)
+    flow.boundary[0] = water.Reservoir(LEFT, 3.0)
+    assert not flow.advance(1.0)
+    assert (flow.time, flow.inflow(LEFT)) == before[:2]
+    assert np.array_equal(flow.pressure_head.x.array, before[2])
+
+
 # --- to finite elements of the soil ----------------------------------------------------------------------------------
 
 
