@@ -5,6 +5,7 @@ import pytest
 from core_cases import box
 
 import mpm_core as mpm
+from mpm_core.probes import PointProbe
 
 YOUNG, POISSON = 1000.0, 0.3
 LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
@@ -144,6 +145,16 @@ def test_implicit_and_explicit_runs_agree():
         order = np.argsort(model.particles.id)
         moved.append(model.particles.displacement[order])
     assert np.linalg.norm(moved[0] - moved[1]) < 0.05 * np.linalg.norm(moved[0])
+
+
+def test_filled_space_is_that_of_rings():
+    mesh = box((10, 10), (1.25, 1.25), body=((-1.0, -1.0), (1.0, 1.0)))
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e3, poisson=0.3), geometry=mpm.Geometry.AXISYMMETRIC)
+    model.seed(density=1000.0, per_cell=6, cell_tag=1)
+    assert model.cell_volumes.sum() == pytest.approx(1.25**3 / 2, rel=1e-12)
+    assert mpm.space(model) == pytest.approx((0.5, 0.5), rel=1e-12)
+    shares = [v for k, v in PointProbe(model, [[0.55, 0.52], [1.1, 1.1]]).values().items() if k.startswith("filled")]
+    assert shares == pytest.approx([1.0, 0.0], abs=1e-12)
 
 
 def test_what_axial_symmetry_does_not_have_is_refused():

@@ -151,14 +151,14 @@ class PointProbe:
         sums = np.zeros(
             (len(self._points), 2 + len(self._columns))
         )  # ranks that have it, volumes of cell and soil, the rest
-        cell_of = p.cell
+        cell_of, volumes = p.cell, model.cell_volumes
         for k, cell in enumerate(self._own_cells()):
             if cell < 0:
                 continue
             inside = p[cell_of == cell]
             v = inside.volume[:, None]
             moments = np.concatenate([(v * inside.velocity).sum(axis=0), (v * inside.stress).sum(axis=0)])
-            sums[k] = [1.0, model.mesh.cell_volumes[cell], v.sum(), *moments]
+            sums[k] = [1.0, volumes[cell], v.sum(), *moments]
         # A point on a side between the cells of two ranks is seen by both: the mean of the two.
         sums = model.comm.allreduce(sums)
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -23,7 +23,7 @@ STEPS_BETWEEN = 256
 
 
 class Space(NamedTuple):
-    """Volumes, in plane strain areas times one metre [m3].
+    """Volumes, in plane strain areas times one metre, in axial symmetry of one radian [m3].
 
     particles: sum of the particles' volumes
     filled: what they fill: in each cell the less of their volume and its own
@@ -41,7 +41,7 @@ def space(model: Model) -> Space:
     """
     p, mesh = model.particles, model.mesh
     held = np.bincount(p.cell, p.volume, minlength=mesh.owned_cells)
-    filled = np.minimum(held[: mesh.owned_cells], mesh.cell_volumes[: mesh.owned_cells])
+    filled = np.minimum(held[: mesh.owned_cells], model.cell_volumes[: mesh.owned_cells])
     sums = model.comm.allreduce(np.array([p.volume.sum(), filled.sum()]))
     return Space(float(sums[0]), float(sums[1]))
 
