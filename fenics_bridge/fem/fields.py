@@ -27,6 +27,20 @@ def strain(u, radius=None):
     return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
 
 
+def dilation(u, radius=None):
+    """Change of volume of a displacement, the trace of its strain, as a UFL expression; radius: as for `strain`."""
+    return ufl.div(u) if radius is None else ufl.div(u) + u[0] / radius
+
+
+def strain_up_to_axis(u, radius=None):
+    """The same strain where the axis belongs to the points: there the hoop strain is du_r/dr, the limit of u_r / r."""
+    components = strain(u, radius)
+    if radius is None:
+        return components
+    hoop = ufl.conditional(ufl.gt(radius, 1e-9 * ufl.CellDiameter(u.ufl_domain())), components[2], components[0])
+    return ufl.as_vector([components[0], components[1], hoop, components[3]])
+
+
 def elastic_stress(strain_components, young, poisson):
     """Stress components of an isotropic elastic body as a UFL vector; plane strain keeps its stress zz."""
     shear = young / (2 * (1 + poisson))

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import ufl
+from dolfinx import fem
 from mpi4py import MPI
 
 from fenics_bridge.errors import agree
+from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
 from mpm_core import Geometry
 
 
@@ -42,13 +44,29 @@ def weighted(integrand, radius):
     return integrand if radius is None else radius * integrand
 
 
+def body_volumes(domain, geometry):
+    """Volumes of the cells that this rank owns (m,): [m^D], or of one radian, the integral of r dA, in an axisymmetric body."""
+    volumes = cell_volumes(domain)
+    return volumes * cell_corners(domain)[:, :, 0].mean(axis=1) if geometry == Geometry.AXISYMMETRIC else volumes
+
+
+def require_same_geometry(model, fem):
+    """Raise InputError, on all ranks, unless particles and finite elements have the same geometry. Collective."""
+    same = model.geometry == fem.geometry
+    problem = f"fem: its geometry is {fem.geometry.name}, that of the particles is {model.geometry.name}"
+    agree(model.comm, None if same else problem)
+
+
 def require_axis_held(space, geometry, constraints):
-    """Raise InputError, on all ranks, unless nodes on the axis are held along the radius. Collective."""
+    """Raise InputError, on all ranks, unless nodes on the axis are held along the radius. Collective.
+
+    space: of the displacement, or that part of a mixed space
+    """
     if geometry != Geometry.AXISYMMETRIC:
         return
-    x = space.tabulate_dof_coordinates()[:, 0]
-    size = space.mesh.comm.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX)
-    on_axis = np.flatnonzero(x <= 1e-12 * size)
-    free = np.setdiff1d(2 * on_axis, constraints.dofs)
+    domain, radial = space.mesh, space.sub(0)
+    size = domain.comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), op=MPI.MAX)
+    on_axis = fem.locate_dofs_geometrical((radial, radial.collapse()[0]), lambda x: x[0] <= 1e-12 * size)[0]
+    free = np.setdiff1d(on_axis, constraints.dofs)
     problem = f"supports: {len(free)} nodes lie on the axis and may move along the radius, expected a roller there"
-    agree(space.mesh.comm, problem if len(free) else None)
+    agree(domain.comm, problem if len(free) else None)

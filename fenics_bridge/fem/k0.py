@@ -24,6 +24,8 @@ def k0_jaky(friction_angle):
 def k0_stress(points, surface, unit_weight, k0):
     """Stress of uniform ground at rest: the weight above a point, and K0 times it on both horizontal axes.
 
+    In an axisymmetric body these are the radius and the hoop.
+
     Exact for level ground; under a sloping surface it is a start that a solver then brings into equilibrium.
     points: (n, D) [m]; the last axis points up
     surface: height of the ground, as a number [m], as a polyline (k, 2) of points (x, y) with x rising [m]

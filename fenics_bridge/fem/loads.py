@@ -88,7 +88,7 @@ class LoadVectors:
         self._pressure = {}
 
     def forces(self, load):
-        """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain).
+        """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain, [N] per radian).
 
         Collective; raises InputError, on all ranks, for a tag that does not exist or a value that is not finite.
         """
@@ -140,21 +140,22 @@ class LoadVectors:
         return self._pressure[tag]
 
 
-def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=None):
+def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=None, radius=None):
     """Work of weight, tractions and a body force on a test displacement, as a UFL form.
 
     unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag; body_force: as for `solve_elastic`
+    radius: of an axisymmetric body, a UFL expression; the work is then that of one radian
     Collective; raises InputError, on all ranks, for a facet tag that does not exist.
     """
     down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
-    work = ufl.inner(fem.Constant(domain, np.array(down)), test) * ufl.dx
+    work = weighted(ufl.inner(fem.Constant(domain, np.array(down)), test), radius) * ufl.dx
     if body_force is not None:
         # Cubic: its error is far below that of linear and quadratic displacements
         force = fem.Function(compat.function_space(domain, "Lagrange", 3, domain.geometry.dim))
         force.interpolate(lambda x: body_force(x[: domain.geometry.dim]))
-        work += ufl.inner(force, test) * ufl.dx
+        work += weighted(ufl.inner(force, test), radius) * ufl.dx
     for tag, value in traction.items():
         ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
         numbers = tag_numbers(domain.comm, facet_tags, tag, "traction")
-        work += ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test) * ds(numbers)
+        work += weighted(ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test), radius) * ds(numbers)
     return work

@@ -14,7 +14,8 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.equilibration import Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.fields import assembled, strain
+from fenics_bridge.fem.fields import assembled, dilation, strain
+from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, weighted
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
@@ -34,22 +35,26 @@ class MixedQuasiStatic:
     Has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_", solver=None):
+    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_", solver=None, geometry=None):
         """
         law: of `mpm_core`, LinearElastic, or MohrCoulomb with a friction angle of 0 and no tension cut-off
         facet_tags, supports: as for `solve_elastic`; options_prefix: of the PETSc options of the linear solver
-        solver: as for `QuasiStatic`
+        solver, geometry: as for `QuasiStatic`
         Raises InputError, on all ranks, for bad arguments. Collective.
         """
         agree(domain.comm, _first_mistake(law))
+        self.geometry = geometry_of(domain, geometry)
+        radius = radius_of(domain, self.geometry)
         space = compat.taylor_hood_space(domain)
         self.domain, self.law = domain, law
         constraints = Constraints(space.sub(0), facet_tags, supports)
-        self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0])
-        self.points = QuadraturePoints(domain, [law], Materials(domain, law, None).number, 2)
+        require_axis_held(space.sub(0), self.geometry, constraints)
+        self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0], radius=radius)
+        number = Materials(domain, law, None).number
+        self.points = QuadraturePoints(domain, [law], number, 2, radius is not None)
         self.load, self.converged = Load(), False
         unknowns = fem.Function(space), fem.Function(space)
-        self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law)
+        self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law, radius)
         linear = LinearSolver(space, options_prefix, newton=True)
         self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
         self.solver = solver or Solver()
@@ -82,7 +87,7 @@ class MixedQuasiStatic:
         return raise_load(self, load, first_step, tolerance, progress)
 
     def reaction(self, facet_tag):
-        """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in 2D). Collective."""
+        """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in plane strain, [N] per radian). Collective."""
         space, dim = self._body.solution.function_space, self.domain.geometry.dim
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
@@ -118,7 +123,7 @@ class _MixedKinematics:
     The unknown pressure is in units of the shear modulus, which keeps the two sorts of equations alike in size.
     """
 
-    def __init__(self, solution, increment, points, constraints, law):
+    def __init__(self, solution, increment, points, constraints, law, radius=None):
         space = solution.function_space
         self._space, self._points = space, points
         domain, size = space.mesh, points.size
@@ -128,17 +133,23 @@ class _MixedKinematics:
         self._deviator = np.eye(size) - np.outer(np.arange(size) < 3, np.arange(size) < 3) / 3
         u, p = (a + b for a, b in zip(ufl.split(solution), ufl.split(increment)))
         (v, q), (du, dp) = ufl.TestFunctions(space), ufl.TrialFunctions(space)
-        self._strain = fem.Expression(strain(ufl.split(increment)[0]), points.reference)
+        self._strain = fem.Expression(strain(ufl.split(increment)[0], radius), points.reference)
         self._stress, self._stress_rows = self._quadrature_function(size)
         self._tangent, self._tangent_rows = self._quadrature_function(size**2)
         dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
 
-        def volume(u, p):
-            return self.scale * (-p * ufl.div(v) - q * ufl.div(u) - flexibility * p * q) * dx
+        # The pressure's terms have one degree more with the radius.
+        dx_volume = dx if radius is None else ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 3})
 
-        self._internal = fem.form(ufl.inner(self._stress, strain(v)) * dx + volume(u, p))
-        stiffness = ufl.inner(ufl.dot(matrix, strain(du)), strain(v)) * dx + volume(du, dp)
+        def volume(u, p):
+            terms = -p * dilation(v, radius) - q * dilation(u, radius) - flexibility * p * q
+            return self.scale * weighted(terms, radius) * dx_volume
+
+        tested = strain(v, radius)
+        self._internal = fem.form(weighted(ufl.inner(self._stress, tested), radius) * dx + volume(u, p))
+        change = ufl.inner(ufl.dot(matrix, strain(du, radius)), tested)
+        stiffness = weighted(change, radius) * dx + volume(du, dp)
         self._stiffness = Stiffness(stiffness, constraints)
         self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
 

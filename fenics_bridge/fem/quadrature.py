@@ -24,8 +24,11 @@ class QuadraturePoints:
     trial_stress, trial_state, tangent: (n, S), (n, n_state), (n, S, S) at the displacement under trial
     """
 
-    def __init__(self, domain, laws, material, degree):
-        """laws: by number; material: (owned cells,) int32, number of each cell's law; degree: of the quadrature."""
+    def __init__(self, domain, laws, material, degree, axisymmetric=False):
+        """laws: by number; material: (owned cells,) int32, number of each cell's law; degree: of the quadrature.
+
+        axisymmetric: whether means over a cell are those of its volume of one radian, r dA
+        """
         self.size = N_STRESS[domain.geometry.dim]
         self._domain = domain
         self.degree, self.reference = degree, compat.quadrature_points(domain, degree)
@@ -33,6 +36,7 @@ class QuadraturePoints:
         # With the points of a law in one piece it works on them in place.
         self.cells = np.argsort(material, kind="stable").astype(np.int32)
         self.n = len(self.cells) * self.per_cell
+        self._radii = self.coordinates()[:, 0].reshape(-1, self.per_cell) if axisymmetric else None
         sizes = cell_sizes(cell_volumes(domain)[self.cells], domain.geometry.dim)
         self.cell_size = np.repeat(sizes, self.per_cell)
         self.time, self.duration = 0.0, np.inf
@@ -148,13 +152,14 @@ class QuadraturePoints:
         return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, -1)
 
     def cell_function(self, values, name, degree):
-        """Function that is constant (degree 0: the mean) or linear (degree 1: through the points) in each cell.
+        """Function that is constant (degree 0: the mean by volume) or linear (degree 1: through the points) in each cell.
 
         The mean of admissible stresses is admissible; the linear function is exact at the points. values: (n, k)
         """
         values = values.reshape(len(self.cells), self.per_cell, -1)
         if degree == 0:
-            at_nodes = values.mean(axis=1, keepdims=True)
+            weights = None if self._radii is None else np.broadcast_to(self._radii[:, :, None], values.shape)
+            at_nodes = np.average(values, axis=1, weights=weights)[:, None]
         else:
             at_nodes = np.einsum("kq,cqs->cks", np.linalg.inv(self._linear_shapes()), values)
         space = compat.function_space(self._domain, "DG", degree, values.shape[2])

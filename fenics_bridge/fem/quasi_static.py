@@ -72,7 +72,9 @@ class QuasiStatic:
         constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._materials = Materials(domain, law, cell_tags)
-        self.points = QuadraturePoints(domain, self.laws, self._materials.number, max(1, 2 * (degree - 1)))
+        quadrature = max(1, 2 * (degree - 1))
+        axisymmetric = self.radius is not None
+        self.points = QuadraturePoints(domain, self.laws, self._materials.number, quadrature, axisymmetric)
         self.load, self.converged, self.solver = Load(), False, solver or Solver()
         self._assemble(constraints)
 
