@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.geometry import require_same_geometry
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,9 @@ def compare(fem, model, smooth=False, places=None):
     places: other places (n, D) [m] to evaluate the finite elements at; for particles that were handed over and so
         never stood in the undeformed body, `model.particles.position` after the hand-over
     Returns a dictionary of Difference, `displacement` [m] and `stress` [Pa]. Raises InputError, on all ranks, naming a
-    particle whose place is outside the finite elements' mesh. Collective.
+    particle whose place is outside the finite elements' mesh, and for another geometry. Collective.
     """
+    require_same_geometry(model, fem)
     particles = model.particles
     search = PointSearch(fem.displacement.function_space.mesh, particles.initial_position if places is None else places)
     search.require_all("particles")

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.fields import cell_function
+from fenics_bridge.fem.geometry import Geometry, body_volumes
 from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
 
 _SAMPLES = 400
@@ -17,21 +18,25 @@ _FULL = 0.95
 
 
 def volume_change(displacement):
-    """det(1 + grad u) as a function that is linear in each cell: exact for linear displacements."""
+    """det(1 + grad u) as a function that is linear in each cell: exact for linear displacements.
+
+    Of an axisymmetric body it is the change of the section's area; volumes change by the ratio of the radii besides.
+    """
     domain = displacement.function_space.mesh
     change = ufl.det(ufl.Identity(domain.geometry.dim) + ufl.grad(displacement))
     return cell_function(domain, ufl.as_vector([change]), 1, "volume change")
 
 
-def held_volumes(domain, displacement):
+def held_volumes(domain, displacement, geometry=None):
     """Volume [m^D] of the moved body in each cell of another mesh that this rank owns: (m,).
 
     Sampled in the cells of the finite elements, each sample moved by the displacement. What of the body would be
-    outside of the other mesh is left out. domain: the other mesh; displacement: function [m]. Collective.
+    outside of the other mesh is left out. domain: the other mesh; displacement: function [m]
+    geometry: a Geometry; volumes of an axisymmetric body are those of one radian. Collective.
     """
-    body, volumes = displacement.function_space.mesh, cell_volumes(domain)
+    body, volumes = displacement.function_space.mesh, body_volumes(domain, geometry)
     own = cell_volumes(body)
-    per_cell = max(1, round(_SAMPLES * _mean(body.comm, own) / _mean(domain.comm, volumes)))
+    per_cell = max(1, round(_SAMPLES * _mean(body.comm, own) / _mean(domain.comm, cell_volumes(domain))))
     shares = simplex_samples(body.geometry.dim, per_cell)
     at = np.zeros((len(own) * len(shares), 3))
     at[:, : body.geometry.dim] = np.einsum("qk,ckd->cqd", shares, _ordered(cell_corners(body))).reshape(len(at), -1)
@@ -40,6 +45,8 @@ def held_volumes(domain, displacement):
     if len(at):
         moved = moved + np.asarray(displacement.eval(at, cells)).reshape(moved.shape)
         sampled = sampled * np.asarray(volume_change(displacement).eval(at, cells)).ravel()
+    if geometry == Geometry.AXISYMMETRIC:
+        sampled = sampled * moved[:, 0]
     held = PointSearch(domain, moved).cell_sums(sampled)
     return np.where(held > _FULL * volumes, volumes, held)
 

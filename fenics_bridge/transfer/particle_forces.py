@@ -6,10 +6,11 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_bridge.errors import agree
+from mpm_core import Geometry
 
 
 def boundary_forces(model, tag, pressure):
-    """Force on each particle by a pressure on the boundary with a tag: (n, D) [N] ([N/m] in 2D).
+    """Force on each particle by a pressure on the boundary with a tag: (n, D) [N] ([N/m] in plane strain, [N] per radian).
 
     A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it.
     pressure: [Pa], compression positive. Collective.
@@ -32,14 +33,19 @@ def boundary_forces(model, tag, pressure):
         ) @ gradient  # shape function of k
         nearest = rows[distance < distance.min() + 1e-6]
         # The outward normal times the area is -D V grad N of the opposite corner.
-        force[nearest] += pressure * dim * mesh.cell_volumes[cell] * gradient / len(nearest)
+        area = dim * mesh.cell_volumes[cell] * gradient
+        share = np.full(len(nearest), 1 / len(nearest))
+        if model.geometry == Geometry.AXISYMMETRIC:  # each carries its own ring
+            area *= np.delete(mesh.points[mesh.cells[cell], 0], k).mean()
+            share = position[nearest, 0] / position[nearest, 0].sum()
+        force[nearest] += pressure * share[:, None] * area
     any_facet = model.comm.allreduce(len(facets))
     agree(model.comm, None if any_facet else f"pressure: no soil lies at the boundary with the tag {tag}")
     return force
 
 
 def seepage_forces(model, pore_pressure):
-    """Force -V grad p of the pore water on each particle, p being linear in each cell: (n, D) [N] ([N/m] in 2D)."""
+    """Force -V grad p of the pore water on each particle, p being linear in each cell: (n, D) [N] ([N/m] in plane strain, [N] per radian)."""
     mesh, cells = model.mesh, model.particles.cell
     p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
     agree(model.comm, None if np.all(np.isfinite(p)) else "pore_pressure: it gives values that are not finite")

@@ -14,6 +14,7 @@ import mpm_core as mpm
 from fenics_bridge.mesh.tagged import owned_cells
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+from axisymmetric_cases import cylinder_fem, cylinder_particles  # noqa: E402
 from bridge_cases import (
     MESHES,
     POISSON,
@@ -231,3 +232,23 @@ def test_axisymmetric_elements_are_the_same_on_any_number_of_ranks(options):
         assert comm.allreduce(int((fem.points.state[:, 0] > 0).sum())) > 10
     for here, alone in zip(*found):
         np.testing.assert_allclose(here, alone, rtol=0, atol=1e-6 * np.abs(alone).max())
+
+
+@pytest.mark.parametrize(("degree", "options"), [(1, {}), (2, {"smooth": True}), (1, {"move": True})])
+def test_axisymmetric_hand_over_between_different_partitions(degree, options):
+    """Stresses with the hoop, state, places and volumes of one radian; in place the linear elements are in balance at once."""
+    results = []
+    for comm in (COMM, MPI.COMM_SELF):
+        elements = cylinder_fem(8, comm, degree=degree)
+        model = cylinder_particles(8, comm, headroom=0.25)
+        report = bridge.initialise(model, elements, equilibrate=False, **options)
+        if degree == 1 and not options:
+            assert report.unbalanced_ratio < 1e-8
+        fields = ("stress", "state", "volume", "position", "deviatoric_strain")
+        results.append((report.unbalanced_ratio, by_id(model, *fields) if comm is COMM else in_order(model, *fields)))
+    (here, fields_here), (alone, fields_alone) = results
+    assert here == pytest.approx(alone, rel=1e-3, abs=1e-8)
+    for mine, whole in zip(fields_here, fields_alone):
+        assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+    report = bridge.initialise(cylinder_particles(8, headroom=0.25), cylinder_fem(8, degree=degree), **options)
+    assert report.settled_ratio < 1e-3

@@ -152,10 +152,3 @@ def test_wrong_input_is_named():
         bridge.QuasiStatic(beyond, law, tags, [bridge.fixed(3)], geometry=AXISYMMETRIC)
     with pytest.raises(bridge.InputError, match="geometry: got .*SOLID.*, which a mesh of 2 dimensions cannot have"):
         bridge.QuasiStatic(domain, law, facet_tags, [bridge.fixed(3)], geometry=bridge.Geometry.SOLID)
-    held = [bridge.roller(1, (1, 0)), bridge.fixed(3)]
-    fem = bridge.QuasiStatic(domain, law, facet_tags, held, degree=1, geometry=AXISYMMETRIC)
-    fem.solve(bridge.Load(unit_weight=1e3))
-    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law)
-    model.seed(density=100.0, per_cell=3)
-    with pytest.raises(bridge.InputError, match="fem: it is axisymmetric, the particles are in plane strain"):
-        bridge.initialise(model, fem)
