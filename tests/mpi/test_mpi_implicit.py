@@ -40,11 +40,12 @@ def test_small_displacements_are_the_same_on_any_partition(comm, owners_of):
     """With mean stresses averaged in the forces, whose tangent is a product over ranks."""
     model, alone = sliding_slope(comm, owners_of), sliding_slope(MPI.COMM_SELF)
     for each in (model, alone):
+        each.fix(3)  # without inertia, a body that may slide as a whole would leave the tangent singular
         each.set_gravity((0, -6.0))
         *_, report = each.implicit(1.0, dt=0.5, quasi_static=True, small_displacements=True, nmd=True)
         assert report.cuts == 0 and report.iterations < 8 and report.unbalanced_ratio < 1e-7
     moved, expected = all_by_id(model), all_by_id(alone)
-    assert moved["state"].max() > 1e-3
+    assert moved["state"].max() > 1e-4  # soil yields
     np.testing.assert_allclose(
         moved["stress"], expected["stress"], rtol=0, atol=1e-7 * np.abs(expected["stress"]).max()
     )
