@@ -57,6 +57,26 @@ inline double dot(const Vector<D>& a, const Vector<D>& b)
 }
 
 template <int D>
+inline Matrix<D> product(const Matrix<D>& a, const Matrix<D>& b)
+{
+  Matrix<D> c{};
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      for (int k = 0; k < D; ++k)
+        c[i][j] += a[i][k] * b[k][j];
+  return c;
+}
+
+template <int D>
+inline Vector<D> product(const Matrix<D>& a, const Vector<D>& b)
+{
+  Vector<D> c;
+  for (int i = 0; i < D; ++i)
+    c[i] = dot<D>(a[i], b);
+  return c;
+}
+
+template <int D>
 inline double norm(const Vector<D>& a)
 {
   return std::sqrt(dot<D>(a, a));

@@ -4,131 +4,56 @@
 
 namespace mpm
 {
-namespace
+template <class G, int D>
+void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces)
 {
-/// What a cell tells its neighbours.
-struct CellContents
-{
-  double volume; ///< filled
-  double mass;
-  double shear; ///< integral of the shear modulus over the filled volume
-};
-
-template <class G, int D = G::dim>
-std::vector<CellContents> cell_contents(const Model<G>& model, const Halo& cells)
-{
-  std::vector<CellContents> contents(model.mesh.cells.size(), CellContents{});
-  for (const Run& run : model.order.runs)
+  const double inertia = step.options.quasi_static ? 0 : 1 / step.stage.dt;
+  for (const GhostFacet<D>& facet : step.ghosts)
   {
-    const double shear = shear_modulus(model.laws[run.material]);
-    for (Index p = run.first; p < run.last; ++p)
-    {
-      contents[run.cell].volume += model.particles.volume[p];
-      contents[run.cell].mass += model.particles.mass[p];
-      contents[run.cell].shear += model.particles.volume[p] * shear;
-    }
+    const Vector<D> jump =
+        jump_over(facet,
+                  [&](Index i)
+                  {
+                    Vector<D> value;
+                    for (int a = 0; a < D; ++a)
+                      value[a] = facet.stiffness * step.dt * (field.velocity[i][a] - field.start_velocity[i][a]) +
+                                 facet.mass * inertia * (end_velocity(step, field, i, a) - step.stage.start[i][a]);
+                    return value;
+                  });
+    for (int k = 0; k < D + 2; ++k)
+      for (int a = 0; a < D; ++a)
+        forces[facet.nodes[k]].ghost[a] += facet.share[k] * facet.jump[k] * jump[a];
   }
-  update(cells, contents);
-  return contents;
 }
-
-/// The facet of a cell opposite to vertex k, to a neighbour; without its coefficients.
-template <int D>
-GhostFacet<D> facet_between(const Mesh<D>& mesh, Index cell, int k, Index other)
-{
-  GhostFacet<D> facet{};
-  const auto on_facet = facet_nodes<D>(mesh.cells[cell], k);
-  std::copy(on_facet.begin(), on_facet.end(), facet.nodes.begin());
-  int opposite = 0;
-  while (std::find(on_facet.begin(), on_facet.end(), mesh.cells[other][opposite]) != on_facet.end())
-    ++opposite;
-  facet.nodes[D] = mesh.cells[cell][k];
-  facet.nodes[D + 1] = mesh.cells[other][opposite];
-
-  Vector<D> normal = mesh.shapes[cell].gradient[k]; // at right angles to the facet
-  const double length = norm<D>(normal);
-  for (Index c : {cell, other})
-    for (int l = 0; l <= D; ++l)
-    {
-      const auto at = std::find(facet.nodes.begin(), facet.nodes.end(), mesh.cells[c][l]) - facet.nodes.begin();
-      facet.jump[at] += (c == cell ? 1 : -1) * dot<D>(normal, mesh.shapes[c].gradient[l]) / length;
-    }
-  const bool shared = other >= mesh.owned_cells;
-  facet.share.fill(shared ? 0.5 : 1);
-  facet.share[D] = 1;
-  facet.share[D + 1] = shared ? 0 : 1;
-  return facet;
-}
-/// A facet of a cell without filled neighbours: the jump is to a gradient of zero, as a lone particle has none.
-template <int D>
-GhostFacet<D> outer_facet(const Mesh<D>& mesh, Index cell, int k)
-{
-  GhostFacet<D> facet{};
-  const auto on_facet = facet_nodes<D>(mesh.cells[cell], k);
-  std::copy(on_facet.begin(), on_facet.end(), facet.nodes.begin());
-  facet.nodes[D] = facet.nodes[D + 1] = mesh.cells[cell][k];
-  const Vector<D> normal = mesh.shapes[cell].gradient[k];
-  for (int l = 0, at = 0; l <= D; ++l)
-    facet.jump[l == k ? D : at++] = dot<D>(normal, mesh.shapes[cell].gradient[l]) / norm<D>(normal);
-  facet.share.fill(1);
-  facet.share[D + 1] = 0;
-  return facet;
-}
-
-/// Weights of a facet of cell c, opposite to vertex k; h is the mean of both altitudes over it.
-template <class G, int D = G::dim>
-void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const CellContents& both,
-                 const GhostOptions& options, GhostFacet<D>& facet)
-{
-  // |grad N_k| is one over the altitude, so the facet's measure is D times the volume times that.
-  // In axial symmetry both are those of one radian, at the cell's radius.
-  const double area = D * cell_volume<G>(mesh.shapes[c]) * norm<D>(mesh.shapes[c].gradient[k]);
-  const double h = D * volumes / (2 * area);
-  facet.stiffness = options.stiffness * both.shear / both.volume * h * area;
-  facet.mass = options.mass * both.mass / both.volume * h * h * h * area;
-}
-} // namespace
 
 template <class G, int D>
-std::vector<GhostFacet<D>> find_ghost_facets(const Model<G>& model, const Halos& halos, const GhostOptions& options)
+void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
 {
-  std::vector<GhostFacet<D>> facets;
-  if (options.filled == 0)
-    return facets;
-  const Mesh<D>& mesh = model.mesh;
-  const auto contents = cell_contents(model, halos.cells);
-  const auto bad = [&](Index c) { return contents[c].volume < options.filled * cell_volume<G>(mesh.shapes[c]); };
-  const auto filled = [&](Index c) { return c != none && contents[c].volume > 0; };
-  for (Index c = 0; c < mesh.owned_cells; ++c)
+  std::size_t rows = 0;
+  for (const GhostFacet<D>& facet : step.ghosts)
+    rows += static_cast<std::size_t>(std::ranges::count_if(facet.share, [](double share) { return share != 0; }));
+  tangent.expect(rows * (D + 2));
+  for (const GhostFacet<D>& facet : step.ghosts)
   {
-    if (!filled(c))
-      continue;
-    const bool lone = bad(c) && std::none_of(mesh.neighbours[c].begin(), mesh.neighbours[c].end(), filled);
-    for (int k = 0; k <= D; ++k)
-    {
-      const Index other = mesh.neighbours[c][k];
-      if (lone)
+    const double factor =
+        facet.stiffness + (step.options.quasi_static ? 0 : facet.mass / (step.stage.weight * step.stage.dt * step.dt));
+    for (int k = 0; k < D + 2; ++k)
+      for (int l = 0; l < D + 2; ++l)
       {
-        GhostFacet<D> facet = outer_facet(mesh, c, k);
-        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]), contents[c], options, facet);
-        facets.push_back(facet);
+        if (facet.share[k] == 0)
+          continue;
+        Matrix<D> block{};
+        for (int a = 0; a < D; ++a)
+          block[a][a] = facet.share[k] * factor * facet.jump[k] * facet.jump[l];
+        tangent.add(facet.nodes[k], facet.nodes[l], block);
       }
-      // Each facet once: from the lower of two owned cells, and from the owned cell where the other is a ghost.
-      else if (filled(other) && (bad(c) || bad(other)) && (other > c || other >= mesh.owned_cells))
-      {
-        GhostFacet<D> facet = facet_between(mesh, c, k, other);
-        const CellContents both{contents[c].volume + contents[other].volume, contents[c].mass + contents[other].mass,
-                                contents[c].shear + contents[other].shear};
-        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]) + cell_volume<G>(mesh.shapes[other]), both, options,
-                       facet);
-        facets.push_back(facet);
-      }
-    }
   }
-  return facets;
 }
 
-template std::vector<GhostFacet<2>> find_ghost_facets(const Model<PlaneStrain>&, const Halos&, const GhostOptions&);
-template std::vector<GhostFacet<2>> find_ghost_facets(const Model<Axisymmetric>&, const Halos&, const GhostOptions&);
-template std::vector<GhostFacet<3>> find_ghost_facets(const Model<Solid>&, const Halos&, const GhostOptions&);
+#define INSTANTIATE(G)                                                                                                 \
+  template void add_ghost_forces(const VelocityField<G>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);  \
+  template void add_ghost_entries(const ImplicitStep<G>&, BlockWriter<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -4,31 +4,72 @@
 
 namespace mpm
 {
-template <class G, int D>
-std::vector<double> shear_frequencies(Model<G>& model)
+template <class G>
+Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, double start, double end)
 {
-  std::vector<double> stiffness(model.mesh.points.size(), 0.0);
-  for (const Run& run : model.order.runs)
+  const double x = step.frequency[node] * step.length;
+  const double resolved = step.options.second_order ? left_by_second_order(x) : left_by_backward_euler(x);
+  Inertia inertia =
+      damped_inertia(mass, start, end, step.stage.dt, step.options.damping, step.frequency[node], resolved);
+  inertia.derivative /= step.stage.weight;
+  return inertia;
+}
+
+namespace
+{
+/// Of the iterate.
+template <class G>
+Inertia iterate_inertia(const VelocityField<G>& field, const ImplicitStep<G>& step, Index node, int component)
+{
+  return stage_inertia(step, field.nodes[node].mass, node, step.stage.start[node][component],
+                       end_velocity(step, field, node, component));
+}
+} // namespace
+
+template <class G, int D>
+void add_inertia_forces(const VelocityField<G>& field, const ImplicitStep<G>& step,
+                        std::span<const unsigned char> owned, std::vector<NodalForces<D>>& forces)
+{
+  if (step.options.quasi_static)
+    return;
+  for (std::size_t i = 0; i < forces.size(); ++i)
+    for (int a = 0; a < D && owned[i] && step.active[i]; ++a)
+      forces[i].inertia[a] += iterate_inertia(field, step, static_cast<Index>(i), a).force;
+}
+
+template <class G, int D>
+void add_inertia_entries(const VelocityField<G>& field, const ImplicitStep<G>& step, std::span<const Index> owned,
+                         BlockWriter<D>& tangent)
+{
+  tangent.expect(owned.size());
+  for (Index node : owned)
   {
-    double volume = 0;
-    for (Index p = run.first; p < run.last; ++p)
-      volume += model.particles.volume[p];
-    const double shear = shear_modulus(model.laws[run.material]);
-    for (int k = 0; k <= D; ++k)
-    {
-      const Vector<D>& g = model.mesh.shapes[run.cell].gradient[k];
-      stiffness[model.mesh.cells[run.cell][k]] += volume * shear * dot<D>(g, g);
-    }
+    Matrix<D> block{};
+    for (int a = 0; a < D && !step.options.quasi_static; ++a)
+      block[a][a] = iterate_inertia(field, step, node, a).derivative / step.dt;
+    tangent.add(node, node, block);
   }
-  sum_shared(model.exchange, stiffness.data(), 1);
-  std::vector<double> frequency(stiffness.size(), 0.0);
+}
+
+template <int D>
+std::vector<double> shear_frequencies(std::span<const double> stiffness, std::span<const NodeSums<D>> nodes)
+{
+  std::vector<double> frequency(nodes.size(), 0.0);
   for (std::size_t i = 0; i < frequency.size(); ++i)
-    if (model.fields.front().nodes[i].mass > 0)
-      frequency[i] = std::sqrt(stiffness[i] / model.fields.front().nodes[i].mass);
+    if (nodes[i].mass > 0)
+      frequency[i] = std::sqrt(stiffness[i] / nodes[i].mass);
   return frequency;
 }
 
-template std::vector<double> shear_frequencies(Model<PlaneStrain>&);
-template std::vector<double> shear_frequencies(Model<Axisymmetric>&);
-template std::vector<double> shear_frequencies(Model<Solid>&);
+template std::vector<double> shear_frequencies<2>(std::span<const double>, std::span<const NodeSums<2>>);
+template std::vector<double> shear_frequencies<3>(std::span<const double>, std::span<const NodeSums<3>>);
+#define INSTANTIATE(G)                                                                                                 \
+  template Inertia stage_inertia(const ImplicitStep<G>&, double, Index, double, double);                               \
+  template void add_inertia_forces(const VelocityField<G>&, const ImplicitStep<G>&, std::span<const unsigned char>,    \
+                                   std::vector<NodalForces<G::dim>>&);                                                 \
+  template void add_inertia_entries(const VelocityField<G>&, const ImplicitStep<G>&, std::span<const Index>,           \
+                                    BlockWriter<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

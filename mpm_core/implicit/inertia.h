@@ -1,75 +1,32 @@
 #pragma once
 /// @file
-/// What inertia and local damping amount to over a step of any length.
-///
-/// The explicit scheme damps by D = alpha |R| sign(v), R = f_ext - f_int. What that does to a body depends on whether a
-/// step resolves the small elastic oscillations at the scale of the mesh, of angular frequency omega.
-///
-/// **Resolved**, omega dt << 1: R held over the step moves the node by m dv/dt = R - alpha |R| sign(v), that is, with
-/// the apparent mass m / (1 - alpha) while it gains speed and m / (1 + alpha) while it loses speed. Where the velocity
-/// changes its sign within the step, D changes with it, so the momentum that R must give is
-///
-///     R dt = m [ (w - v0) / (1 + alpha) + (v1 - w) / (1 - alpha) ],   w = v1 clipped to between 0 and v0.
-///
-/// This is r(v1) = R - D - m (v1 - v0) / dt = 0 with D the mean over the step, solved for R: continuous and increasing
-/// in v1, where sign(v1) would make the residual jump. With alpha = 0 it is plain backward Euler.
-///
-/// **Not resolved**, omega dt >> 1: of the oscillation R' = m a', v' the step knows nothing, backward Euler having
-/// taken it away; but its mean effect on the slow motion v stays. For a sine, and for Gaussian noise, whose v' and a'
-/// are not correlated at one time,
-///
-///     < alpha |R'| sign(v + v') > = alpha (2/pi) omega m v + O(v^3),   omega = rms(a') / rms(v'),
-///
-/// while |v| is not above rms(v'): a viscous drag, which is what makes a damped explicit slide creep.
-///
-/// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation, one of second order
-/// (1 + 2 z) / (1 + z)^2 with z = (g omega dt)^2 (see implicit_step.h). That share of D is taken as resolved, and the
-/// rest as not.
+/// Inertia of an implicit step, with what local damping adds to it: a term of its residual, and of its tangent.
 
-#include "model/model.h"
-
-#include <algorithm>
-#include <numbers>
-#include <vector>
+#include "implicit/damped_inertia.h"
+#include "implicit/entries.h"
 
 namespace mpm
 {
-/// g: length of each stage of a step of second order, over that of the step.
-inline constexpr double stage_fraction = 1 - 0.5 * std::numbers::sqrt2;
+/// The force of one component of a node for its velocities at start and end of the stage, and its derivative by the
+/// iterate.
+template <class G>
+Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, double start, double end);
 
-/// Inertia force of one component, with what local damping adds to it, and its derivative by v1.
-struct Inertia
-{
-  double force;      ///< [N]
-  double derivative; ///< [N s/m]
-};
+/// M (v1 - v0) / dt + D of the iterate `field.velocity`; nothing in a quasi-static step.
+/// @param owned  per node: 1 on exactly one of the ranks that share it
+template <class G, int D = G::dim>
+void add_inertia_forces(const VelocityField<G>& field, const ImplicitStep<G>& step,
+                        std::span<const unsigned char> owned, std::vector<NodalForces<D>>& forces);
 
-/// @param frequency  omega of the node [rad/s]
-/// @param resolved   energy of an oscillation that the step leaves, over that at its start
-inline Inertia damped_inertia(double mass, double v0, double v1, double dt, double alpha, double frequency,
-                              double resolved)
-{
-  const double drag = alpha * (1 - resolved) * 2 * std::numbers::inv_pi * frequency * mass;
-  alpha *= resolved;
-  const double w = std::clamp(v1, std::min(0.0, v0), std::max(0.0, v0));
-  const double slowed = mass / dt / (1 + alpha), sped = mass / dt / (1 - alpha);
-  return {slowed * (w - v0) + sped * (v1 - w) + drag * v1, (v1 == w && v1 != v0 ? slowed : sped) + drag};
-}
-
-/// Energy of an oscillation that a step of backward Euler leaves, over that at its start; x = omega dt.
-inline double left_by_backward_euler(double x) { return 1 / (1 + x * x); }
-
-/// The same of a step of second order.
-inline double left_by_second_order(double x)
-{
-  const double z = stage_fraction * stage_fraction * x * x;
-  return (1 + 2 * z) / ((1 + z) * (1 + z));
-}
+/// Its derivative by u, of the nodes whose rows this rank has; zeros in a quasi-static step, so that the matrix has the
+/// same entries.
+template <class G, int D = G::dim>
+void add_inertia_entries(const VelocityField<G>& field, const ImplicitStep<G>& step, std::span<const Index> owned,
+                         BlockWriter<D>& tangent);
 
 /// omega of each node [rad/s]: that of its oscillation in shear against its neighbours, sqrt(sum_p V_p G |grad N|^2 /
-/// m). The yielding soil slides by shear, and of the oscillations at the mesh's scale those in shear are slowest.
-/// @pre the nodes' masses are known
-/// @note Collective
-template <class G, int D = G::dim>
-std::vector<double> shear_frequencies(Model<G>& model);
+/// m) (T5). The yielding soil slides by shear, and of the oscillations at the mesh's scale those in shear are slowest.
+/// @param stiffness  sum_p V_p G |grad N|^2 of each node, over all ranks [N/m]
+template <int D>
+std::vector<double> shear_frequencies(std::span<const double> stiffness, std::span<const NodeSums<D>> nodes);
 } // namespace mpm

@@ -1,5 +1,7 @@
 #include "implicit/relaxation.h"
 
+#include "implicit/inertia.h"
+#include "implicit/supported.h"
 #include "materials/tools/elasticity.h"
 
 #include <algorithm>
@@ -40,33 +42,32 @@ double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& modu
 
 /// Bound on the rows of |J| = |dr/dv| at each node [N s/m].
 template <class G, int D = G::dim>
-std::vector<double> tangent_rows(Model<G>& model, const ImplicitStep<G>& step)
+std::vector<double> tangent_rows(const Mesh<D>& mesh, const MaterialPoints<D>& points, NodeExchange& exchange,
+                                 const VelocityField<G>& field, const ImplicitStep<G>& step)
 {
-  std::vector<double> rows(model.mesh.points.size(), 0.0),
-      cell(static_cast<std::size_t>(model.mesh.owned_cells) * (D + 1), 0.0);
-  for (const Run& run : model.order.runs)
+  std::vector<double> rows(mesh.points.size(), 0.0), cell(static_cast<std::size_t>(mesh.owned_cells) * (D + 1), 0.0);
+  for (const Run& run : points.runs)
   {
     double stress = 0, filled = 0;
     for (Index p = run.first; p < run.last; ++p)
     {
-      filled += model.particles.volume[p];
-      for (const Column& column : model.particles.stress)
+      filled += points.particles.volume[p];
+      for (const Column& column : points.particles.stress)
         stress = std::max(stress, std::abs(column[p]));
     }
-    const double shear = shear_modulus(model.laws[run.material]);
-    const ElasticModuli moduli{p_wave_modulus(model.laws[run.material]) - 2 * shear, shear};
-    const CellShape<D>& shape = model.mesh.shapes[run.cell];
-    const double overfull = std::max(1.0, model.fields.front().moments[run.cell].volume / cell_volume<G>(shape));
+    const double shear = shear_modulus(points.laws[run.material]);
+    const ElasticModuli moduli{p_wave_modulus(points.laws[run.material]) - 2 * shear, shear};
+    const CellShape<D>& shape = mesh.shapes[run.cell];
+    const double overfull = std::max(1.0, field.moments[run.cell].volume / cell_volume<G>(shape));
     for (int k = 0; k <= D; ++k)
     {
       double& row = cell[static_cast<std::size_t>(run.cell) * (D + 1) + static_cast<std::size_t>(k)];
       row = std::max(row, overfull * stiffness_row<G>(shape, k, moduli, stress));
     }
   }
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
+  for (Index c = 0; c < mesh.owned_cells; ++c)
     for (int k = 0; k <= D; ++k)
-      rows[model.mesh.cells[c][k]] +=
-          step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
+      rows[mesh.cells[c][k]] += step.dt * cell[static_cast<std::size_t>(c) * (D + 1) + static_cast<std::size_t>(k)];
   const double inertia = step.options.quasi_static ? 0 : 1 / (step.stage.weight * step.stage.dt);
   for (const GhostFacet<D>& facet : step.ghosts)
   {
@@ -77,11 +78,11 @@ std::vector<double> tangent_rows(Model<G>& model, const ImplicitStep<G>& step)
       rows[facet.nodes[k]] +=
           facet.share[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
   }
-  sum_shared(model.exchange, rows.data(), 1);
+  sum_shared(exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] += step.options.quasi_static
                    ? 0
-                   : stage_inertia(model, step, static_cast<Index>(i), 0, 0).derivative; // at its largest
+                   : stage_inertia(step, field.nodes[i].mass, static_cast<Index>(i), 0, 0).derivative; // at its largest
   return rows;
 }
 
@@ -103,23 +104,23 @@ constexpr double mass_share(RelaxationKind kind)
 }
 
 /// Sum over all nodes, each counted once.
-template <class G, class F>
-double nodal_sum(const Model<G>& model, F&& term)
+template <class F>
+double nodal_sum(const NodeExchange& exchange, F&& term)
 {
   double sum = 0;
-  for (std::size_t i = 0; i < model.mesh.points.size(); ++i)
-    if (model.exchange.owned[i])
+  for (std::size_t i = 0; i < exchange.owned.size(); ++i)
+    if (exchange.owned[i])
       sum += term(i);
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, exchange.comm);
   return sum;
 }
 
 /// c of Underwood (1983), critical for the mode that the iteration moves in: 2 sqrt(w J w / w M w), J w from the last
 /// change of r.
 template <class G, int D = G::dim>
-double critical_damping(const Model<G>& model, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
+double critical_damping(const NodeExchange& exchange, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
 {
-  const double stiffness = nodal_sum(model,
+  const double stiffness = nodal_sum(exchange,
                                      [&](std::size_t i)
                                      {
                                        double sum = 0;
@@ -127,7 +128,7 @@ double critical_damping(const Model<G>& model, const ImplicitStep<G>& step, cons
                                          sum += relaxation.rate[i][a] * (relaxation.last[i][a] - step.residual[i][a]);
                                        return sum;
                                      });
-  const double mass = nodal_sum(model, [&](std::size_t i)
+  const double mass = nodal_sum(exchange, [&](std::size_t i)
                                 { return relaxation.mass[i] * dot<D>(relaxation.rate[i], relaxation.rate[i]); });
   return mass > 0 ? std::min(1.9, 2 * std::sqrt(std::max(0.0, stiffness / mass))) : 0;
 }
@@ -135,14 +136,14 @@ double critical_damping(const Model<G>& model, const ImplicitStep<G>& step, cons
 /// Damping of the kind in the next iteration. Kinetic: 1 where the body has passed a peak of its kinetic energy, as the
 /// power of the residual says, else 0.
 template <class G, int D = G::dim>
-double next_damping(const Model<G>& model, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
+double next_damping(const NodeExchange& exchange, const ImplicitStep<G>& step, const Relaxation<D>& relaxation)
 {
   switch (relaxation.kind)
   {
   case RelaxationKind::viscous:
-    return critical_damping(model, step, relaxation);
+    return critical_damping(exchange, step, relaxation);
   case RelaxationKind::kinetic:
-    return nodal_sum(model, [&](std::size_t i) { return dot<D>(relaxation.rate[i], step.residual[i]); }) < 0 ? 1 : 0;
+    return nodal_sum(exchange, [&](std::size_t i) { return dot<D>(relaxation.rate[i], step.residual[i]); }) < 0 ? 1 : 0;
   default:
     return local_damping_share;
   }
@@ -179,7 +180,8 @@ Vector<D> next_rate(RelaxationKind kind, const Vector<D>& rate, const Vector<D>&
 template <class G, int D>
 Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, RelaxationKind kind)
 {
-  Relaxation<D> relaxation{kind, tangent_rows(model, step), {}, {}, {}};
+  Relaxation<D> relaxation{
+      kind, tangent_rows(model.mesh, material_points(model), model.exchange, model.fields.front(), step), {}, {}, {}};
   for (double& mass : relaxation.mass)
     mass *= margin * mass_share(kind);
   relaxation.rate.assign(model.mesh.points.size(), {});
@@ -195,7 +197,7 @@ int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, dou
   while (done < most && relaxation.report.residual > tolerance * relaxation.report.scale &&
          relaxation.report.failed == 0)
   {
-    const double damping = next_damping(model, step, relaxation);
+    const double damping = next_damping(model.exchange, step, relaxation);
     for (std::size_t i = 0; i < relaxation.rate.size(); ++i)
     {
       if (!step.active[i])
@@ -205,7 +207,7 @@ int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, dou
       for (int a = 0; a < D; ++a)
         model.fields.front().velocity[i][a] += relaxation.rate[i][a];
     }
-    impose_supports(model, step);
+    impose_supports(step, model.fields.front());
     relaxation.last = step.residual;
     relaxation.report = find_residual(model, step, false);
     ++done;

@@ -8,53 +8,59 @@ namespace mpm
 {
 namespace
 {
-template <class G, int D = G::dim>
-std::vector<Index> filled_cells(const Model<G>& model)
+/// P = 1 - sum d d^T of supported directions.
+template <int D>
+Matrix<D> projector_of(const Support<D>& support)
 {
-  std::vector<Index> cells;
-  for (Index c = 0; c < model.mesh.owned_cells; ++c)
-    if (model.fields.front().moments[c].volume > 0)
-      cells.push_back(c);
-  return cells;
+  Matrix<D> p{};
+  for (int i = 0; i < D; ++i)
+    p[i][i] = 1;
+  for (int k = 0; k < support.count; ++k)
+    for (int i = 0; i < D; ++i)
+      for (int j = 0; j < D; ++j)
+        p[i][j] -= support.direction[k][i] * support.direction[k][j];
+  return p;
+}
+
+template <int D>
+void set_supports(std::span<const Support<D>> supports, std::size_t nodes, ImplicitSystem<D>& system)
+{
+  system.support.assign(nodes, none);
+  system.projectors.clear();
+  for (std::size_t s = 0; s < supports.size(); ++s)
+  {
+    system.support[supports[s].node] = static_cast<Index>(s);
+    system.projectors.push_back(projector_of(supports[s]));
+  }
 }
 } // namespace
 
 template <class G, int D>
-bool number_nodes(Model<G>& model, const ImplicitStep<G>& step, ImplicitSystem<D>& system)
+bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                  ImplicitSystem<D>& system)
 {
-  NodeExchange& exchange = model.exchange;
-  const Index n = model.mesh.n_nodes();
-  std::vector<Index> owned, cells = filled_cells(model);
-  for (Index i = 0; i < n; ++i)
+  std::vector<Index> owned;
+  for (std::size_t i = 0; i < step.active.size(); ++i)
     if (exchange.owned[i] && step.active[i])
-      owned.push_back(i);
+      owned.push_back(static_cast<Index>(i));
   std::vector<std::array<Index, 2>> ghosts;
   for (const GhostFacet<D>& facet : step.ghosts)
     ghosts.push_back({facet.nodes[D], facet.nodes[D + 1]});
-  int changed = owned != system.owned || cells != system.cells || ghosts != system.ghosts;
+  int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
   const RowSlice rows = row_slice(exchange.comm, owned.size());
   system.total = rows.total;
-  std::vector<std::array<double, 2>> sums(static_cast<std::size_t>(n)); // number, stiffness; whole numbers are exact
+  std::vector<std::array<double, 2>> sums(step.active.size()); // number, stiffness; whole numbers are exact
   for (std::size_t k = 0; k < owned.size(); ++k)
     sums[owned[k]][0] = static_cast<double>(rows.before + static_cast<GlobalIndex>(k));
-  for (const Run& run : model.order.runs)
-  {
-    double volume = 0;
-    for (Index p = run.first; p < run.last; ++p)
-      volume += model.particles.volume[p];
-    for (int k = 0; k <= D; ++k)
-    {
-      const Vector<D>& g = model.mesh.shapes[run.cell].gradient[k];
-      sums[model.mesh.cells[run.cell][k]][1] += volume * p_wave_modulus(model.laws[run.material]) * dot<D>(g, g);
-    }
-  }
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    sums[i][1] = step.elastic[i];
   sum_shared(exchange, sums);
   update(step.halos.nodes, sums);
 
   system.owned = std::move(owned);
-  system.cells = std::move(cells);
+  system.cells = step.cells;
   system.ghosts = std::move(ghosts);
   system.number.resize(sums.size());
   system.diagonal.resize(sums.size());
@@ -63,9 +69,7 @@ bool number_nodes(Model<G>& model, const ImplicitStep<G>& step, ImplicitSystem<D
     system.number[i] = sums[i][1] > 0 ? static_cast<GlobalIndex>(sums[i][0]) : none;
     system.diagonal[i] = sums[i][1];
   }
-  system.support.assign(sums.size(), none);
-  for (std::size_t s = 0; s < model.fields.front().supports.size(); ++s)
-    system.support[model.fields.front().supports[s].node] = static_cast<Index>(s);
+  set_supports<D>(field.supports, sums.size(), system);
   return changed;
 }
 
@@ -89,12 +93,15 @@ void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::spa
   sum_shared(exchange, nodal);
 }
 
-template bool number_nodes(Model<PlaneStrain>&, const ImplicitStep<PlaneStrain>&, ImplicitSystem<2>&);
-template bool number_nodes(Model<Axisymmetric>&, const ImplicitStep<Axisymmetric>&, ImplicitSystem<2>&);
-template bool number_nodes(Model<Solid>&, const ImplicitStep<Solid>&, ImplicitSystem<3>&);
 #define INSTANTIATE(D)                                                                                                 \
   template std::vector<double> owned_values<D>(const ImplicitSystem<D>&, std::span<const Vector<D>>);                  \
   template void set_nodal<D>(NodeExchange&, const ImplicitSystem<D>&, std::span<const double>, std::span<Vector<D>>);
 INSTANTIATE(2)
 INSTANTIATE(3)
+#undef INSTANTIATE
+#define INSTANTIATE(G)                                                                                                 \
+  template bool number_nodes(NodeExchange&, const VelocityField<G>&, const ImplicitStep<G>&, ImplicitSystem<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

@@ -1,6 +1,6 @@
 #include "implicit/trial.h"
 
-#include "implicit/tangent.h"
+#include "implicit/cell_tangent.h"
 #include "model/batches.h"
 #include "model/integration.h"
 #include "model/law_increment.h"
@@ -53,21 +53,20 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
 }
 
 template <class G, int D = G::dim>
-TrialStrain<D> cell_strain(const Model<G>& model, const ImplicitStep<G>& step, Index cell)
+TrialStrain<D> cell_strain(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step, Index cell)
 {
-  const auto velocity = [&](Index i) -> const Vector<D>& { return model.fields.front().velocity[i]; };
-  const AffineField<D> in_cell = affine_field<D>(model.mesh, cell, velocity);
+  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
+  const AffineField<D> in_cell = affine_field<D>(mesh, cell, velocity);
   const Matrix<D>& gradient = in_cell.gradient;
   CellStrain<D> strain = strain_increment<D>(gradient, step.dt);
   double hoop = 0;
   if constexpr (G::has_hoop)
   {
-    hoop = step.dt * in_cell.value[0] / model.mesh.shapes[cell].centre[0];
+    hoop = step.dt * in_cell.value[0] / mesh.shapes[cell].centre[0];
     add_hoop(strain, hoop);
   }
   if (step.options.mixed_discretisation)
-    set_volumetric<G>(strain,
-                      mean_volumetric_strain<D>(model.mesh.cells[cell], model.fields.front().volumetric_strain));
+    set_volumetric<G>(strain, mean_volumetric_strain<D>(mesh.cells[cell], field.volumetric_strain));
   if (step.options.hold_positions)
   {
     make_small<D>(strain);
@@ -82,14 +81,14 @@ TrialStrain<D> cell_strain(const Model<G>& model, const ImplicitStep<G>& step, I
 }
 
 /// Copies a batch's stresses and states to the scratch.
-template <class G, int D = G::dim>
-void load_batch(const Model<G>& model, const Batch& batch, TrialScratch<D>& scratch)
+template <int D>
+void load_batch(const Particles<D>& particles, const Batch& batch, TrialScratch<D>& scratch)
 {
   const Index size = batch.last - batch.first;
   for (int k = 0; k < n_stress<D>; ++k)
-    std::copy_n(model.particles.stress[k].data() + batch.first, size, scratch.stress[k]);
-  for (std::size_t k = 0; k < model.particles.state.size(); ++k)
-    std::copy_n(model.particles.state[k].data() + batch.first, size, scratch.state[k]);
+    std::copy_n(particles.stress[k].data() + batch.first, size, scratch.stress[k]);
+  for (std::size_t k = 0; k < particles.state.size(); ++k)
+    std::copy_n(particles.state[k].data() + batch.first, size, scratch.state[k]);
 }
 
 /// Strains one run and turns its stresses, at `at` in the scratch.
@@ -105,16 +104,16 @@ void strain_run(Index size, const CellStrain<D>& strain, Index at, TrialScratch<
 }
 
 /// Counts a failure, and keeps the failure of the first.
-template <class G, int D = G::dim>
-void note_failure(const Model<G>& model, typename Failure<D>::Kind kind, Index particle, const SymTensor<D>& increment,
-                  TrialCount<D>& count)
+template <int D>
+void note_failure(const Particles<D>& particles, typename Failure<D>::Kind kind, Index particle,
+                  const SymTensor<D>& increment, TrialCount<D>& count)
 {
   if (count.failed++ == 0)
-    count.failure = failure_of<D>(model.particles, kind, particle, increment);
+    count.failure = failure_of<D>(particles, kind, particle, increment);
 }
 
-template <class G, int D = G::dim>
-void note_failed_laws(const Model<G>& model, const Batch& batch, const std::vector<Index>& failed,
+template <int D>
+void note_failed_laws(const Particles<D>& particles, const Batch& batch, const std::vector<Index>& failed,
                       const TrialScratch<D>& scratch, TrialCount<D>& count)
 {
   for (Index i : failed)
@@ -122,13 +121,13 @@ void note_failed_laws(const Model<G>& model, const Batch& batch, const std::vect
     SymTensor<D> increment;
     for (int k = 0; k < n_stress<D>; ++k)
       increment[k] = scratch.strain[k][i];
-    note_failure<G>(model, Failure<D>::Kind::law_failed, batch.first + i, increment, count);
+    note_failure<D>(particles, Failure<D>::Kind::law_failed, batch.first + i, increment, count);
   }
 }
 
 template <class G, int D = G::dim>
-BatchReport update_scratch(const Model<G>& model, const ImplicitStep<G>& step, const Batch& batch, bool tangents,
-                           TrialScratch<D>& scratch)
+BatchReport update_scratch(const Mesh<D>& mesh, const MaterialPoints<D>& material, const ImplicitStep<G>& step,
+                           const Batch& batch, TrialScratch<D>& scratch)
 {
   PointBatch<D> points;
   points.size = batch.last - batch.first;
@@ -141,32 +140,32 @@ BatchReport update_scratch(const Model<G>& model, const ImplicitStep<G>& step, c
   for (int k = 0; k < max_states; ++k)
     state[k] = scratch.state[k];
   points.state = state.data();
-  points.tangent = tangents ? scratch.tangent.data() : nullptr;
-  points.time = model.time;
+  points.tangent = scratch.tangent.empty() ? nullptr : scratch.tangent.data();
+  points.time = step.time;
   points.dt = law_dt(step);
-  give_cell_sizes(model, batch, scratch.increment, points);
+  give_cell_sizes(mesh, material, batch, scratch.increment, points);
   if (!step.options.hold_positions)
     give_deformation(
-        model, batch, [&](std::size_t r) { return scratch.trials[r].gradient; },
+        material, batch, [&](std::size_t r) { return scratch.trials[r].gradient; },
         [&](std::size_t r) { return scratch.trials[r].strain.volumetric; }, scratch.increment, points);
-  return update<D>(model.laws[batch.material], points);
+  return update<D>(material.laws[batch.material], points);
 }
 
-/// Adds the particles of one run, at `at` in the scratch, to the sums of its cell.
+/// Adds the V sigma of one run, at `at` in the scratch.
 template <class G, int D = G::dim>
-void sum_run(const Model<G>& model, ImplicitStep<G>& step, const Run& run, Index at, const TrialScratch<D>& scratch)
+void sum_stress(const Column& volumes, const Run& run, Index at, const TrialScratch<D>& scratch, Working<G>& stress)
 {
-  const double* const volume = model.particles.volume.data() + run.first;
-  auto sum = step.stress[run.cell];
+  const double* const volume = volumes.data() + run.first;
+  auto sum = stress;
   for (Index p = 0; p < run.last - run.first; ++p)
     for (int k = 0; k < G::n_working; ++k) // sums side by side, none waits for the other
       sum[k] += volume[p] * scratch.stress[working_component<G>[k]][at + p];
-  step.stress[run.cell] = sum;
+  stress = sum;
 }
 
 /// Adds V C of one run, of the components that do work.
 template <class G, int D = G::dim>
-void sum_stiffness(const Model<G>& model, const Run& run, Index at, const TrialScratch<D>& scratch,
+void sum_stiffness(const Column& volumes, const Run& run, Index at, const TrialScratch<D>& scratch,
                    std::array<Working<G>, G::n_working>& stiffness)
 {
   constexpr int S = n_stress<D>;
@@ -174,7 +173,7 @@ void sum_stiffness(const Model<G>& model, const Run& run, Index at, const TrialS
   for (Index p = 0; p < run.last - run.first; ++p)
   {
     const double* const c = &scratch.tangent[static_cast<std::size_t>((at + p) * S * S)];
-    const double volume = model.particles.volume[run.first + p];
+    const double volume = volumes[run.first + p];
     for (int k = 0; k < G::n_working; ++k)
       for (int j = 0; j < G::n_working; ++j)
         sum[k][j] += volume * c[working_component<G>[k] * S + working_component<G>[j]];
@@ -184,13 +183,11 @@ void sum_stiffness(const Model<G>& model, const Run& run, Index at, const TrialS
 
 /// Full cells integrate the mean of their particles over their own volume.
 template <class G, int D = G::dim>
-void integrate_cells(const Model<G>& model, ImplicitStep<G>& step)
+void integrate_cells(const Mesh<D>& mesh, const VelocityField<G>& field, ImplicitStep<G>& step)
 {
-  for (std::size_t c = 0; c < step.stress.size(); ++c)
+  for (Index c : step.cells)
   {
-    const double filled = model.fields.front().moments[c].volume;
-    const double factor =
-        filled > 0 ? integrated_volume(model.mesh, model.fields.front(), static_cast<Index>(c)) / filled : 0;
+    const double factor = integrated_volume(mesh, field, c) / field.moments[c].volume;
     for (double& component : step.stress[c])
       component *= factor;
     if (!step.stiffness.empty())
@@ -199,52 +196,66 @@ void integrate_cells(const Model<G>& model, ImplicitStep<G>& step)
           component *= factor;
   }
 }
+
+/// Strains, stresses and sums of one batch; the strains of its cells stay in the step.
+template <class G, int D = G::dim>
+void try_batch(const Mesh<D>& mesh, const MaterialPoints<D>& material, const VelocityField<G>& field,
+               const Batch& batch, TrialScratch<D>& scratch, ImplicitStep<G>& step, TrialCount<D>& count)
+{
+  const auto& [particles, runs, laws] = material;
+  load_batch(particles, batch, scratch);
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const TrialStrain<D>& trial = scratch.trials[r - batch.first_run] = cell_strain(mesh, field, step, runs[r].cell);
+    step.strains[runs[r].cell] = trial.strain;
+    strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
+    if (!trial.keeps_volume)
+      note_failure<D>(particles, Failure<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
+  }
+  const BatchReport report = update_scratch(mesh, material, step, batch, scratch);
+  count.plastic += report.plastic;
+  note_failed_laws(particles, batch, report.failed, scratch, count);
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const Index at = runs[r].first - batch.first;
+    sum_stress<G>(particles.volume, runs[r], at, scratch, step.stress[runs[r].cell]);
+    if (!step.stiffness.empty())
+      sum_stiffness<G>(particles.volume, runs[r], at, scratch, step.stiffness[runs[r].cell]);
+  }
+}
 } // namespace
 
 template <class G, int D>
-TrialCount<D> try_stresses(const Model<G>& model, ImplicitStep<G>& step, bool tangents)
+TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& material, const VelocityField<G>& field,
+                           bool tangents, ImplicitStep<G>& step)
 {
-  const auto cells = static_cast<std::size_t>(model.mesh.owned_cells);
+  const auto cells = static_cast<std::size_t>(mesh.owned_cells);
   step.stress.assign(cells, {});
   step.stiffness.assign(tangents ? cells : 0, {});
   step.strains.resize(cells);
   TrialScratch<D> scratch;
   scratch.tangent.resize(tangents ? static_cast<std::size_t>(batch_size * n_stress<D> * n_stress<D>) : 0);
   TrialCount<D> count;
-  const auto& runs = model.order.runs;
-  for (std::size_t r = 0; r < runs.size();)
+  for (std::size_t r = 0; r < material.runs.size();)
   {
-    const Batch batch = next_batch(runs, r);
-    load_batch(model, batch, scratch);
-    for (r = batch.first_run; r < batch.last_run; ++r)
-    {
-      const TrialStrain<D>& trial = scratch.trials[r - batch.first_run] = cell_strain(model, step, runs[r].cell);
-      step.strains[runs[r].cell] = trial.strain;
-      strain_run<D>(runs[r].last - runs[r].first, trial.strain, runs[r].first - batch.first, scratch);
-      if (!trial.keeps_volume)
-        note_failure<G>(model, Failure<D>::Kind::lost_volume, runs[r].first, trial.strain.increment, count);
-    }
-    const BatchReport report = update_scratch(model, step, batch, tangents, scratch);
-    count.plastic += report.plastic;
-    note_failed_laws(model, batch, report.failed, scratch, count);
-    for (r = batch.first_run; r < batch.last_run; ++r)
-    {
-      sum_run(model, step, runs[r], runs[r].first - batch.first, scratch);
-      if (tangents)
-        sum_stiffness(model, runs[r], runs[r].first - batch.first, scratch, step.stiffness[runs[r].cell]);
-    }
+    const Batch batch = next_batch(material.runs, r);
+    try_batch(mesh, material, field, batch, scratch, step, count);
+    r = batch.last_run;
   }
   if (step.options.integration == Integration::mixed)
-    integrate_cells(model, step);
-  if (tangents)
-    step.tangents.resize(cells);
-  for (std::size_t c = 0; tangents && c < cells; ++c)
-    if (model.fields.front().moments[c].volume > 0)
-      step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
+    integrate_cells(mesh, field, step);
+  if (!tangents)
+    return count;
+  step.tangents.resize(cells);
+  for (Index c : step.cells)
+    step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
   return count;
 }
 
-template TrialCount<2> try_stresses(const Model<PlaneStrain>&, ImplicitStep<PlaneStrain>&, bool);
-template TrialCount<2> try_stresses(const Model<Axisymmetric>&, ImplicitStep<Axisymmetric>&, bool);
-template TrialCount<3> try_stresses(const Model<Solid>&, ImplicitStep<Solid>&, bool);
+#define INSTANTIATE(G)                                                                                                 \
+  template TrialCount<G::dim> try_stresses(const Mesh<G::dim>&, const MaterialPoints<G::dim>&,                         \
+                                           const VelocityField<G>&, bool, ImplicitStep<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm

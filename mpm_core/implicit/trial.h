@@ -2,7 +2,8 @@
 /// @file
 /// Stresses of a trial increment, from the step's start, without touching the particles.
 
-#include "implicit/implicit_step.h"
+#include "implicit/step.h"
+#include "model/material_points.h"
 
 namespace mpm
 {
@@ -19,5 +20,6 @@ struct TrialCount
 /// V sigma, and the tangents when wanted, over each owned cell.
 /// @pre with nodal mixed discretisation, `field.volumetric_strain` belongs to the iterate
 template <class G, int D = G::dim>
-TrialCount<D> try_stresses(const Model<G>& model, ImplicitStep<G>& step, bool tangents);
+TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& material, const VelocityField<G>& field,
+                           bool tangents, ImplicitStep<G>& step);
 } // namespace mpm

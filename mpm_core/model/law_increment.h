@@ -3,6 +3,7 @@
 /// What a batch of particles tells a law of its increment beyond stress and strain, where the law needs it.
 
 #include "model/batches.h"
+#include "model/material_points.h"
 
 namespace mpm
 {
@@ -15,15 +16,16 @@ struct LawIncrement
 };
 
 /// Gives a batch the sizes of its particles' cells, if its law needs them.
-template <class G, int D = G::dim>
-void give_cell_sizes(const Model<G>& model, const Batch& batch, LawIncrement<D>& columns, PointBatch<D>& points)
+template <int D>
+void give_cell_sizes(const Mesh<D>& mesh, const MaterialPoints<D>& material, const Batch& batch,
+                     LawIncrement<D>& columns, PointBatch<D>& points)
 {
-  if (!needs(model.laws[batch.material]).cell_size)
+  if (!needs(material.laws[batch.material]).cell_size)
     return;
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.order.runs[r];
-    const double size = cell_size<D>(model.mesh.shapes[run.cell].volume);
+    const Run& run = material.runs[r];
+    const double size = cell_size<D>(mesh.shapes[run.cell].volume);
     std::fill_n(columns.cell_size.data() + (run.first - batch.first), run.last - run.first, size);
   }
   points.cell_size = columns.cell_size.data();
@@ -33,15 +35,15 @@ void give_cell_sizes(const Model<G>& model, const Batch& batch, LawIncrement<D>&
 /// @pre not in axial symmetry, which `set_laws` refuses such laws in: there is no place for the hoop
 /// @param gradient  function of the number of a run in the batch that returns its displacement gradient
 /// @param volumetric  the same of its volumetric strain, which takes the place of the gradient's trace
-template <class G, class Gradient, class Volumetric, int D = G::dim>
-void give_deformation(const Model<G>& model, const Batch& batch, const Gradient& gradient, const Volumetric& volumetric,
-                      LawIncrement<D>& columns, PointBatch<D>& points)
+template <int D, class Gradient, class Volumetric>
+void give_deformation(const MaterialPoints<D>& material, const Batch& batch, const Gradient& gradient,
+                      const Volumetric& volumetric, LawIncrement<D>& columns, PointBatch<D>& points)
 {
-  if (!needs(model.laws[batch.material]).deformation)
+  if (!needs(material.laws[batch.material]).deformation)
     return;
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
-    const Run& run = model.order.runs[r];
+    const Run& run = material.runs[r];
     Matrix<D> f = gradient(r - batch.first_run);
     double change = volumetric(r - batch.first_run);
     for (int a = 0; a < D; ++a)

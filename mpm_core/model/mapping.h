@@ -54,7 +54,8 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const Velocit
 /// speeds it up, with (1 - alpha) |R|. Taking the velocity's sign at the step's start for the whole step would throw a
 /// slow node back past its start: its velocity would change sign step by step, and differences of round-off would grow.
 /// With the mean, the new velocity rises with the old one at a slope between (1 - alpha) / (1 + alpha) and 1, so that
-/// differences never grow by the damping. The implicit scheme has the same law, solved for R (implicit/inertia.h).
+/// differences never grow by the damping. The implicit scheme has the same law, solved for R
+/// (implicit/damped_inertia.h).
 /// @param momentum  m v at the step's start [N s]
 /// @param dt        [s]
 inline double local_damping(double alpha, double residual, double momentum, double dt)

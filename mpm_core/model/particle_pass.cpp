@@ -104,10 +104,10 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
   points.time = model.time;
   points.dt = options.law_dt;
   LawIncrement<D> columns;
-  give_cell_sizes(model, batch, columns, points);
+  give_cell_sizes(model.mesh, material_points(model), batch, columns, points);
   if (!options.small && !dual)
     give_deformation(
-        model, batch, [&](std::size_t r) { return scratch.motion[r].displacement.gradient; },
+        material_points(model), batch, [&](std::size_t r) { return scratch.motion[r].displacement.gradient; },
         [&](std::size_t r) { return scratch.cells[r / lanes].volumetric[r % lanes]; }, columns, points);
   const BatchReport report = update<D>(model.laws[batch.material], points);
   model.last.plastic += report.plastic;

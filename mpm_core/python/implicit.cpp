@@ -1,6 +1,7 @@
 #include "explicit/run.h"
 #include "implicit/relaxation.h"
-#include "implicit/system.h"
+#include "implicit/stages.h"
+#include "implicit/supported.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 
@@ -15,7 +16,7 @@ struct Implicit
   Model<G>& model;
   ImplicitStep<G> step;
   ImplicitSystem<D> system;
-  CooEntries stiffness, volumetric_force, volumetric_strain, mean_stress, mean_stress_by_strain;
+  TangentEntries tangent;
   Relaxation<D> relaxation;
 };
 
@@ -45,15 +46,19 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
   using I = Implicit<G>;
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init([](Model<G>& model) { return I{model, {}, {}, {}, {}, {}, {}, {}, {}}; }), py::keep_alive<1, 2>())
+      .def(py::init(
+               [](Model<G>& model) {
+                 return I{model, {}, {}, {}, {}};
+               }),
+           py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
           {
             start_step(i.model, i.step, options, dt);
-            const bool changed = number_nodes(i.model, i.step, i.system);
+            const bool changed = number_nodes(i.model.exchange, i.model.fields.front(), i.step, i.system);
             if (changed)
-              i.stiffness = i.volumetric_force = i.volumetric_strain = i.mean_stress = i.mean_stress_by_strain = {};
+              i.tangent = {};
             return changed;
           },
           Release())
@@ -68,22 +73,13 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           },
           py::arg("tangents") = false)
       .def(
-          "assemble",
-          [](I& i)
-          {
-            stiffness_entries(i.model, i.step, i.system, i.stiffness);
-            if (!i.step.options.mixed_discretisation)
-              return;
-            volumetric_force_entries(i.model, i.step, i.system, i.volumetric_force);
-            volumetric_strain_entries(i.model, i.system, i.volumetric_strain);
-            if (i.step.options.average_stress)
-              mean_stress_entries(i.model, i.step, i.system, i.mean_stress, i.mean_stress_by_strain);
-          },
+          "assemble", [](I& i) { find_tangent(i.model.mesh, i.model.fields.front(), i.step, i.system, i.tangent); },
           Release())
       .def(
           "start_second_stage", [](I& i) { start_second_stage(i.model, i.step); }, Release())
       .def(
-          "displacement_error", [](const I& i) { return displacement_error(i.model, i.step); }, Release())
+          "displacement_error",
+          [](const I& i) { return displacement_error(i.model.exchange, i.model.fields.front(), i.step); }, Release())
       .def_property_readonly("dt", [](const I& i) { return i.step.dt; })
       .def("start_relaxation",
            [](I& i, RelaxationKind kind)
@@ -105,7 +101,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           "finish",
           [](I& i)
           {
-            const bool done = finish_step(i.model, i.step);
+            const bool done = accept_step(i.model, i.step);
             const std::string why = done ? "" : failure_text(i.model, *i.model.failure);
             i.model.failure.reset();
             return why;
@@ -121,18 +117,18 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           {
             check_array<double>("velocity", array, {static_cast<py::ssize_t>(i.system.owned.size() * D)});
             set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.fields.front().velocity);
-            impose_supports(i.model, i.step);
+            impose_supports(i.step, i.model.fields.front());
           })
-      .def("stiffness_places", [](const I& i) { return places(i.stiffness); })
-      .def("stiffness_values", [](const I& i) { return copied(i.stiffness.values); })
-      .def("volumetric_force_places", [](const I& i) { return places(i.volumetric_force); })
-      .def("volumetric_force_values", [](const I& i) { return copied(i.volumetric_force.values); })
-      .def("volumetric_strain_places", [](const I& i) { return places(i.volumetric_strain); })
-      .def("volumetric_strain_values", [](const I& i) { return copied(i.volumetric_strain.values); })
-      .def("mean_stress_places", [](const I& i) { return places(i.mean_stress); })
-      .def("mean_stress_values", [](const I& i) { return copied(i.mean_stress.values); })
-      .def("mean_stress_by_strain_places", [](const I& i) { return places(i.mean_stress_by_strain); })
-      .def("mean_stress_by_strain_values", [](const I& i) { return copied(i.mean_stress_by_strain.values); });
+      .def("stiffness_places", [](const I& i) { return places(i.tangent.stiffness); })
+      .def("stiffness_values", [](const I& i) { return copied(i.tangent.stiffness.values); })
+      .def("volumetric_force_places", [](const I& i) { return places(i.tangent.volumetric_force); })
+      .def("volumetric_force_values", [](const I& i) { return copied(i.tangent.volumetric_force.values); })
+      .def("volumetric_strain_places", [](const I& i) { return places(i.tangent.volumetric_strain); })
+      .def("volumetric_strain_values", [](const I& i) { return copied(i.tangent.volumetric_strain.values); })
+      .def("mean_stress_places", [](const I& i) { return places(i.tangent.mean_stress); })
+      .def("mean_stress_values", [](const I& i) { return copied(i.tangent.mean_stress.values); })
+      .def("mean_stress_by_strain_places", [](const I& i) { return places(i.tangent.mean_stress_by_strain); })
+      .def("mean_stress_by_strain_values", [](const I& i) { return copied(i.tangent.mean_stress_by_strain.values); });
 }
 } // namespace
 

@@ -29,8 +29,8 @@ PHASES = {
     "explicit step, 3D": "explicit_step<mpm::Solid>",
     "pass over the particles, 3D": "particle_pass<mpm::Solid>",
     "Mohr-Coulomb, 3D": "update<3>(mpm::MohrCoulomb const&",
-    "residual and tangents of an implicit step, 2D": "find_residual<mpm::PlaneStrain, 2>",
-    "entries of the stiffness matrix, 2D": "stiffness_entries<mpm::PlaneStrain, 2>",
+    "residual and tangents of an implicit step, 2D": "find_residual<mpm::PlaneStrain>",
+    "entries of the stiffness matrix, 2D": "find_tangent<mpm::PlaneStrain, 2>",
 }
 """What is counted: the functions, with all that they call"""
 

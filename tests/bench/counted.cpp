@@ -4,7 +4,7 @@
 #include "../cpp/boxes.h"
 
 #include "explicit/explicit_step.h"
-#include "implicit/system.h"
+#include "implicit/implicit_step.h"
 #include "particles/seed.h"
 
 using namespace mpm;
@@ -57,11 +57,11 @@ void assemble(Model<G> model)
 {
   ImplicitStep<G> step;
   ImplicitSystem<G::dim> system;
-  CooEntries entries;
+  TangentEntries tangent;
   start_step(model, step, ImplicitOptions{}, 20 * critical_time_step(model));
-  number_nodes(model, step, system);
+  number_nodes(model.exchange, model.fields.front(), step, system);
   find_residual(model, step, true);
-  stiffness_entries(model, step, system, entries);
+  find_tangent(model.mesh, model.fields.front(), step, system, tangent);
 }
 } // namespace
 

@@ -1,7 +1,7 @@
 /// @file
 /// Local damping over a step: the same law in the explicit and in the implicit scheme, and no sign left to round-off.
 
-#include "implicit/inertia.h"
+#include "implicit/damped_inertia.h"
 #include "model/mapping.h"
 
 #include <gtest/gtest.h>

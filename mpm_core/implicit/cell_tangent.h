@@ -2,7 +2,7 @@
 /// @file
 /// The tangent of one cell of an implicit step.
 
-#include "implicit/implicit_step.h"
+#include "implicit/step.h"
 #include "transfer/kinematics.h"
 
 namespace mpm

@@ -1,4 +1,4 @@
-#include "implicit/tangent.h"
+#include "implicit/cell_tangent.h"
 
 namespace mpm
 {

@@ -1,0 +1,90 @@
+#include "implicit/averaging.h"
+
+#include "model/integration.h"
+
+namespace mpm
+{
+template <class G, int D>
+void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
+                              CooEntries& entries)
+{
+  Writer writer(entries);
+  writer.expect(step.cells.size() * (D + 1) * (D + 1) * D);
+  for (Index c : step.cells)
+  {
+    for (int k = 0; k <= D; ++k)
+    {
+      Vector<D> force = product<D>(projector(system, mesh.cells[c][k]),
+                                   internal_force<G>(step.tangents[c].by_volumetric, mesh.shapes[c], k));
+      for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
+        for (int a = 0; a < D; ++a)
+          writer.add(D * system.number[mesh.cells[c][k]] + a, system.number[mesh.cells[c][l]], force[a] / (D + 1));
+    }
+  }
+}
+
+template <class G, int D>
+void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitSystem<D>& system,
+                               CooEntries& entries)
+{
+  Writer writer(entries);
+  writer.expect(system.cells.size() * (D + 1) * (D + 1) * D);
+  for (Index c : system.cells)
+    for (int k = 0; k <= D; ++k)
+    {
+      const Index node = mesh.cells[c][k];
+      const double weight = integrated_volume(mesh, field, c) / field.volumetric_strain[node].volume;
+      for (int l = 0; l <= D; ++l)
+      {
+        const Index other = mesh.cells[c][l];
+        Vector<D> volumetric = mesh.shapes[c].gradient[l];
+        if constexpr (G::has_hoop)
+          volumetric[0] += hoop_gradient<G>(mesh.shapes[c]);
+        const Vector<D> change = product<D>(projector(system, other), volumetric);
+        for (int b = 0; b < D; ++b)
+          writer.add(system.number[node], D * system.number[other] + b, weight * change[b]);
+      }
+    }
+}
+
+template <class G, int D>
+void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
+                         CooEntries& by_displacement, CooEntries& by_strain)
+{
+  Writer displacement(by_displacement), strain(by_strain);
+  displacement.expect(step.cells.size() * (D + 1) * (D + 1) * D);
+  strain.expect(step.cells.size() * (D + 1) * (D + 1));
+  for (Index c : step.cells)
+  {
+    const CellTangent<G>& tangent = step.tangents[c];
+    for (int l = 0; l <= D; ++l)
+    {
+      const Index other = mesh.cells[c][l];
+      Vector<D> change{};
+      const auto rows = gradient_rows<G>(mesh.shapes[c], l);
+      for (int b = 0; b < D; ++b)
+        for (int m = 0; m < n_gradient<G>; ++m)
+          change[b] += tangent.mean_by_gradient[m] * rows[b][m] / (D + 1);
+      change = product<D>(projector(system, other), change);
+      for (int k = 0; k <= D; ++k)
+      {
+        const GlobalIndex row = system.number[mesh.cells[c][k]];
+        for (int b = 0; b < D; ++b)
+          displacement.add(row, D * system.number[other] + b, change[b]);
+        strain.add(row, system.number[other], tangent.mean_by_volumetric / ((D + 1) * (D + 1)));
+      }
+    }
+  }
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void volumetric_force_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,   \
+                                         CooEntries&);                                                                 \
+  template void volumetric_strain_entries(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitSystem<G::dim>&, \
+                                          CooEntries&);                                                                \
+  template void mean_stress_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,        \
+                                    CooEntries&, CooEntries&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

@@ -1,0 +1,54 @@
+#include "implicit/balance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm
+{
+template <class G>
+void balance(const VelocityField<G>& field, ImplicitStep<G>& step)
+{
+  constexpr int D = G::dim;
+  step.residual.assign(step.forces.size(), {});
+  for (std::size_t i = 0; i < step.residual.size(); ++i)
+    for (int a = 0; a < D && step.active[i]; ++a)
+    {
+      const NodalForces<D>& f = step.forces[i];
+      step.residual[i][a] = f.external[a] - f.internal[a] - f.ghost[a] - f.inertia[a];
+    }
+  for (Support<D> held : field.supports)
+  {
+    held.value.fill(0);
+    impose<D>(held, step.residual[held.node]);
+  }
+}
+
+template <class G>
+TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& step, const TrialCount<G::dim>& count)
+{
+  constexpr int D = G::dim;
+  std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
+  for (std::size_t i = 0; i < step.residual.size(); ++i)
+  {
+    const NodalForces<D>& f = step.forces[i];
+    if (!exchange.owned[i] || !step.active[i])
+      continue;
+    sums[0] += dot<D>(step.residual[i], step.residual[i]);
+    sums[1] += dot<D>(f.external, f.external);
+    sums[2] += dot<D>(f.internal, f.internal);
+    sums[3] += dot<D>(f.inertia, f.inertia);
+  }
+  sums[4] = static_cast<double>(count.plastic);
+  sums[5] = static_cast<double>(count.failed);
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, exchange.comm);
+  return {std::sqrt(sums[0]), std::sqrt(std::max({sums[1], sums[2], sums[3]})), static_cast<std::int64_t>(sums[4]),
+          static_cast<std::int64_t>(sums[5])};
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void balance(const VelocityField<G>&, ImplicitStep<G>&);                                                    \
+  template TrialReport trial_report(const NodeExchange&, const ImplicitStep<G>&, const TrialCount<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

@@ -1,0 +1,20 @@
+#pragma once
+/// @file
+/// The external force of an implicit step, a term of its residual that does not depend on the iterate.
+
+#include "implicit/step.h"
+
+namespace mpm
+{
+/// f_ext (15) at the end of the stage, over all ranks; where the step applies a fraction of its load only, that
+/// fraction of what is out of balance at its start.
+/// @param gravity  at the end of the stage [m/s2]
+/// @param nodes    sums at the step's start
+template <int D>
+std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity, double load_share);
+
+/// @param owned  per node: 1 on exactly one of the ranks that share it
+template <class G, int D = G::dim>
+void add_external_forces(const ImplicitStep<G>& step, std::span<const unsigned char> owned,
+                         std::vector<NodalForces<D>>& forces);
+} // namespace mpm

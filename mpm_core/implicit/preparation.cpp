@@ -1,0 +1,55 @@
+#include "implicit/preparation.h"
+
+#include "implicit/inertia.h"
+#include "implicit/nodal_stiffness.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+template <class G>
+void find_active(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field, ImplicitStep<G>& step)
+{
+  std::vector<double> filled(mesh.points.size(), 0.0);
+  step.cells.clear();
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+    if (field.moments[c].volume > 0)
+    {
+      step.cells.push_back(c);
+      for (Index node : mesh.cells[c])
+        filled[node] = 1;
+    }
+  sum_shared(exchange, filled.data(), 1);
+  step.active.resize(filled.size());
+  std::ranges::transform(filled, step.active.begin(), [](double f) { return f > 0 ? 1 : 0; });
+}
+
+template <class G>
+void find_frequencies(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MaterialPoints<G::dim>& points,
+                      const VelocityField<G>& field, ImplicitStep<G>& step)
+{
+  step.elastic = nodal_stiffness(mesh, points, [](const Law& law) { return p_wave_modulus(law); });
+  step.frequency.assign(field.nodes.size(), 0.0);
+  if (step.options.damping == 0)
+    return;
+  auto stiffness = nodal_stiffness(mesh, points, [](const Law& law) { return shear_modulus(law); });
+  sum_shared(exchange, stiffness.data(), 1);
+  step.frequency = shear_frequencies<G::dim>(stiffness, field.nodes);
+}
+
+template <class G>
+void make_halos_once(const Mesh<G::dim>& mesh, const NodeExchange& exchange, ImplicitStep<G>& step)
+{
+  if (exchange.size > 1 && !step.halos_ready)
+    step.halos = make_halos(mesh, exchange.comm);
+  step.halos_ready = true;
+}
+#define INSTANTIATE(G)                                                                                                 \
+  template void find_active(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);            \
+  template void find_frequencies(const Mesh<G::dim>&, NodeExchange&, const MaterialPoints<G::dim>&,                    \
+                                 const VelocityField<G>&, ImplicitStep<G>&);                                           \
+  template void make_halos_once(const Mesh<G::dim>&, const NodeExchange&, ImplicitStep<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

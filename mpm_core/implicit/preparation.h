@@ -1,0 +1,26 @@
+#pragma once
+/// @file
+/// What an implicit step knows of its mesh and particles before the first trial.
+
+#include "implicit/step.h"
+
+namespace mpm
+{
+/// Cells with particles, and the nodes that they touch: those that the step moves. A node may have stiffness and yet
+/// hardly any mass.
+/// @note Collective
+template <class G>
+void find_active(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                 ImplicitStep<G>& step);
+
+/// Elastic stiffness of the nodes, and the frequencies that damping acts on (T5).
+/// @note Collective
+template <class G>
+void find_frequencies(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MaterialPoints<G::dim>& points,
+                      const VelocityField<G>& field, ImplicitStep<G>& step);
+
+/// Halos of the mesh, by the first step of a run on several ranks.
+/// @note Collective
+template <class G>
+void make_halos_once(const Mesh<G::dim>& mesh, const NodeExchange& exchange, ImplicitStep<G>& step);
+} // namespace mpm
