@@ -10,87 +10,24 @@ zero, and one of the two is zero. PETSc solves it together with the flow, so tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
-
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
 from fenics_bridge import compat
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
-from fenics_bridge.fem.supports import tagged_facets
-from fenics_bridge.mesh.names import by_number, label, tag_numbers
-from fenics_bridge.mesh.tagged import owned_cells, tag_values
-from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, mistake_in, value_at
+from fenics_bridge.water.applied import AppliedBoundary
+from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace
 from fenics_bridge.water.complementarity import BoundedProblem
-from fenics_bridge.water.retention import AlwaysSaturated
-
-WATER_WEIGHT = 9810.0
-"""Unit weight of water [N/m3]."""
-
-WATER_MODULUS = 2.2e9
-"""Bulk modulus of water [Pa]."""
+from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, soils_by_tag
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
 
 MOST_CONTINUATION_STEPS = 60
 """Steps of the continuation to a steady flow."""
-
-
-@dataclass(frozen=True)
-class PorousSoil:
-    """How soil holds water and lets it through.
-
-    conductivity: saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor
-    porosity: n [-], in (0, 1); for transient flow only
-    compressibility: of the skeleton, m_v [1/Pa], the inverse of the oedometric modulus; for transient flow only
-    retention: curve of `fenics_bridge.water.retention`; without one the soil stays saturated
-    Raises InputError for values outside these ranges.
-    """
-
-    conductivity: Any
-    porosity: float = 0.4
-    compressibility: float = 0.0
-    retention: Any = field(default_factory=AlwaysSaturated)
-
-    def __post_init__(self):
-        k = np.asarray(self.conductivity, dtype=float)
-        square = k.ndim == 2 and k.shape[0] == k.shape[1] and np.allclose(k, k.T)
-        if not (
-            np.all(np.isfinite(k)) and (k.ndim < 2 or square) and np.all(np.linalg.eigvalsh(self.tensor(k, 3)) > 0)
-        ):
-            raise InputError(f"conductivity: got {self.conductivity!r} m/s, expected positive numbers, or a "
-                             "symmetric tensor with positive principal values")  # fmt: skip
-        if not 0 < self.porosity < 1:
-            raise InputError(f"porosity: got {self.porosity!r}, expected more than 0 and less than 1")
-        if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
-            raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
-
-    @staticmethod
-    def tensor(conductivity, dim):
-        """Conductivity as a tensor (D, D) [m/s]."""
-        k = np.asarray(conductivity, dtype=float)
-        return k if k.ndim == 2 else np.diag(np.broadcast_to(k, k.shape or (dim,)))
-
-
-class _Held(NamedTuple):
-    """A boundary condition where it holds.
-
-    tags: numbers of its facets; dofs: of this rank; rate: prescribed inflow over k [-] as a constant, None where there is none
-    density, ds: of that inflow over the facets, UFL; total: compiled form of its integral
-    """
-
-    condition: Any
-    tags: tuple
-    dofs: np.ndarray
-    rate: Any = None
-    density: Any = None
-    ds: Any = None
-    total: Any = None
 
 
 class Seepage:
@@ -118,21 +55,24 @@ class Seepage:
                 problem = f"{name}: got {value!r}, expected a positive number"
         agree(comm, problem)
         self.domain, self.unit_weight, self.water_modulus, self.time = domain, unit_weight, water_modulus, 0.0
-        self._facet_tags, self._dim, self._degree = facet_tags, domain.geometry.dim, degree
+        self._dim, self._degree = domain.geometry.dim, degree
         space = compat.function_space(domain, "Lagrange", degree)
         self.pressure_head = fem.Function(space, name="pressure_head")
         self._old = fem.Function(space)
         self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         self._dt, self._sharpness = fem.Constant(domain, 1.0), fem.Constant(domain, 1.0)
-        self._soils, self._measures, self._cells = self._soils_by_tag(soil, cell_tags)
+        self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags)
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
-        self._height = space.tabulate_dof_coordinates()[:, self._dim - 1]
-        self._steady, self._transient, self._prefix = None, None, options_prefix
-        self._stored, self._held = None, []
+        self._applied = AppliedBoundary(space, facet_tags, self._largest)
+        self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
         self.boundary = list(boundary)
         self._take_boundary()
         self.iterations = 0
-        self._reaction = np.zeros(len(self._height))
+        self._reaction = np.zeros(len(self._applied.height))
+
+    def _take_boundary(self):
+        if self._applied.take(self.boundary):
+            self._steady = self._transient = None
 
     # --- solving -----------------------------------------------------------------------------------------------------
 
@@ -183,11 +123,9 @@ class Seepage:
         return not failure
 
     def _solve(self, problem):
-        for held in self._held:
-            if held.rate is not None:
-                held.rate.value = value_at(held.condition.rate, self.time) / self._largest
-        fixed, values, upper = self._bounds()
-        heads = np.concatenate([values[fixed] + self._height[fixed], self._height])
+        self._applied.set_time(self.time)
+        height, (fixed, values, upper) = self._applied.height, self._applied.bounds(self.time)
+        heads = np.concatenate([values[fixed] + height[fixed], height])
         low, high = heads.min(initial=np.inf), heads.max(initial=-np.inf)
         comm = self.domain.comm
         size = comm.allreduce(float(high), MPI.MAX) - comm.allreduce(float(low), MPI.MIN)
@@ -214,9 +152,7 @@ class Seepage:
                 form += (now - before) / (self._largest * self._dt) * test * self._lumped(dx)
                 slope = ufl.derivative(now, psi, trial)
                 lagged += slope / (self._largest * self._dt) * test * self._lumped(dx)
-        for held in self._held:
-            if held.rate is not None:
-                form -= held.density * test * held.ds
+        form -= self._applied.inflow_form(test)
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
 
     def _lumped(self, dx):
@@ -229,77 +165,6 @@ class Seepage:
         storage = soil.porosity / self.water_modulus + soil.compressibility
         return soil.retention.saturation(-pressure) * (soil.porosity + storage * pressure)
 
-    # --- boundary conditions and soils -------------------------------------------------------------------------------
-
-    def _take_boundary(self):
-        """Check the boundary conditions and find where they hold, unless they are those of the last time. Collective."""
-        held = [one.condition for one in self._held]
-        if held and len(held) == len(self.boundary) and all(a is b for a, b in zip(held, self.boundary)):
-            return
-        comm = self.domain.comm
-        for condition in self.boundary:
-            known = isinstance(condition, (Head, Reservoir, SeepageFace, Flux, Rain))
-            problem = mistake_in(condition) if known else "expected Head, Reservoir, SeepageFace, Flux or Rain"
-            agree(comm, f"boundary: {condition!r}: {problem}" if problem else None)
-        self._held = [self._where(condition) for condition in self.boundary]
-        self._steady = self._transient = None
-
-    def _where(self, condition):
-        """Where a boundary condition holds."""
-        space, dim, domain = self.pressure_head.function_space, self._dim, self.domain
-        tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
-        domain.topology.create_connectivity(dim - 1, dim)
-        facets = tagged_facets(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
-        dofs = fem.locate_dofs_topological(space, dim - 1, facets)
-        if not isinstance(condition, (Flux, Rain)):
-            return _Held(condition, tags, dofs)
-        rate = fem.Constant(domain, 0.0)
-        level = abs(ufl.FacetNormal(domain)[dim - 1]) if isinstance(condition, Rain) else 1.0
-        ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)(tags)
-        return _Held(condition, tags, dofs, rate, rate * level, ds, fem.form(rate * level * ds))
-
-    def _bounds(self):
-        """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at the present time."""
-        n = len(self._height)
-        fixed, values, upper = np.zeros(n, dtype=bool), np.zeros(n), np.full(n, np.inf)
-        for condition, dofs in ((held.condition, held.dofs) for held in self._held):
-            if isinstance(condition, (Head, Reservoir)):
-                level = value_at(condition.level, self.time)
-                below = dofs if isinstance(condition, Head) else dofs[self._height[dofs] <= level]
-                free = dofs[~fixed[dofs]] if isinstance(condition, Reservoir) else dofs[:0]
-                upper[free] = np.minimum(upper[free], 0.0)
-                below = below[~fixed[below]]
-                fixed[below], values[below] = True, level - self._height[below]
-            elif isinstance(condition, (SeepageFace, Rain)):
-                upper[dofs] = np.minimum(upper[dofs], getattr(condition, "ponding", 0.0))
-        return fixed, values, upper
-
-    def _soils_by_tag(self, soil, cell_tags):
-        """The soils, and the measure over the cells of each."""
-        comm, dim = self.domain.comm, self._dim
-        by_tag = soil if isinstance(soil, dict) else {None: soil}
-        for key, one in by_tag.items():
-            agree(
-                comm, None if isinstance(one, PorousSoil) else f"soil: got {one!r} for {key!r}, expected a PorousSoil"
-            )
-            shape = np.shape(one.conductivity)
-            agree(comm, None if not shape or shape[0] == dim else f"conductivity: has shape {shape}, expected ({dim},) or "
-                  f"({dim}, {dim}) in {dim}D")  # fmt: skip
-        if not isinstance(soil, dict):
-            every = np.arange(owned_cells(self.domain) + self.domain.topology.index_map(dim).num_ghosts, dtype=np.int32)
-            return [soil], [ufl.Measure("dx", domain=self.domain)], [every]
-        agree(
-            comm, "cell_tags: got None, expected the tags that the soils are given for" if cell_tags is None else None
-        )
-        by_tag = by_number(comm, cell_tags, by_tag, "soil", "cell")
-        values = tag_values(self.domain, cell_tags, dim)
-        known = set().union(*comm.allgather(set(values.tolist())))
-        without = sorted(known - set(by_tag))
-        agree(comm, f"soil: none for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None)
-        dx = ufl.Measure("dx", domain=self.domain, subdomain_data=cell_tags)
-        cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in by_tag]
-        return list(by_tag.values()), [dx(tag) for tag in by_tag], cells
-
     # --- results -----------------------------------------------------------------------------------------------------
 
     def inflow(self, facet_tag):
@@ -308,18 +173,7 @@ class Seepage:
         It follows from the equilibrium of the nodes, so that the inflows of all tags balance to the tolerance of the solution.
         A node where several conditions meet counts for the first of them. Collective; raises InputError for an unknown tag.
         """
-        numbers = tag_numbers(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
-        counted = np.zeros(len(self._height), dtype=bool)
-        n, total = self.pressure_head.function_space.dofmap.index_map.size_local, 0.0
-        for held in self._held:
-            new = held.dofs[~counted[held.dofs] & (held.dofs < n)]
-            counted[held.dofs] = True
-            if set(held.tags).isdisjoint(numbers):
-                continue
-            total += self._reaction[new].sum()
-            if held.rate is not None:
-                total += self._largest * fem.assemble_scalar(held.total)
-        return self.domain.comm.allreduce(float(total))
+        return self._applied.inflow(facet_tag, self._reaction)
 
     def stored_water(self):
         """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""

@@ -171,7 +171,7 @@ def test_pressure_in_a_saturated_layer_diffuses_as_terzaghi_says():
     # c_v = k / (gamma_w (n / K_w + m_v)); the degree of consolidation at T = 0.1, 0.2, 0.5
     k, storage = 1e-8, 1e-7
     domain, facet_tags = box((0.1, 1.0), (1, 40))
-    soil = water.PorousSoil(k, porosity=0.4, compressibility=storage - 0.4 / water.seepage.WATER_MODULUS)
+    soil = water.PorousSoil(k, porosity=0.4, compressibility=storage - 0.4 / water.soils.WATER_MODULUS)
     flow = water.Seepage(domain, soil, facet_tags, [water.Head(TOP, 1.0)])
     height = flow.pressure_head.function_space.tabulate_dof_coordinates()[:, 1]
     flow.pressure_head.x.array[:] = 1.0 - height + 1.0  # an excess head of 1 m

@@ -1,0 +1,121 @@
+"""Boundary conditions of the water on the degrees of freedom of a pressure space."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.geometry import weighted
+from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, mistake_in, value_at
+
+
+class _Held(NamedTuple):
+    """A boundary condition where it holds.
+
+    tags: numbers of its facets; dofs: of this rank; rate: prescribed inflow over the unit [-] as a constant, None where there
+    is none; density, ds: of that inflow over the facets, UFL; total: compiled form of its integral
+    """
+
+    condition: Any
+    tags: tuple
+    dofs: np.ndarray
+    rate: Any = None
+    density: Any = None
+    ds: Any = None
+    total: Any = None
+
+
+class AppliedBoundary:
+    """The boundary conditions of the water on a scalar space; where conditions meet at a node, a prescribed head holds first.
+
+    height: (m,) [m] of the dofs of this rank, ghosts included; held: the conditions where they hold
+    """
+
+    def __init__(self, space, facet_tags, unit, radius=None):
+        """unit: of prescribed inflows in forms [m/s]; radius: of an axisymmetric body, a UFL expression."""
+        self._space, self._facet_tags, self._unit, self._radius = space, facet_tags, unit, radius
+        self._dim = space.mesh.geometry.dim
+        self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
+        self.held = []
+
+    def take(self, boundary):
+        """Check a list of conditions and find where they hold; whether they are other ones than the last time.
+
+        Raises InputError, on all ranks, for values out of range and unknown tags. Collective.
+        """
+        held = [one.condition for one in self.held]
+        if len(held) == len(boundary) and all(a is b for a, b in zip(held, boundary)):
+            return False
+        for condition in boundary:
+            known = isinstance(condition, (Head, Reservoir, SeepageFace, Flux, Rain))
+            problem = mistake_in(condition) if known else "expected Head, Reservoir, SeepageFace, Flux or Rain"
+            agree(self._space.mesh.comm, f"boundary: {condition!r}: {problem}" if problem else None)
+        self.held = [self._where(condition) for condition in boundary]
+        return True
+
+    def _where(self, condition):
+        """Where a boundary condition holds."""
+        domain, dim = self._space.mesh, self._dim
+        tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
+        domain.topology.create_connectivity(dim - 1, dim)
+        facets = tagged_facets(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
+        dofs = fem.locate_dofs_topological(self._space, dim - 1, facets)
+        if not isinstance(condition, (Flux, Rain)):
+            return _Held(condition, tags, dofs)
+        rate = fem.Constant(domain, 0.0)
+        level = abs(ufl.FacetNormal(domain)[dim - 1]) if isinstance(condition, Rain) else 1.0
+        density = weighted(rate * level, self._radius)
+        ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)(tags)
+        return _Held(condition, tags, dofs, rate, density, ds, fem.form(density * ds))
+
+    def inflow_form(self, test):
+        """Prescribed inflows over their unit against a test function, as a UFL form; 0 where there are none."""
+        return sum(held.density * test * held.ds for held in self.held if held.rate is not None)
+
+    def set_time(self, time):
+        """Give the prescribed inflows their values at a time [s]."""
+        for held in self.held:
+            if held.rate is not None:
+                held.rate.value = value_at(held.condition.rate, time) / self._unit
+
+    def bounds(self, time):
+        """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at a time [s]."""
+        n = len(self.height)
+        fixed, values, upper = np.zeros(n, dtype=bool), np.zeros(n), np.full(n, np.inf)
+        for condition, dofs in ((held.condition, held.dofs) for held in self.held):
+            if isinstance(condition, (Head, Reservoir)):
+                level = value_at(condition.level, time)
+                below = dofs if isinstance(condition, Head) else dofs[self.height[dofs] <= level]
+                free = dofs[~fixed[dofs]] if isinstance(condition, Reservoir) else dofs[:0]
+                upper[free] = np.minimum(upper[free], 0.0)
+                below = below[~fixed[below]]
+                fixed[below], values[below] = True, level - self.height[below]
+            elif isinstance(condition, (SeepageFace, Rain)):
+                upper[dofs] = np.minimum(upper[dofs], getattr(condition, "ponding", 0.0))
+        return fixed, values, upper
+
+    def inflow(self, facet_tag, reaction):
+        """Water that enters through the facets of a tag [m3/s], per metre [m2/s] in plane flow; negative where it leaves.
+
+        reaction: (m,) [m3/s], inflow at the dofs beside the prescribed rates. A node where several conditions meet counts for
+        the first of them. Collective; raises InputError for an unknown tag.
+        """
+        comm = self._space.mesh.comm
+        numbers = tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")
+        counted = np.zeros(len(self.height), dtype=bool)
+        n, total = self._space.dofmap.index_map.size_local, 0.0
+        for held in self.held:
+            new = held.dofs[~counted[held.dofs] & (held.dofs < n)]
+            counted[held.dofs] = True
+            if set(held.tags).isdisjoint(numbers):
+                continue
+            total += reaction[new].sum()
+            if held.rate is not None:
+                total += self._unit * fem.assemble_scalar(held.total)
+        return comm.allreduce(float(total))

@@ -1,0 +1,83 @@
+"""How soils hold water and let it through, and which of them fills which cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import ufl
+
+from fenics_bridge.errors import InputError, agree
+from fenics_bridge.mesh.names import by_number, label
+from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.water.retention import AlwaysSaturated
+
+WATER_WEIGHT = 9810.0
+"""Unit weight of water [N/m3]."""
+
+WATER_MODULUS = 2.2e9
+"""Bulk modulus of water [Pa]."""
+
+
+@dataclass(frozen=True)
+class PorousSoil:
+    """How soil holds water and lets it through.
+
+    conductivity: saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor
+    porosity: n [-], in (0, 1); for transient flow only
+    compressibility: of the skeleton, m_v [1/Pa], the inverse of the oedometric modulus; for transient flow only
+    retention: curve of `fenics_bridge.water.retention`; without one the soil stays saturated
+    Raises InputError for values outside these ranges.
+    """
+
+    conductivity: Any
+    porosity: float = 0.4
+    compressibility: float = 0.0
+    retention: Any = field(default_factory=AlwaysSaturated)
+
+    def __post_init__(self):
+        k = np.asarray(self.conductivity, dtype=float)
+        square = k.ndim == 2 and k.shape[0] == k.shape[1] and np.allclose(k, k.T)
+        if not (
+            np.all(np.isfinite(k)) and (k.ndim < 2 or square) and np.all(np.linalg.eigvalsh(self.tensor(k, 3)) > 0)
+        ):
+            raise InputError(f"conductivity: got {self.conductivity!r} m/s, expected positive numbers, or a "
+                             "symmetric tensor with positive principal values")  # fmt: skip
+        if not 0 < self.porosity < 1:
+            raise InputError(f"porosity: got {self.porosity!r}, expected more than 0 and less than 1")
+        if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
+            raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
+
+    @staticmethod
+    def tensor(conductivity, dim):
+        """Conductivity as a tensor (D, D) [m/s]."""
+        k = np.asarray(conductivity, dtype=float)
+        return k if k.ndim == 2 else np.diag(np.broadcast_to(k, k.shape or (dim,)))
+
+
+def soils_by_tag(domain, soil, cell_tags):
+    """The soils, the measure over the cells of each, and these cells, ghosts too: three lists.
+
+    soil: PorousSoil, or {cell tag or name: PorousSoil}. Raises InputError, on all ranks, for tags that do not exist or have
+    no soil, and for conductivities of another dimension. Collective.
+    """
+    comm, dim = domain.comm, domain.geometry.dim
+    by_tag = soil if isinstance(soil, dict) else {None: soil}
+    for key, one in by_tag.items():
+        agree(comm, None if isinstance(one, PorousSoil) else f"soil: got {one!r} for {key!r}, expected a PorousSoil")
+        shape = np.shape(one.conductivity)
+        agree(comm, None if not shape or shape[0] == dim else f"conductivity: has shape {shape}, expected ({dim},) or "
+              f"({dim}, {dim}) in {dim}D")  # fmt: skip
+    if not isinstance(soil, dict):
+        every = np.arange(owned_cells(domain) + domain.topology.index_map(dim).num_ghosts, dtype=np.int32)
+        return [soil], [ufl.Measure("dx", domain=domain)], [every]
+    agree(comm, "cell_tags: got None, expected the tags that the soils are given for" if cell_tags is None else None)
+    by_tag = by_number(comm, cell_tags, by_tag, "soil", "cell")
+    values = tag_values(domain, cell_tags, dim)
+    known = set().union(*comm.allgather(set(values.tolist())))
+    without = sorted(known - set(by_tag))
+    agree(comm, f"soil: none for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None)
+    dx = ufl.Measure("dx", domain=domain, subdomain_data=cell_tags)
+    cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in by_tag]
+    return list(by_tag.values()), [dx(tag) for tag in by_tag], cells
