@@ -116,15 +116,15 @@ def function_space(domain, family, degree, size=None):
     return fem.VectorFunctionSpace(domain, (family, degree), dim=size)
 
 
-def taylor_hood_space(domain):
-    """Displacement, continuous and quadratic, with pressure, continuous and linear."""
+def displacement_pressure_space(domain, degree):
+    """Displacement, continuous and of degree 1 or 2, with pressure, continuous and linear; degree 2 is Taylor and Hood's."""
     dim = domain.geometry.dim
     if basix_ufl is not None:
         cell = domain.basix_cell()
-        parts = [basix_ufl.element("Lagrange", cell, 2, shape=(dim,)), basix_ufl.element("Lagrange", cell, 1)]
+        parts = [basix_ufl.element("Lagrange", cell, degree, shape=(dim,)), basix_ufl.element("Lagrange", cell, 1)]
         return fem.functionspace(domain, basix_ufl.mixed_element(parts))
     cell = domain.ufl_cell()
-    parts = [ufl.VectorElement("Lagrange", cell, 2), ufl.FiniteElement("Lagrange", cell, 1)]
+    parts = [ufl.VectorElement("Lagrange", cell, degree), ufl.FiniteElement("Lagrange", cell, 1)]
     return fem.FunctionSpace(domain, ufl.MixedElement(parts))
 
 

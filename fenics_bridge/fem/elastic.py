@@ -117,7 +117,7 @@ def solve_nearly_incompressible(
     agree(domain.comm, None if poisson > 0 else f"poisson: got {poisson!r}, expected more than 0")
     geometry = geometry_of(domain, geometry)
     radius = radius_of(domain, geometry)
-    space = compat.taylor_hood_space(domain)
+    space = compat.displacement_pressure_space(domain, 2)
     constraints = Constraints(space.sub(0), facet_tags, supports)
     require_axis_held(space.sub(0), geometry, constraints)
     (v, q), trial = ufl.TestFunctions(space), ufl.TrialFunctions(space)

@@ -123,7 +123,11 @@ class EquilibriumStep:
             self.scale = self._forces_at_work(forces.array)
         forces.array[self._fixed] = 0.0
         self._residual_vector = forces
-        return self._norm(forces.array) / self.scale if self.scale > 0 else 0.0
+        return self._relative(forces.array)
+
+    def _relative(self, out_of_balance):
+        """Norm of the out-of-balance forces where nothing is prescribed, over that of the forces at work."""
+        return self._norm(out_of_balance) / self.scale if self.scale > 0 else 0.0
 
     def _forces_at_work(self, out_of_balance):
         """Largest norm of the loads before and after the step and of the reactions at its start.

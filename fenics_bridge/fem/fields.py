@@ -59,6 +59,25 @@ def cell_function(domain, expression, degree, name):
     return function
 
 
+def part_of(function, collapsed, name):
+    """A part of a function on a mixed space as a function of its own.
+
+    collapsed: (space, dofs) of the part, as `sub(i).collapse()` of the mixed space returns them
+    """
+    space, dofs = collapsed
+    part = fem.Function(space, name=name)
+    part.x.array[:] = function.x.array[dofs]
+    return part
+
+
+def force_on(space, forces, facets):
+    """Sum of nodal forces (local dofs of a displacement space) over the nodes of facets: (D,). Collective."""
+    dim = space.mesh.geometry.dim
+    nodes = fem.locate_dofs_topological(space, dim - 1, facets)
+    mine = nodes[nodes < space.dofmap.index_map.size_local]
+    return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))
+
+
 def nodal_average(function, radius=None):
     """Continuous, piecewise linear function whose nodal values average those of the cells around, by volume.
 

@@ -18,20 +18,27 @@ class Kinematics:
     (`averaged.AveragedKinematics` has the same methods for strains that are averaged over nodes.)
     """
 
-    def __init__(self, increment, points, constraints, geometry=None):
-        """increment: displacement function whose strain is wanted; points: QuadraturePoints; geometry: a Geometry."""
+    def __init__(self, increment, points, constraints, geometry=None, further=None):
+        """
+        increment: displacement function whose strain is wanted; points: QuadraturePoints; geometry: a Geometry
+        further: on a mixed space, whose first part is the displacement: function of its test and trial functions that returns its
+            further internal forces and their tangent, UFL forms
+        """
         self._space, self._points = increment.function_space, points
         domain, size = self._space.mesh, points.size
         radius = radius_of(domain, geometry)
-        self._strain = fem.Expression(strain(increment, radius), points.reference)
+        functions = increment, ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
+        du, test, trial = functions if further is None else (ufl.split(f)[0] for f in functions)
+        more_forces, more_stiffness = further(*functions[1:]) if further is not None else (0, 0)
+        self._strain = fem.Expression(strain(du, radius), points.reference)
         self._stress, self._stress_rows = self._quadrature_function(size)
         self._tangent, self._tangent_rows = self._quadrature_function(size**2)
         dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
-        test, trial = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
-        self._internal = fem.form(weighted(ufl.inner(self._stress, strain(test, radius)), radius) * dx)
+        forces = weighted(ufl.inner(self._stress, strain(test, radius)), radius) * dx
         stiffness = weighted(ufl.inner(ufl.dot(matrix, strain(trial, radius)), strain(test, radius)), radius) * dx
-        self._stiffness = Stiffness(stiffness, constraints)
+        self._internal = fem.form(forces + more_forces)
+        self._stiffness = Stiffness(stiffness + more_stiffness, constraints)
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
 
     def strain_increment(self):
@@ -46,8 +53,12 @@ class Kinematics:
 
     def stiffness(self):
         """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
+        return self.stiffness_of(self._points.tangent)
+
+    def stiffness_of(self, tangent):
+        """The same of a given tangent (n, S, S) [Pa]. Collective."""
         size = self._points.size**2
-        self._tangent.x.array.reshape(-1, size)[self._tangent_rows] = self._points.tangent.reshape(-1, size)
+        self._tangent.x.array.reshape(-1, size)[self._tangent_rows] = tangent.reshape(-1, size)
         return self._stiffness.assembled()
 
     def _quadrature_function(self, size):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 
 import mpm_core as mpm
 from fenics_bridge import compat
@@ -14,14 +14,14 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.equilibration import Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.fields import assembled, dilation, strain
+from fenics_bridge.fem.fields import dilation, force_on, part_of
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, weighted
+from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.stiffness import Stiffness
 from fenics_bridge.fem.supports import Constraints, tagged_facets
 
 
@@ -45,7 +45,7 @@ class MixedQuasiStatic:
         agree(domain.comm, _first_mistake(law))
         self.geometry = geometry_of(domain, geometry)
         radius = radius_of(domain, self.geometry)
-        space = compat.taylor_hood_space(domain)
+        space = compat.displacement_pressure_space(domain, 2)
         self.domain, self.law = domain, law
         constraints = Constraints(space.sub(0), facet_tags, supports)
         require_axis_held(space.sub(0), self.geometry, constraints)
@@ -54,22 +54,22 @@ class MixedQuasiStatic:
         self.points = QuadraturePoints(domain, [law], number, 2, radius is not None)
         self.load, self.converged = Load(), False
         unknowns = fem.Function(space), fem.Function(space)
-        self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law, radius)
+        self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law, self.geometry)
         linear = LinearSolver(space, options_prefix, newton=True)
         self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
         self.solver = solver or Solver()
         self._facet_tags = facet_tags
-        self._displacements, self._parts = space.sub(0).collapse()
+        self._displacements = space.sub(0).collapse()
 
     @property
     def displacement(self):
         """Total displacement as a function of its own [m]."""
-        return self._displacement(self._body.solution, "displacement")
+        return part_of(self._body.solution, self._displacements, "displacement")
 
     @property
     def increment(self):
         """Displacement of the last step [m]."""
-        return self._displacement(self._body.increment, "increment")
+        return part_of(self._body.increment, self._displacements, "increment")
 
     def equilibrate(self, load, law=None, **options):
         """Go to the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
@@ -88,16 +88,11 @@ class MixedQuasiStatic:
 
     def reaction(self, facet_tag):
         """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in plane strain, [N] per radian). Collective."""
-        space, dim = self._body.solution.function_space, self.domain.geometry.dim
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        facets = tagged_facets(space.mesh.comm, self._facet_tags, facet_tag, "facet_tag")
-        owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
-        sums = []
-        for component in range(dim):
-            dofs = fem.locate_dofs_topological(space.sub(0).sub(component), dim - 1, facets)
-            sums.append(forces[dofs[dofs < owned]].sum())
-        return self.domain.comm.allreduce(np.array(sums))
+        facets = tagged_facets(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
+        space, dofs = self._displacements
+        return force_on(space, forces[dofs], facets)
 
     def pressure_at(self, points):
         """Pressure at points (n, D) on any rank, compression positive: (n,) [Pa]. Collective."""
@@ -111,68 +106,45 @@ class MixedQuasiStatic:
         """
         return evaluate_at(points, displacement=self.displacement)
 
-    def _displacement(self, both, name):
-        function = fem.Function(self._displacements, name=name)
-        function.x.array[:] = both.x.array[self._parts]
-        return function
 
-
-class _MixedKinematics:
-    """Deviatoric strain, forces and stiffness of displacement and pressure, as `Kinematics` has them for displacement.
+class _MixedKinematics(Kinematics):
+    """Deviatoric strain, forces and stiffness of displacement and pressure.
 
     The unknown pressure is in units of the shear modulus, which keeps the two sorts of equations alike in size.
     """
 
-    def __init__(self, solution, increment, points, constraints, law, radius=None):
-        space = solution.function_space
-        self._space, self._points = space, points
-        domain, size = space.mesh, points.size
-        young, poisson = law.young, law.poisson
+    def __init__(self, solution, increment, points, constraints, law, geometry):
+        young, poisson, size = law.young, law.poisson, points.size
         self.scale = young / (2 * (1 + poisson))
         flexibility = self.scale * 3 * (1 - 2 * poisson) / young  # G / K
         self._deviator = np.eye(size) - np.outer(np.arange(size) < 3, np.arange(size) < 3) / 3
         u, p = (a + b for a, b in zip(ufl.split(solution), ufl.split(increment)))
-        (v, q), (du, dp) = ufl.TestFunctions(space), ufl.TrialFunctions(space)
-        self._strain = fem.Expression(strain(ufl.split(increment)[0], radius), points.reference)
-        self._stress, self._stress_rows = self._quadrature_function(size)
-        self._tangent, self._tangent_rows = self._quadrature_function(size**2)
-        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
-        matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
-
+        domain = solution.function_space.mesh
+        radius = radius_of(domain, geometry)
         # The pressure's terms have one degree more with the radius.
-        dx_volume = dx if radius is None else ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 3})
+        degree = points.degree if radius is None else 3
+        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": degree})
 
-        def volume(u, p):
+        def volume(u, p, v, q):
             terms = -p * dilation(v, radius) - q * dilation(u, radius) - flexibility * p * q
-            return self.scale * weighted(terms, radius) * dx_volume
+            return self.scale * weighted(terms, radius) * dx
 
-        tested = strain(v, radius)
-        self._internal = fem.form(weighted(ufl.inner(self._stress, tested), radius) * dx + volume(u, p))
-        change = ufl.inner(ufl.dot(matrix, strain(du, radius)), tested)
-        stiffness = weighted(change, radius) * dx + volume(du, dp)
-        self._stiffness = Stiffness(stiffness, constraints)
-        self._forces = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+        def further(test, trial):
+            return volume(u, p, *ufl.split(test)), volume(*ufl.split(trial), *ufl.split(test))
+
+        super().__init__(increment, points, constraints, geometry, further)
 
     def strain_increment(self):
         """Deviatoric strain of the increment at the points: (n, S)."""
-        values = compat.expression_values(self._strain, self._space.mesh, self._points.cells)
-        return values.reshape(self._points.n, self._points.size) @ self._deviator
+        return super().strain_increment() @ self._deviator
 
     def internal_forces(self, stress):
         """Nodal forces of a stress (n, S), of which the deviatoric part counts, and of the pressure. Collective."""
-        self._stress.x.array.reshape(-1, self._points.size)[self._stress_rows] = stress @ self._deviator
-        return assembled(self._internal, self._space, self._forces)
+        return super().internal_forces(stress @ self._deviator)
 
     def stiffness(self):
         """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
-        size = self._points.size
-        tangent = self._deviator @ self._points.tangent @ self._deviator
-        self._tangent.x.array.reshape(-1, size**2)[self._tangent_rows] = tangent.reshape(-1, size**2)
-        return self._stiffness.assembled()
-
-    def _quadrature_function(self, size):
-        space = compat.quadrature_space(self._space.mesh, self._points.degree, size)
-        return fem.Function(space), compat.cell_dofs(space)[self._points.cells].ravel()
+        return self.stiffness_of(self._deviator @ self._points.tangent @ self._deviator)
 
 
 def _first_mistake(law):

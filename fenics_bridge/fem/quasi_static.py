@@ -15,7 +15,7 @@ from fenics_bridge.fem.equilibration import Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.failure import explained
-from fenics_bridge.fem.fields import nodal_average
+from fenics_bridge.fem.fields import force_on, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
@@ -188,12 +188,9 @@ class QuasiStatic:
 
         Collective.
         """
-        space, dim = self.displacement.function_space, self.domain.geometry.dim
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         facets = tagged_facets(self.domain.comm, self.facet_tags, facet_tag, "facet_tag")
-        nodes = fem.locate_dofs_topological(space, dim - 1, facets)
-        mine = nodes[nodes < space.dofmap.index_map.size_local]
-        return self.domain.comm.allreduce(out_of_balance.reshape(-1, dim)[mine].sum(axis=0))
+        return force_on(self.displacement.function_space, out_of_balance, facets)
 
     def stress_function(self, smooth=False):
         """Stress [Pa] as a function that is constant in each cell: the mean of its points.

@@ -11,12 +11,12 @@ class Stiffness:
 
     def __init__(self, form, constraints):
         """form: UFL; constraints: Constraints. Collective."""
-        self._form, self._bcs = fem.form(form), constraints.bcs
+        self._form, self._constraints = fem.form(form), constraints
         self._matrix = petsc.create_matrix(self._form)
 
     def assembled(self):
         """The matrix with the form's present coefficients; the same object each time. Collective."""
         self._matrix.zeroEntries()
-        petsc.assemble_matrix(self._matrix, self._form, bcs=self._bcs)
+        petsc.assemble_matrix(self._matrix, self._form, bcs=self._constraints.bcs)
         self._matrix.assemble()
         return self._matrix
