@@ -1,12 +1,18 @@
-"""Water in the pores: retention curves, boundary conditions of the water, seepage."""
+"""Water in the pores: retention curves, boundary conditions of the water, seepage, consolidation."""
 
 from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace
+from fenics_bridge.water.consolidation import Consolidation
+from fenics_bridge.water.consolidation_step import ConsolidationReport
+from fenics_bridge.water.coupled import Element
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import PorousSoil
 
 __all__ = [
     "AlwaysSaturated",
+    "Consolidation",
+    "ConsolidationReport",
+    "Element",
     "Flux",
     "FreeSurface",
     "Gardner",

@@ -39,7 +39,7 @@ class AppliedBoundary:
 
     def __init__(self, space, facet_tags, unit, radius=None):
         """unit: of prescribed inflows in forms [m/s]; radius: of an axisymmetric body, a UFL expression."""
-        self._space, self._facet_tags, self._unit, self._radius = space, facet_tags, unit, radius
+        self._space, self._facet_tags, self.unit, self._radius = space, facet_tags, unit, radius
         self._dim = space.mesh.geometry.dim
         self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
         self.held = []
@@ -82,7 +82,7 @@ class AppliedBoundary:
         """Give the prescribed inflows their values at a time [s]."""
         for held in self.held:
             if held.rate is not None:
-                held.rate.value = value_at(held.condition.rate, time) / self._unit
+                held.rate.value = value_at(held.condition.rate, time) / self.unit
 
     def bounds(self, time):
         """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at a time [s]."""
@@ -103,19 +103,19 @@ class AppliedBoundary:
     def inflow(self, facet_tag, reaction):
         """Water that enters through the facets of a tag [m3/s], per metre [m2/s] in plane flow; negative where it leaves.
 
-        reaction: (m,) [m3/s], inflow at the dofs beside the prescribed rates. A node where several conditions meet counts for
-        the first of them. Collective; raises InputError for an unknown tag.
+        facet_tag: None for all conditions together; reaction: (m,) [m3/s], inflow at the dofs beside the prescribed rates
+        A node where several conditions meet counts for the first of them. Collective; raises InputError for an unknown tag.
         """
         comm = self._space.mesh.comm
-        numbers = tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")
+        numbers = None if facet_tag is None else tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")
         counted = np.zeros(len(self.height), dtype=bool)
         n, total = self._space.dofmap.index_map.size_local, 0.0
         for held in self.held:
             new = held.dofs[~counted[held.dofs] & (held.dofs < n)]
             counted[held.dofs] = True
-            if set(held.tags).isdisjoint(numbers):
+            if numbers is not None and set(held.tags).isdisjoint(numbers):
                 continue
             total += reaction[new].sum()
             if held.rate is not None:
-                total += self._unit * fem.assemble_scalar(held.total)
+                total += self.unit * fem.assemble_scalar(held.total)
         return comm.allreduce(float(total))

@@ -1,0 +1,47 @@
+"""The state from which a consolidation begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.water.seepage import Seepage
+
+
+def set_initial_state(model, stress, pore_pressure):
+    """Do what `Consolidation.initialise` says."""
+    comm, points, solution = model.domain.comm, model.points, model._body.solution
+    state = None
+    if isinstance(stress, QuasiStatic):
+        stress, state = stress.points.stress, stress.points.state
+    pressure = _pressures(model, pore_pressure)
+    _require(comm, "stress", stress, points.stress.shape)
+    _require(comm, "state", state, points.state.shape)
+    _require(comm, "pore_pressure", pressure, model.pressure.x.array.shape)
+    points.stress[:] = 0.0 if stress is None else stress
+    points.reset_state(model._laws)
+    if state is not None:
+        points.state[:] = state
+    solution.x.array[:] = 0.0
+    if pressure is not None:
+        solution.x.array[model._pressures[1]] = pressure / model._unit
+    model._read_pressure()
+
+
+def _pressures(model, pore_pressure):
+    """Pore pressures [Pa] at the nodes: (m,); None for none. Collective."""
+    if pore_pressure is None:
+        return None
+    x = model._pressures[0].tabulate_dof_coordinates()[:, : model.domain.geometry.dim]
+    if not isinstance(pore_pressure, Seepage):
+        return np.broadcast_to(np.asarray(pore_pressure(x), dtype=float), len(x))
+    search = PointSearch(pore_pressure.domain, x)
+    search.require_all("pore_pressure")
+    return pore_pressure.unit_weight * search.values(pore_pressure.pressure_head)[:, 0]
+
+
+def _require(comm, name, values, shape):
+    good = values is None or (np.shape(values) == shape and np.all(np.isfinite(values)))
+    agree(comm, None if good else f"{name}: got shape {np.shape(values)}, expected finite values of shape {shape}")

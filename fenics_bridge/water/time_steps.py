@@ -1,0 +1,38 @@
+"""Following a consolidation in time, with steps that grow and shrink."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_bridge.errors import agree
+
+SHORTEST = 1e-4
+"""Step, over the first one, below which a run gives up."""
+
+
+def run(model, until, first_step, growth, longest, progress):
+    """Do what `Consolidation.run` says."""
+    agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
+    reports, dt = [], min(first_step, longest)
+    while model.time < until * (1 - 1e-12):
+        step = min(dt, until - model.time)
+        reports.append(model.advance(step))
+        if progress is not None:
+            progress(reports[-1])
+        if not reports[-1].converged:
+            dt = 0.5 * step
+            if dt < SHORTEST * first_step:
+                break
+        elif reports[-1].easy:
+            dt = min(growth * dt, longest)
+    return reports
+
+
+def _mistake(until, time, first_step, growth, longest):
+    if not (np.isfinite(until) and until > time):
+        return f"until: got {until!r} s, expected a time after the present one, {time:g} s"
+    if not (np.isfinite(first_step) and first_step > 0):
+        return f"first_step: got {first_step!r} s, expected a positive number"
+    if not longest > 0:
+        return f"longest: got {longest!r} s, expected a positive number"
+    return None if np.isfinite(growth) and growth >= 1 else f"growth: got {growth!r}, expected 1 or more"
