@@ -23,7 +23,8 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 GROUPS = {
-    "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica"),
+    "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
+                     "consolidation"),  # fmt: skip
     "Limit analysis": ("limit_slopes", "limit_footing", "published_slopes", "weak_layer"),
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),
