@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.step_control import StepControl
 
 from fenics_bridge.fem.equilibration import EquilibriumReport
 
@@ -37,10 +38,11 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
     progress: called with each LoadStep, or None. Returns all steps; the last converged one is the last equilibrium.
     """
     steps: list[LoadStep] = []
-    value, size, easy, failed_at, undecided = start, min(first_step, end - start), 0, math.inf, False
+    value, easy, failed_at, undecided = start, 0, math.inf, False
+    control = StepControl(math.inf, min(first_step, end - start))
     while value < end and len(steps) < _MOST_STEPS:
         smallest = tolerance * max(abs(value), first_step)
-        size = min(size, 0.5 * (failed_at - value))
+        size = control.length = min(control.length, 0.5 * (failed_at - value))
         if size < smallest:
             break
         target = end if size >= (end - value) * (1 - 1e-12) else value + size
@@ -51,15 +53,17 @@ def advance(equilibrate, start, end, first_step, tolerance, progress=None):
             value = target
             easy = easy + 1 if steps[-1].report.easy else 0
             if easy == 2:
-                size, easy = 2 * size, 0
+                control.grow()
+                easy = 0
             if failed_at < math.inf and not undecided:
-                size = 0.5 * (failed_at - value)
+                control.length = 0.5 * (failed_at - value)
         else:
-            size, easy = (target - value) / 2, 0
+            control.cut(target - value)
+            easy = 0
             undecided = undecided or steps[-1].report.outcome == "undecided"
             if steps[-1].report.outcome == "failure":
                 failed_at = target
-                size = max(_below_failure(value, target, steps[-1].report.carried), smallest)
+                control.length = max(_below_failure(value, target, steps[-1].report.carried), smallest)
     return steps
 
 

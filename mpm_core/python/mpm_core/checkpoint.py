@@ -14,7 +14,7 @@ from ._core import InputError, RunError
 from .collective import collectively
 from .description import parsed
 from .fingerprint import fingerprint
-from .implicit import StepControl
+from .step_control import StepControl
 
 if TYPE_CHECKING:
     from .model import Model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,15 +17,10 @@ from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
 from .solution import Solution
+from .step_control import StepControl
 
 if TYPE_CHECKING:
     from .model import Model
-
-MAX_CUTS = 10
-"""A step is not made shorter than dt / 2^MAX_CUTS."""
-
-SMALLEST_PART = 1 / 2**MAX_CUTS
-"""of the out-of-balance force, which is applied in parts where all of it at once is too much"""
 
 FADING = 0.1
 """of the ghost penalty between steps that only redistribute stresses"""
@@ -70,20 +65,6 @@ def checked_accuracy(accuracy: float | None, second_order: bool) -> float | None
     return positive("accuracy", accuracy, "m")
 
 
-@dataclass
-class StepControl:
-    """What a run carries from one implicit step to the next beside the particles; checkpoints hold it too."""
-
-    longest: float
-    """[s] that a step may be long"""
-    length: float
-    """[s] of the next step, unless a report comes before"""
-    iterations: int = 0
-    """since the last report"""
-    cuts: int = 0
-    """since the last report"""
-
-
 class Stepper:
     """Implicit steps of a model, with what they took since the last report.
 
@@ -123,15 +104,14 @@ class Stepper:
             reason = self.attempt(dt)
             if not reason:
                 break
-            self.control.cuts += 1
-            self.control.length = dt / 2
-            if self.control.length < self.control.longest / 2**MAX_CUTS:
+            self.control.cut(dt)
+            if self.control.is_too_short:
                 raise RunError(
                     f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from "
                     f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}"
                 )
         if self.last.easy:
-            self.control.length = min(self.control.longest, self._growth * self.control.length)
+            self.control.grow(self._growth)
 
     def attempt(self, dt: float) -> str:
         """Try one step; the particles change only when it succeeds. Returns why it did not, or nothing."""
@@ -225,17 +205,17 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
     """
     options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)
-    applied, part, ghost = 0.0, 1.0, options.ghost
+    control = stepper.control  # of the fraction of what is out of balance that a step applies
+    applied, ghost = 0.0, options.ghost
     for _ in range(max_steps):
         while True:
-            part = min(part, 1.0 - applied)
+            part = min(control.length, 1.0 - applied)
             options.load_share = part / (1.0 - applied) if applied < 1.0 else 1.0
             reason = _attempt_without_time(stepper, model)
             if not reason:
                 break
-            stepper.control.cuts += 1
-            part /= 2
-            if part < SMALLEST_PART or applied == 1.0:
+            control.cut(part)
+            if control.is_too_short or applied == 1.0:
                 error = RunError(
                     f"no equilibrium at t = {model.time:.9g} s with more than {applied:.4g} of the loads: {reason}"
                 )
@@ -243,7 +223,8 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
                 raise error
         applied = min(1.0, applied + part)
         if applied < 1.0:
-            part *= 2 if stepper.last.easy else 1
+            if stepper.last.easy:
+                control.grow()
             continue
         if options.hold_positions:
             ghost.stiffness *= FADING
