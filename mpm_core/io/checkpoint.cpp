@@ -256,9 +256,12 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
   check_positions<D>(file, mesh, particles);
   file.check();
   checkpoint.state = expected;
-  std::erase_if(checkpoint.state.ranks, // of the energy balance, which older files do not have
+  std::erase_if(checkpoint.state.ranks, // of the energy balance and the order, which older files do not have
                 [&](const Table& table)
-                { return table.name.starts_with("energy_") && !file.has("/ranks/" + table.name); });
+                {
+                  const bool may_lack = table.name.starts_with("energy_") || table.name.starts_with("order_");
+                  return may_lack && !file.has("/ranks/" + table.name);
+                });
   const RowSlice rows = checkpoint.same_parts ? RowSlice{exchange.rank, 1, ranks} : RowSlice{0, ranks, ranks};
   for (Table& table : checkpoint.state.ranks)
   {

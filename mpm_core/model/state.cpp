@@ -54,8 +54,8 @@ void for_each_number(M& model, F&& f)
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   f("sorts", Kind::own, model.totals.sorts);
-  f("strays", Kind::own, model.order.out_of_order);
-  f("stray_steps", Kind::own, model.order.cost);
+  f("order_changes", Kind::own, model.order.out_of_order);
+  f("order_cost", Kind::own, model.order.cost);
 }
 
 template <class Moments>
@@ -111,13 +111,11 @@ bool is_of_stored_energy(std::string_view name)
 template <class G>
 void begin_balance_where_unknown(Model<G>& model, const std::vector<Table>& ranks)
 {
-  if (std::ranges::none_of(ranks, [](const Table& table) { return is_of_energy(table.name); }))
+  if (std::ranges::none_of(ranks, [](const Table& table) { return table.name.starts_with("energy_"); }))
     start_energy_balance(model);
   model.energy.stale = false;
 }
 } // namespace
-
-bool is_of_energy(std::string_view name) { return name.starts_with("energy_"); }
 
 template <class G, int D>
 std::vector<Table> rank_state(const Model<G>& model)

@@ -12,9 +12,6 @@ namespace mpm
 template <class G, int D = G::dim>
 std::vector<Table> rank_state(const Model<G>& model);
 
-/// Whether a number of `rank_state` belongs to the energy balance, which files of before it do not have.
-bool is_of_energy(std::string_view name);
-
 /// Sums over the filled cells of this rank, as they were gathered: taken anew from the particles they would differ in
 /// their last bits, and a run that goes on with them would be another one. The first number of a row is the cell over
 /// all ranks.

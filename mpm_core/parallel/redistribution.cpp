@@ -24,9 +24,9 @@ std::vector<int> owners(const Mesh<D>& mesh, const NodeExchange& exchange, std::
   for (GlobalIndex cell : cells)
     asked[keeper(cell)].push_back(cell);
   std::unordered_map<GlobalIndex, GlobalIndex> directory;
-  const Lists told = exchanged(owned, exchange.comm);
+  const Lists registered = exchanged(owned, exchange.comm);
   for (std::size_t r = 0; r < size; ++r)
-    for (GlobalIndex cell : told[r])
+    for (GlobalIndex cell : registered[r])
       directory[cell] = static_cast<GlobalIndex>(r);
   Lists questions = exchanged(asked, exchange.comm);
   for (auto& list : questions)

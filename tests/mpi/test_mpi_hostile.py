@@ -96,7 +96,7 @@ HOSTILE = {
     "steps that overflow": (placed("ranks/steps", 0, 8e18), "/ranks/steps in .* value 8000"),
     "steps below zero": (placed("ranks/steps", 0, -1.0), "/ranks/steps in .* -1.0"),
     "half a step": (placed("ranks/steps", 0, 1.5), "/ranks/steps in .* 1.5"),
-    "a count beyond its type": (placed("ranks/strays", 0, 2.0**31), "/ranks/strays in .* 2147483648"),
+    "a count beyond its type": (placed("ranks/order_changes", 0, 2.0**31), "/ranks/order_changes in .* 2147483648"),
     "a place far off": (
         placed("particles/position", 4, 1e3),
         "/particles/position in .* place .1000.* not in that particle's cell",
