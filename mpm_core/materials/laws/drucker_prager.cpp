@@ -102,11 +102,7 @@ double cone_strength(double cohesion, double friction_angle, ConeMatch match)
   return 6 * cohesion * std::cos(phi) / (std::numbers::sqrt3 * (match == ConeMatch::outer ? 3 - sine : 3 + sine));
 }
 
-double p_wave_modulus(const DruckerPrager& law)
-{
-  const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
-  return moduli.lambda + 2 * moduli.shear;
-}
+double p_wave_modulus(const DruckerPrager& law) { return p_wave_modulus(elastic_moduli(law.young, law.poisson)); }
 
 template <int D>
 BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)

@@ -4,11 +4,7 @@
 
 namespace mpm
 {
-double p_wave_modulus(const LinearElastic& law)
-{
-  const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
-  return moduli.lambda + 2 * moduli.shear;
-}
+double p_wave_modulus(const LinearElastic& law) { return p_wave_modulus(elastic_moduli(law.young, law.poisson)); }
 
 template <int D>
 BatchReport update(const LinearElastic& law, const PointBatch<D>& points)

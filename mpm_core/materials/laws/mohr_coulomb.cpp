@@ -237,11 +237,7 @@ Index return_block(const Surface& m, const std::optional<RegionMaps>& maps, cons
 }
 } // namespace
 
-double p_wave_modulus(const MohrCoulomb& law)
-{
-  const ElasticModuli moduli = elastic_moduli(law.young, law.poisson);
-  return moduli.lambda + 2 * moduli.shear;
-}
+double p_wave_modulus(const MohrCoulomb& law) { return p_wave_modulus(elastic_moduli(law.young, law.poisson)); }
 
 template <int D>
 BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)

@@ -19,6 +19,9 @@ constexpr ElasticModuli elastic_moduli(double young, double poisson)
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
 
+/// K + 4G/3 = lambda + 2 mu [Pa]
+constexpr double p_wave_modulus(const ElasticModuli& moduli) { return moduli.lambda + 2 * moduli.shear; }
+
 /// Tangent d stress / d strain (engineering shear), row-major
 template <int D>
 std::array<double, n_stress<D> * n_stress<D>> elastic_tangent(const ElasticModuli& moduli)
