@@ -1,5 +1,6 @@
 #include "implicit/trial.h"
 
+#include "base/determinant.h"
 #include "implicit/cell_tangent.h"
 #include "model/batches.h"
 #include "model/integration.h"
@@ -45,11 +46,7 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
       f[i][j] = dt * velocity_gradient[i][j] + (i == j ? 1.0 : 0.0);
-  if constexpr (D == 2)
-    return f[0][0] * f[1][1] - f[0][1] * f[1][0];
-  else
-    return f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) - f[0][1] * (f[1][0] * f[2][2] - f[1][2] * f[2][0]) +
-           f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
+  return determinant(f);
 }
 
 template <class G, int D = G::dim>

@@ -1,5 +1,7 @@
 #include "mesh/mesh.h"
 
+#include "base/determinant.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -52,14 +54,6 @@ void check_input(const MeshInput<D>& input)
       if (node < 0 || static_cast<std::size_t>(node) >= nodes)
         throw InputError(show(numbers.data() == input.cells.data() ? "cells" : "facets", ": node ", node,
                               " does not exist, the mesh has ", nodes, " nodes"));
-}
-
-double determinant(const Matrix<2>& a) { return a[0][0] * a[1][1] - a[0][1] * a[1][0]; }
-
-double determinant(const Matrix<3>& a)
-{
-  return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-         a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
 }
 
 /// Gradients of vertices 1..D are the rows of the inverse of the edge matrix, transposed.
