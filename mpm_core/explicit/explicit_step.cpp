@@ -1,6 +1,7 @@
 #include "explicit/explicit_step.h"
 
 #include "explicit/momentum.h"
+#include "model/cell_change.h"
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
@@ -201,19 +202,19 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
 }
 
-template <class G>
-double critical_time_step(const Model<G>& model)
+template <int D>
+double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, MPI_Comm comm)
 {
   double squared = std::numeric_limits<double>::infinity();
-  for (const Run& run : model.order.runs)
+  for (const Run& run : points.runs)
   {
-    const double h = smallest_altitude<G::dim>(model.mesh.shapes[run.cell]);
+    const double h = smallest_altitude<D>(mesh.shapes[run.cell]);
     double density = std::numeric_limits<double>::infinity();
     for (Index p = run.first; p < run.last; ++p)
-      density = std::min(density, model.particles.mass[p] / model.particles.volume[p]);
-    squared = std::min(squared, h * h * density / p_wave_modulus(model.laws[run.material]));
+      density = std::min(density, points.particles.mass[p] / points.particles.volume[p]);
+    squared = std::min(squared, h * h * density / p_wave_modulus(points.laws[run.material]));
   }
-  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
+  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, comm);
   return std::sqrt(squared);
 }
 
@@ -224,9 +225,10 @@ double pic_share_of_step(double share, double dt, double critical)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
-  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
-  template double critical_time_step(const Model<G>&);
+  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
+template double critical_time_step(const Mesh<2>&, const MaterialPoints<2>&, MPI_Comm);
+template double critical_time_step(const Mesh<3>&, const MaterialPoints<3>&, MPI_Comm);
 } // namespace mpm

@@ -2,7 +2,7 @@
 /// @file
 /// The explicit scheme, section 3 of the paper.
 
-#include "model/model.h"
+#include "model/material_points.h"
 
 namespace mpm
 {
@@ -39,8 +39,8 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 
 /// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
 /// @note Collective
-template <class G>
-double critical_time_step(const Model<G>& model);
+template <int D>
+double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, MPI_Comm comm);
 
 /// The PIC share of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the step:
 /// 1 - (1 - share)^(dt / dt_cr).

@@ -61,9 +61,8 @@ template <class G>
 void require_integration(const Model<G>& model, const ExplicitOptions& options)
 {
   if (options.integration == Integration::dual_domain && (G::has_hoop || model.fields.size() > 1))
-    throw InputError(
-        "integration is DUAL_DOMAIN, expected PARTICLES or MIXED in axial symmetry and with several velocity "
-        "fields");
+    throw InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED in axial symmetry and with several "
+                     "velocity fields");
 }
 
 template <class G>
@@ -96,7 +95,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   {
     if (done % control_interval == 0)
     {
-      const double critical = critical_time_step(model);
+      const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
       dt = next_step(model, run, critical);
       of_step.pic_share = pic_share_of_step(run.pic, dt, critical);
     }
@@ -142,10 +141,7 @@ void check_conservation(const Model<G>& model, const Diagnostics& local)
   if (const std::string text = shared_failure(model.exchange.comm, out.str()); !text.empty())
     throw RunError("particles were lost or counted twice: " + text);
 }
-} // namespace
 
-namespace
-{
 /// What is taken at particles and nodes, of this rank.
 template <class G, int D = G::dim>
 void take_energies(const Model<G>& model, Diagnostics& d)

@@ -11,6 +11,7 @@
 #include "implicit/stages.h"
 #include "implicit/supported.h"
 #include "implicit/trial.h"
+#include "model/cell_change.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
 
@@ -123,7 +124,10 @@ double pic_share(const Model<G>& model, const ImplicitStep<G>& step)
 {
   if (step.options.quasi_static)
     return 1;
-  return step.options.pic > 0 ? pic_share_of_step(step.options.pic, step.dt, critical_time_step(model)) : 0;
+  if (step.options.pic == 0)
+    return 0;
+  const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
+  return pic_share_of_step(step.options.pic, step.dt, critical);
 }
 
 /// Makes the particles those of the step's start again.

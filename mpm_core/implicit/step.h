@@ -64,7 +64,7 @@ struct TrialReport
   std::int64_t failed = 0;  ///< particles whose law failed, and cells that would lose their volume
 };
 
-/// Forces on a node [N]; each term of the residual has its own, as works are told apart by them.
+/// Forces on a node [N]; each term of the residual has its own, as their works are counted apart.
 template <int D>
 struct NodalForces
 {

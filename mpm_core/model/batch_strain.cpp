@@ -83,8 +83,9 @@ void find_cell_strains(const Mesh<D>& mesh, const VelocityField<G>& field, const
   }
 }
 
-/// Strains the particles of a batch, those of a cell alike.
-template <class G, int D = G::dim>
+} // namespace
+
+template <class G, int D>
 void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                   const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
 {
@@ -101,8 +102,7 @@ void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
   }
 }
 
-/// Strains the particles of a batch, each by the gradient at its own place.
-template <class G, int D = G::dim>
+template <class G, int D>
 void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                          const PassOptions& options, const Batch& batch, Particles<D>& particles,
                          BatchScratch<D>& scratch)
@@ -122,23 +122,13 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
     }
   }
 }
-} // namespace
-
-template <class G, int D>
-void strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                  const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
-{
-  if (field.integration.kind == Integration::dual_domain)
-    strain_dual_domains(mesh, field, runs, options, batch, particles, scratch);
-  else
-    strain_cells(mesh, field, runs, options, batch, particles, scratch);
-}
-
 #define INSTANTIATE(G)                                                                                                 \
   template void find_motions(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
                              const PassOptions&, const Batch&, BatchScratch<G::dim>&);                                 \
-  template void strain_batch(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
-                             const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);
+  template void strain_cells(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
+                             const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);             \
+  template void strain_dual_domains(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,             \
+                                    const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

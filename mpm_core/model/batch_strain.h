@@ -35,10 +35,17 @@ template <class G, int D = G::dim>
 void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                   const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch);
 
-/// Strains the particles of a batch: rotates their stresses, grows their volumes, and leaves their strain increments in
-/// the scratch, for the law.
+/// Strains the particles of a batch, those of a cell alike: rotates their stresses, grows their volumes, and leaves
+/// their strain increments in the scratch, for the law.
 /// @pre find_motions has been called for the batch
 template <class G, int D = G::dim>
-void strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                   const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch);
+
+/// The same for each particle by the gradient at its own place.
+/// @pre average_gradients has been called for the field
+template <class G, int D = G::dim>
+void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                         const PassOptions& options, const Batch& batch, Particles<D>& particles,
+                         BatchScratch<D>& scratch);
 } // namespace mpm

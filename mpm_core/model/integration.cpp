@@ -52,44 +52,20 @@ void gather_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Part
   sum_shared(exchange, integration.dual_nodes);
 }
 
-/// What a cell integrates: volume times mean stress.
-template <class G, int D = G::dim>
-Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+/// Internal forces (14) of what the cells integrate: a function of a filled cell, volume times mean stress where it is
+/// full, the sum over its particles where it is not.
+template <class G, class Stress, int D = G::dim>
+void replace_internal_forces(const Mesh<D>& mesh, const Stress& full_stress, VelocityField<G>& field)
 {
-  const CellIntegration<D>& integration = field.integration;
-  Working<G> stress = field.moments[cell].stress;
-  if (!integration.whole[cell])
-    return stress;
-  double factor = cell_volume<G>(mesh.shapes[cell]) / field.moments[cell].volume;
-  if constexpr (!G::has_hoop)
-    if (integration.kind == Integration::dual_domain)
-    {
-      std::array<const DualStress<D>*, D + 1> nodes;
-      for (int k = 0; k <= D; ++k)
-        nodes[k] = &integration.dual_nodes[mesh.cells[cell][k]];
-      stress = dual_mean<D>(integration.dual_cells[cell], nodes);
-      factor = cell_volume<G>(mesh.shapes[cell]);
-    }
-  for (double& component : stress)
-    component *= factor;
-  return stress;
-}
-} // namespace
-
-template <class G, int D>
-void integrate_stress(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
-                      const std::vector<Run>& runs, VelocityField<G>& field)
-{
-  find_whole_cells(mesh, exchange, field);
-  if (field.integration.kind == Integration::dual_domain)
-    gather_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
   for (NodeSums<D>& node : field.nodes)
     node.internal = {};
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
     if (field.moments[c].mass == 0)
       continue;
-    const Working<G> stress = integrated_stress(mesh, field, c);
+    Working<G> stress = field.moments[c].stress;
+    if (field.integration.whole[c])
+      stress = full_stress(c);
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D> force = internal_force<G>(stress, mesh.shapes[c], k);
@@ -97,6 +73,40 @@ void integrate_stress(const Mesh<D>& mesh, NodeExchange& exchange, const Particl
         field.nodes[mesh.cells[c][k]].internal[a] += force[a];
     }
   }
+}
+
+template <class G>
+Working<G> scaled_stress(Working<G> stress, double factor)
+{
+  for (double& component : stress)
+    component *= factor;
+  return stress;
+}
+} // namespace
+
+template <class G, int D>
+void integrate_mixed(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
+{
+  find_whole_cells(mesh, exchange, field);
+  const auto of_mean = [&](Index c)
+  { return scaled_stress<G>(field.moments[c].stress, cell_volume<G>(mesh.shapes[c]) / field.moments[c].volume); };
+  replace_internal_forces(mesh, of_mean, field);
+}
+
+template <class G, int D>
+void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                            const std::vector<Run>& runs, VelocityField<G>& field)
+{
+  find_whole_cells(mesh, exchange, field);
+  gather_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
+  const auto of_dual_mean = [&](Index c)
+  {
+    std::array<const DualStress<D>*, D + 1> nodes;
+    for (int k = 0; k <= D; ++k)
+      nodes[k] = &field.integration.dual_nodes[mesh.cells[c][k]];
+    return scaled_stress<G>(dual_mean<D>(field.integration.dual_cells[c], nodes), cell_volume<G>(mesh.shapes[c]));
+  };
+  replace_internal_forces(mesh, of_dual_mean, field);
 }
 
 template <class G, int D>
@@ -147,11 +157,16 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template void integrate_stress(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                         \
-                                 const std::vector<Run>&, VelocityField<G>&);                                          \
+  template void integrate_mixed(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                                \
   template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \
   template Matrix<G::dim> dual_gradient(const Mesh<G::dim>&, const VelocityField<G>&, const Vector<G::dim>&, Index);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+#undef INSTANTIATE
+#define INSTANTIATE(G)                                                                                                 \
+  template void integrate_dual_domains(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                   \
+                                       const std::vector<Run>&, VelocityField<G>&);
+INSTANTIATE(PlaneStrain)
 INSTANTIATE(Solid)
 } // namespace mpm

@@ -24,12 +24,18 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
-/// Puts the internal force of mixed or dual domain integration in the place of the particles' sum, on this rank.
+/// Puts the internal force of mixed integration in the place of the particles' sum, on this rank: a full cell
+/// integrates the mean stress of its particles over its volume.
 /// @post field.integration.whole tells which cells are full
 /// @note Collective
 template <class G, int D = G::dim>
-void integrate_stress(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
-                      const std::vector<Run>& runs, VelocityField<G>& field);
+void integrate_mixed(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field);
+
+/// The same with dual domains: a full cell integrates the mean stress by their weights.
+/// @pre not in axial symmetry
+template <class G, int D = G::dim>
+void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                            const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Means of the velocity gradient over the full cells that share a node, from the nodes' `velocity`.
 /// @note Collective

@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// What a batch of particles tells a law of its increment beyond stress and strain, where the law needs it.
+/// What a law is given of the increment of a batch beyond stress and strain, where it needs it.
 
 #include "model/batches.h"
 #include "model/material_points.h"

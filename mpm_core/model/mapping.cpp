@@ -34,8 +34,11 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if (std::exchange(field.part_shrinks, false))
     shrink_part(mesh, exchange, field);
   scatter<G>(mesh, field.part, field.moments, field.tractions, field.nodes);
-  if (field.integration.kind != Integration::particles)
-    integrate_stress(mesh, exchange, particles, runs, field);
+  if (field.integration.kind == Integration::mixed)
+    integrate_mixed(mesh, exchange, field);
+  if constexpr (!G::has_hoop)
+    if (field.integration.kind == Integration::dual_domain)
+      integrate_dual_domains(mesh, exchange, particles, runs, field);
 }
 
 template <class G>

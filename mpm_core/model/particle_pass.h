@@ -24,10 +24,4 @@ struct PassOptions
 /// no local cell on the list of lost ones, and neither is gathered.
 template <class G>
 void particle_pass(Model<G>& model, const PassOptions& options);
-
-/// Takes outflow particles out, sends migrating ones to their ranks and gathers arrivals; sorts when order has been
-/// lost.
-/// @note Collective
-template <class G>
-void migrate_particles(Model<G>& model);
 } // namespace mpm

@@ -1,0 +1,96 @@
+#pragma once
+/// @file
+/// Two ways to strain particles: those of a cell alike, or each by the gradient at its own place. They are siblings
+/// that the pass over the particles takes as a parameter.
+
+#include "model/batch_strain.h"
+#include "model/law_increment.h"
+
+namespace mpm
+{
+/// Half of the work of a batch's stresses on the strains in the scratch, particle by particle.
+template <class G, int D = G::dim>
+inline double half_work(const Particles<D>& particles, const Batch& batch, const BatchScratch<D>& scratch)
+{
+  double sum = 0;
+  for (Index p = batch.first; p < batch.last; ++p)
+    for (int k : working_component<G>)
+      sum += particles.volume[p] * particles.stress[k][p] * scratch.strain[k][p - batch.first];
+  return 0.5 * sum;
+}
+
+/// Half of the work of a sum of stresses, V sigma, on the strain of a run of the batch.
+template <class G, int D = G::dim>
+inline double half_work(const Working<G>& stress, const BatchScratch<D>& scratch, std::size_t run)
+{
+  const auto& increment = scratch.cells[run / lanes].increment;
+  double sum = 0;
+  for (std::size_t k = 0; k < G::n_working; ++k)
+    sum += stress[k] * increment[working_component<G>[k]][run % lanes];
+  return 0.5 * sum;
+}
+
+/// Integration over particles, or mixed: volumes and work follow from the moments of a cell and its one strain.
+struct StrainPerCell
+{
+  static constexpr bool moves_moments = true; ///< the moments of cells can follow the motion of the nodes
+
+  template <class G, int D = G::dim>
+  static void strain(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                     const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
+  {
+    strain_cells(mesh, field, runs, options, batch, particles, scratch);
+  }
+
+  template <int D>
+  static void deform(const MaterialPoints<D>& material, const Batch& batch, const BatchScratch<D>& scratch,
+                     LawIncrement<D>& columns, PointBatch<D>& points)
+  {
+    give_deformation(
+        material, batch, [&](std::size_t r) { return scratch.motion[r].displacement.gradient; },
+        [&](std::size_t r) { return scratch.cells[r / lanes].volumetric[r % lanes]; }, columns, points);
+  }
+
+  template <class G, int D = G::dim>
+  static double half_work_of_batch(const Particles<D>&, const Batch&, const BatchScratch<D>&)
+  {
+    return 0;
+  }
+
+  template <class G, int D = G::dim>
+  static double half_work_of_run(const Working<G>& stress, const BatchScratch<D>& scratch, std::size_t run)
+  {
+    return half_work<G>(stress, scratch, run);
+  }
+};
+
+/// Dual domains: each particle has its own strain and its own work, and no deformation gradient is known of it.
+struct StrainPerParticle
+{
+  static constexpr bool moves_moments = false;
+
+  template <class G, int D = G::dim>
+  static void strain(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                     const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
+  {
+    strain_dual_domains(mesh, field, runs, options, batch, particles, scratch);
+  }
+
+  template <int D>
+  static void deform(const MaterialPoints<D>&, const Batch&, const BatchScratch<D>&, LawIncrement<D>&, PointBatch<D>&)
+  {
+  }
+
+  template <class G, int D = G::dim>
+  static double half_work_of_batch(const Particles<D>& particles, const Batch& batch, const BatchScratch<D>& scratch)
+  {
+    return half_work<G>(particles, batch, scratch);
+  }
+
+  template <class G, int D = G::dim>
+  static double half_work_of_run(const Working<G>&, const BatchScratch<D>&, std::size_t)
+  {
+    return 0;
+  }
+};
+} // namespace mpm
