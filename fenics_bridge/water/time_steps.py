@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from mpm_core.step_control import StepControl
 
 from fenics_bridge.errors import agree
 
@@ -13,18 +14,16 @@ SHORTEST = 1e-4
 def run(model, until, first_step, growth, longest, progress):
     """Do what `Consolidation.run` says."""
     agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
-    reports, dt = [], min(first_step, longest)
-    while model.time < until * (1 - 1e-12):
-        step = min(dt, until - model.time)
+    reports, control = [], StepControl(longest, min(first_step, longest))
+    while model.time < until * (1 - 1e-12) and control.length >= SHORTEST * first_step:
+        step = min(control.length, until - model.time)
         reports.append(model.advance(step))
         if progress is not None:
             progress(reports[-1])
         if not reports[-1].converged:
-            dt = 0.5 * step
-            if dt < SHORTEST * first_step:
-                break
+            control.cut(step)
         elif reports[-1].easy:
-            dt = min(growth * dt, longest)
+            control.grow(growth)
     return reports
 
 
