@@ -25,6 +25,14 @@ comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
                      "consolidation"),  # fmt: skip
+    "Axial symmetry": (
+        "axisymmetric_cylinder",
+        "axisymmetric_motion",
+        "cavity_expansion",
+        "circular_footing",
+        "lube_columns",
+        "quarter_model",
+    ),
     "Limit analysis": ("limit_slopes", "limit_footing", "published_slopes", "weak_layer"),
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),

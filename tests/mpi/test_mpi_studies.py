@@ -10,8 +10,10 @@ from mpi4py import MPI
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "studies" / "verification"), str(ROOT / "tests" / "python")]
+import axisymmetric_cylinder  # noqa: E402
 import compare_fem  # noqa: E402
 import handover  # noqa: E402
+import quarter_model  # noqa: E402
 import safety  # noqa: E402
 import slope  # noqa: E402
 import thick_cylinder  # noqa: E402
@@ -73,3 +75,9 @@ def test_particles_differ_from_quadratic_elements_as_linear_ones_do(shared_path,
 def test_cylinder_of_the_verification(shared_path):
     """Its particles move from rank to rank, and some ranks have none that carries the pressure."""
     assert [check.quantity for check in thick_cylinder.run(True, shared_path).checks if not check.passed] == []
+
+
+@pytest.mark.parametrize("case", [axisymmetric_cylinder, quarter_model])
+def test_half_sections_of_the_verification(shared_path, case):
+    """Rings on a rank that has none of the axis, or none of the wall; and a body of three dimensions beside them."""
+    assert [check.quantity for check in case.run(True, shared_path).checks if not check.passed] == []
