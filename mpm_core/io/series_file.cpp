@@ -200,7 +200,8 @@ void SeriesFile::add_fields(const char* center, const RowSlice& rows, const std:
     if (is_symmetric_tensor(n))
       for (std::size_t k = 0; k < n; ++k)
       {
-        const std::string name = field.name + "_" + component_names[k];
+        const char* component = n == 4 && k == 2 ? field.out_of_plane : component_names[k];
+        const std::string name = field.name + "_" + component;
         add_field(name, center, add_reals(name, rows, columns.subspan(k, 1), 1, field.carrier));
       }
     else

@@ -27,6 +27,7 @@ struct OutputField
   std::string name;
   std::size_t rows;
   std::vector<OutputColumn> columns; ///< one per component
+  const char* out_of_plane = "zz";   ///< name of the third of four components
   RowCarrier* carrier = nullptr; ///< brings the rows from ranks whose columns have them; null: they are in order here
 };
 

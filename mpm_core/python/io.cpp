@@ -106,6 +106,9 @@ void write_model(std::uintptr_t comm, const Model<G>& model, const ModelFields& 
         input_error_of([&] { frame.particle_fields = particle_fields<D>(model.particles, names.particles); });
   for (OutputField& field : output_fields(more))
     frame.particle_fields.fields.push_back(std::move(field));
+  if constexpr (G::has_hoop)
+    for (OutputField& field : frame.particle_fields.fields)
+      field.out_of_plane = "hoop";
   for (OutputIndexField& field : output_fields(more_integers))
     frame.particle_fields.index_fields.push_back(std::move(field));
   write(communicator(comm), frame);

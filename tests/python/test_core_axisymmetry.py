@@ -5,6 +5,7 @@ import pytest
 from core_cases import box
 
 import mpm_core as mpm
+from mpm_core.output import ModelOutput
 from mpm_core.probes import PointProbe
 
 YOUNG, POISSON = 1000.0, 0.3
@@ -155,6 +156,24 @@ def test_filled_space_is_that_of_rings():
     assert mpm.space(model) == pytest.approx((0.5, 0.5), rel=1e-12)
     shares = [v for k, v in PointProbe(model, [[0.55, 0.52], [1.1, 1.1]]).values().items() if k.startswith("filled")]
     assert shares == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
+def test_files_name_the_hoop_stress(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    model = ring(0.0, 1.0, (2, 2))
+    stress = np.arange(4.0 * len(model.particles)).reshape(-1, 4)
+    model.particles.set("stress", stress)
+    model.report()
+    with ModelOutput(model, str(tmp_path / "particles"), str(tmp_path / "mesh")) as output:
+        output.write()
+    with h5py.File(tmp_path / "particles" / "000000.h5") as file:
+        assert {name for name in file if name.startswith("stress")} == {
+            f"stress_{c}" for c in ("xx", "yy", "hoop", "xy")
+        }
+        order = np.argsort(np.array(file["id"]))
+        hoop = np.array(file["stress_hoop"])[order]
+    np.testing.assert_array_equal(hoop, stress[np.argsort(model.particles.id), 2])
+    assert 'Name="stress_hoop"' in (tmp_path / "particles.xdmf").read_text()
 
 
 def test_what_axial_symmetry_does_not_have_is_refused():
