@@ -96,7 +96,7 @@ def _pictures(
 ) -> Iterator[np.ndarray]:
     """Frames as pixels (height, width, 4), even numbers of them as films need. What does not move is drawn once."""
     with paper_style():
-        figure, axes, bar_axes = figure_with_bar(*scene.limits(positions))
+        figure, axes, bar_axes = figure_with_bar(*scene.limits(positions), scene.half_section)
         figure.set_dpi(150)
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
         canvas = FigureCanvasAgg(figure)

@@ -18,7 +18,18 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator
 import fenics_bridge as bridge
 
 from .figures import save_figure
-from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, boundary_edges, colour_limits, discs, paper_style
+from .plots import (
+    CURVES,
+    ROUND_TICKS,
+    WIDTH,
+    Quantity,
+    Scene,
+    axis_labels,
+    boundary_edges,
+    colour_limits,
+    discs,
+    paper_style,
+)
 
 INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
 INCREMENT_SHEAR = Quantity("Shear strain increment at collapse, relative", "-", colours="inferno")
@@ -29,12 +40,13 @@ LINE = "#00a8e8"
 class Field:
     """A nodal quantity on triangles, on the first rank.
 
-    points: (n, 2) [m]; cells: (m, 3) rows of points; values: (n, k)
+    points: (n, 2) [m]; cells: (m, 3) rows of points; values: (n, k); half_section: of an axisymmetric body
     """
 
     points: np.ndarray
     cells: np.ndarray
     values: np.ndarray
+    half_section: bool = False
 
     @property
     def outline(self) -> np.ndarray:
@@ -57,8 +69,11 @@ class Field:
         return values[order][np.searchsorted(np.cumsum(area[order]), (1 - share) * area.sum())]
 
 
-def gathered(function: object) -> Field | None:
-    """A continuous function of DOLFINx at the corners of all cells; None but on the first rank. Collective."""
+def gathered(function: object, half_section: bool = False) -> Field | None:
+    """A continuous function of DOLFINx at the corners of all cells; None but on the first rank. Collective.
+
+    half_section: of an axisymmetric body, which the axes of pictures then say
+    """
     comm = function.function_space.mesh.comm
     mesh = bridge.background_arrays(function.function_space.mesh)
     values = bridge.evaluate_at(mesh["points"], value=function)["value"]
@@ -68,7 +83,7 @@ def gathered(function: object) -> Field | None:
         return None
     corners, at_corners = (np.concatenate(arrays) for arrays in zip(*parts))
     points, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    return Field(points, number.reshape(-1, 3), at_corners[first])
+    return Field(points, number.reshape(-1, 3), at_corners[first], half_section)
 
 
 # --- curves ----------------------------------------------------------------------------------------------------------
@@ -196,7 +211,7 @@ def save_mechanism(
     lengths, shear = np.linalg.norm(field.values, axis=1), field.shear()
     lower, upper = (np.array(corner) for corner in box or (field.points.min(axis=0), field.points.max(axis=0)))
     with paper_style():
-        figure, panels = _panels(lower, upper, 2)
+        figure, panels = _panels(lower, upper, 2, field.half_section)
         for (axes, bar), quantity in zip(panels, (INCREMENT, INCREMENT_SHEAR)):
             axes.add_collection(LineCollection(field.outline, colors="black", linewidths=0.8, zorder=3))
             is_shear = quantity is INCREMENT_SHEAR
@@ -263,27 +278,30 @@ def save_side_by_side(
             axes.set_title(
                 f"{name}, up to {quantity.scale * values.max():.3g} {quantity.unit}", loc="left", pad=4, fontsize=8.5
             )
-            axes.set_xlabel("$x$ [m]", labelpad=1)
-        grid[0].set_ylabel("$y$ [m]", labelpad=1)
+            axes.set_xlabel(axis_labels(scene.half_section)[0], labelpad=1)
+        grid[0].set_ylabel(axis_labels(scene.half_section)[1], labelpad=1)
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=list(grid), location="bottom",
                               ticks=ROUND_TICKS, shrink=0.55, aspect=45, extend="max")  # fmt: skip
         bar.set_label(f"{quantity.label}; {title}")
         _save(figure, path)
 
 
-def _panels(lower: np.ndarray, upper: np.ndarray, count: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
+def _panels(
+    lower: np.ndarray, upper: np.ndarray, count: int, half_section: bool = False
+) -> tuple[Figure, list[tuple[Axes, Axes]]]:
     """Equal axes side by side, each with room for a horizontal colour bar below: (axes, bar axes) of each."""
     margin = 0.03 * (upper - lower).max()
     each = (WIDTH - 0.25) / count - 0.35
     height = float(np.clip(each * (upper[1] - lower[1] + 2 * margin) / (upper[0] - lower[0] + 2 * margin), 0.8, 6.0))
     figure = plt.figure(figsize=(WIDTH, height + 1.3), layout="constrained")
     grid = figure.subplots(2, count, height_ratios=[1, 0.04], squeeze=False)
+    along, up = axis_labels(half_section)
     for axes in grid[0]:
         axes.set_aspect("equal")
         axes.set_xlim(lower[0] - margin, upper[0] + margin)
         axes.set_ylim(lower[1] - margin, upper[1] + margin)
-        axes.set_xlabel("$x$ [m]", labelpad=1)
-    grid[0][0].set_ylabel("$y$ [m]")
+        axes.set_xlabel(along, labelpad=1)
+    grid[0][0].set_ylabel(up)
     return figure, list(zip(grid[0], grid[1]))
 
 

@@ -12,7 +12,17 @@ from mpi4py import MPI
 
 import mpm_core as mpm
 
-from .plots import DISPLACEMENT, PORE_PRESSURE, SHEAR_STRAIN, SPEED, VERTICAL_STRESS, Quantity, Scene, disc_diameter
+from .plots import (
+    DISPLACEMENT,
+    PORE_PRESSURE,
+    SHEAR_STRAIN,
+    SPEED,
+    VERTICAL_STRESS,
+    Quantity,
+    Scene,
+    axis_labels,
+    disc_diameter,
+)
 
 QUANTITIES = {
     "shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS, "speed": SPEED
@@ -35,7 +45,7 @@ class Movie:
         title: stands above the panel.
         scene: mesh behind the particles.
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
-            (n,) [m^3 per metre], quantities by their keys (n,) in SI units, and ``id`` (n,) when rows change their order
+            (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,) when rows change their order
             or number from frame to frame. On ranks other than the first each is None.
         quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
     """
@@ -58,8 +68,11 @@ def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
     pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
+    area = p["volume"]
+    if model.geometry == mpm.Geometry.AXISYMMETRIC:
+        area = area / p["position"][:, 0]
     return {
-        "time": np.float64(time), "position": p["position"], "volume": p["volume"], "id": p["id"],
+        "time": np.float64(time), "position": p["position"], "volume": area, "id": p["id"],
         "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
         "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore,
     }  # fmt: skip
@@ -147,6 +160,7 @@ def packed(movie: Movie) -> dict:
         "ids": ids.tolist() if (ids != np.arange(len(ids))).any() else None,
         "fields": fields,
         "scene": _scene(movie.scene),
+        "axes": [label.replace("$", "") for label in axis_labels(movie.scene.half_section)],
     }
 
 

@@ -81,6 +81,16 @@ PORE_PRESSURE = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="vir
 SPEED = Quantity("Speed", "m/s", colours="plasma")
 
 
+AXES = "$x$ [m]", "$y$ [m]"
+HALF_SECTION_AXES = "$r$ [m] (half section, axis at the left)", "$z$ [m]"
+"""Labels of pictures in the plane of the mesh, in plane strain and of bodies of revolution"""
+
+
+def axis_labels(half_section: bool) -> tuple[str, str]:
+    """Labels of the axes of a picture of a plane body, or of the half section of an axisymmetric one."""
+    return HALF_SECTION_AXES if half_section else AXES
+
+
 @dataclass
 class Scene:
     """The background mesh that particles are drawn in front of.
@@ -89,11 +99,13 @@ class Scene:
         points: (n, 2), m.
         cells: (m, 3) rows of ``points``.
         is_soil: (m,) true for cells that held soil at the start; all if not given.
+        half_section: whether the body is axisymmetric, about the axis x = 0.
     """
 
     points: np.ndarray
     cells: np.ndarray
     is_soil: np.ndarray | None = None
+    half_section: bool = False
     boundary: np.ndarray = field(init=False, repr=False)
     initial_outline: np.ndarray = field(init=False, repr=False)
 
@@ -141,7 +153,7 @@ def colour_limits(quantity: Quantity, values: Iterable[np.ndarray]) -> tuple[flo
     return float(ticks[0]), float(ticks[-1])
 
 
-def figure_with_bar(lower: np.ndarray, upper: np.ndarray) -> tuple[Figure, Axes, Axes]:
+def figure_with_bar(lower: np.ndarray, upper: np.ndarray, half_section: bool = False) -> tuple[Figure, Axes, Axes]:
     """A figure for a picture in equal axes that shows [lower, upper], with room for a horizontal colour bar below."""
     left, right, bottom, top, bar = 0.52, 0.18, 0.98, 0.34, 0.11  # in
     width = WIDTH - left - right
@@ -153,8 +165,9 @@ def figure_with_bar(lower: np.ndarray, upper: np.ndarray) -> tuple[Figure, Axes,
     axes.set_aspect("equal")
     axes.set_xlim(lower[0], upper[0])
     axes.set_ylim(lower[1], upper[1])
-    axes.set_xlabel("$x$ [m]", labelpad=1)
-    axes.set_ylabel("$y$ [m]")
+    along, up = axis_labels(half_section)
+    axes.set_xlabel(along, labelpad=1)
+    axes.set_ylabel(up)
     return figure, axes, bar_axes
 
 
@@ -216,7 +229,7 @@ def save_particles(
     """
     limits = limits or colour_limits(quantity, [values])
     with paper_style():
-        figure, axes, bar_axes = figure_with_bar(*scene.limits([position]))
+        figure, axes, bar_axes = figure_with_bar(*scene.limits([position]), scene.half_section)
         draw_scene(axes, scene)
         collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
         collection.set_array(quantity.scale * values)
@@ -230,7 +243,7 @@ def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray
     with paper_style():
         lower, upper = scene.points.min(axis=0), scene.points.max(axis=0)
         margin = 0.02 * (upper - lower).max()
-        figure, axes, bar_axes = figure_with_bar(lower - margin, upper + margin)
+        figure, axes, bar_axes = figure_with_bar(lower - margin, upper + margin, scene.half_section)
         bar_axes.remove()
         axes.triplot(*scene.points.T, scene.cells, color=GREY, linewidth=0.35, zorder=1)
         # Less than half the diameter, so that the particles stand apart and the mesh shows between them.

@@ -20,4 +20,4 @@ def scene_of(model: mpm.Model, soil_tags: Sequence[int]) -> Scene | None:
         return None
     corners, tags = (np.concatenate(arrays) for arrays in zip(*parts))
     points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-    return Scene(points, cells.reshape(-1, 3), np.isin(tags, soil_tags))
+    return Scene(points, cells.reshape(-1, 3), np.isin(tags, soil_tags), model.geometry == mpm.Geometry.AXISYMMETRIC)

@@ -4,6 +4,7 @@ Example of a file:
 
     mesh = "embankment.geo"            # beside this file; or a .msh
     cell_size = 0.5                    # and other constants of the .geo file under [constants]
+    axisymmetric = true                # the mesh is a half section about the axis x = 0; false by default
 
     [soils.clay]                       # a physical group of the mesh
     unit_weight = 17e3                 # N/m3
@@ -39,7 +40,7 @@ from .parameters import ParameterError, checked_values
 from .slope_case import GRAVITY, add_soil_options
 from .soils import add_law_options, law_of
 
-KEYS = ("mesh", "cell_size", "constants", "soils", "laws", "supports", "stages", "classes")
+KEYS = ("mesh", "cell_size", "axisymmetric", "constants", "soils", "laws", "supports", "stages", "classes")
 STAGE_KEYS = (
     "name", "fill", "excavate", "law", "unit_weight", "pressure", "support", "release", "water_level", "reset_displacement"
 )  # fmt: skip
@@ -52,7 +53,7 @@ class Site:
 
     domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
-    numbers: {soil: its tags}; further_laws: those that come in by stages
+    further_laws: those that come in by stages; axisymmetric: whether it is a half section
     """
 
     domain: Any
@@ -64,19 +65,32 @@ class Site:
     supports: list[bridge.Support]
     stages: list[bridge.Stage]
     further_laws: list[Any] = field(default_factory=list)
+    axisymmetric: bool = False
+
+    @property
+    def geometry(self) -> mpm.Geometry | None:
+        """Of elements and particles; None for what the dimension of the mesh says."""
+        return mpm.Geometry.AXISYMMETRIC if self.axisymmetric else None
 
     def finite_elements(self, degree: int, laws: dict[int, Any] | None = None, **options: Any) -> bridge.QuasiStatic:
         """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective."""
         body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
         return bridge.QuasiStatic(
-            body, laws or self.laws, facet_tags, self.supports, degree, cell_tags=cell_tags, **options
+            body,
+            laws or self.laws,
+            facet_tags,
+            self.supports,
+            degree,
+            cell_tags=cell_tags,
+            geometry=self.geometry,
+            **options,
         )
 
     def model(self, more: Sequence[Any] = ()) -> tuple[mpm.Model, dict[int, int]]:
         """A model without particles on the whole mesh, and the number of the law of each tag; `more` laws last. Collective."""
         mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
         laws = [*self.laws.values(), *self.further_laws, *more]
-        return mpm.Model(mesh, laws), {tag: k for k, tag in enumerate(self.laws)}
+        return mpm.Model(mesh, laws, geometry=self.geometry), {tag: k for k, tag in enumerate(self.laws)}
 
     def particles(self, per_cell: int, laws: dict[int, Any] | None = None, more: Sequence[Any] = ()) -> mpm.Model:
         """A model with particles of all soils, unstressed, with weight and supports. Collective.
@@ -87,7 +101,9 @@ class Site:
         """
         mesh = bridge.background_mesh(self.domain, self.cell_tags, self.facet_tags)
         laws = laws or self.laws
-        model, number = mpm.Model(mesh, [*laws.values(), *more]), {tag: k for k, tag in enumerate(laws)}
+        model, number = mpm.Model(mesh, [*laws.values(), *more], geometry=self.geometry), {
+            tag: k for k, tag in enumerate(laws)
+        }
         for soil, weight in self.unit_weight.items():
             for tag in mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=number[tag])
@@ -111,6 +127,9 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
         InputError: on all ranks, with the file, the key and what was expected.
     """
     table = _table(path)
+    axisymmetric = table.get("axisymmetric", False)
+    if not isinstance(axisymmetric, bool):
+        raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
     constants = {**table.get("constants", {}), **({"cell_size": table["cell_size"]} if "cell_size" in table else {})}
     if cell_size is not None:
         constants["cell_size"] = cell_size
@@ -132,7 +151,7 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
     others = {name: law_at(given, 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()}
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, _supports(table, path, domain, facet_tags), [],
-                list(others.values()))  # fmt: skip
+                list(others.values()), axisymmetric)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
     return site
 

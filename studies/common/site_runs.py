@@ -58,7 +58,7 @@ def site_study(
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    write_summary(folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label))
+    write_summary(folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label, site.axisymmetric))
     if comm.rank == 0:
         for row in rows:
             sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
@@ -67,9 +67,9 @@ def site_study(
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
-def _drawn(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str) -> Pictures:
+def _drawn(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool) -> Pictures:
     """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
-    field = gathered(runs[-1].mechanism)
+    field = gathered(runs[-1].mechanism, half_section)
     if field is None:
         return {}
     names = ["site" if size is None else f"{size:g} m" for size in sizes]

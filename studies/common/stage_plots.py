@@ -19,7 +19,7 @@ import fenics_bridge as bridge
 
 from .field_plots import Field, gathered
 from .figures import Pictures
-from .plots import CURVES, Quantity, boundary_edges, paper_style
+from .plots import CURVES, Quantity, axis_labels, boundary_edges, paper_style
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
@@ -39,13 +39,14 @@ class StagePicture:
 
     def field(self) -> Field:
         """The displacement on the cells that are there."""
-        return Field(self.displacement.points, self.displacement.cells[self.there], self.displacement.values)
+        return Field(self.displacement.points, self.displacement.cells[self.there], self.displacement.values,
+                     self.displacement.half_section)  # fmt: skip
 
 
 def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
     """The site as it is now; None but on the first rank. Collective."""
     fem, comm = site.fem, site.fem.domain.comm
-    field = gathered(fem.displacement)
+    field = gathered(fem.displacement, fem.geometry == bridge.Geometry.AXISYMMETRIC)
     parts = comm.gather(tuple(values[:, 0] for values in own_cell_values(fem)))
     if field is None or parts is None:
         return None
@@ -69,6 +70,7 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
     ]
     limits = (0.0, max(float(np.quantile(v * quantity.scale, 0.995)) for v in values) or 1.0)
     aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
+    along, up = axis_labels(stages[0].displacement.half_section)
     with paper_style():
         figure, panels = plt.subplots(len(stages), 1, figsize=(6.9, len(stages) * (5.4 * aspect + 0.35) + 0.45), sharex=True,
                                       squeeze=False, layout="constrained")  # fmt: skip
@@ -85,8 +87,8 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
             outline = field.points[boundary_edges(field.cells)]
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
             axes.set_title(stage.name, loc="left", pad=3)
-            axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel="$y$ [m]")
-        panels[-1, 0].set_xlabel("$x$ [m]")
+            axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel=up)
+        panels[-1, 0].set_xlabel(along)
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
                               extend="max", pad=0.01)  # fmt: skip
         bar.set_label(quantity.label)
@@ -144,10 +146,14 @@ class StageFiles:
         """Add displacement, stress, material (-1: no soil) and strain as they are after a stage."""
         material, strain = own_cell_values(self._fem)
         n = len(material)
-        stress = self._fem.stress_function()
+        function = self._fem.stress_function()
+        stress = function.x.array.reshape(-1, function.ufl_shape[0])[:n]
+        if self._fem.geometry == bridge.Geometry.AXISYMMETRIC:  # named as those of axisymmetric particles
+            stresses = {f"stress_{part}": stress[:, k].copy() for k, part in enumerate(("xx", "yy", "hoop", "xy"))}
+        else:
+            stresses = {"stress": stress}
         moved = bridge.evaluate_at(self._points, displacement=self._fem.displacement)["displacement"]
-        cells = {"material": material[:, 0], "deviatoric_strain": strain[:, 0],
-                 "stress": stress.x.array.reshape(-1, stress.ufl_shape[0])[:n]}  # fmt: skip
+        cells = {"material": material[:, 0], "deviatoric_strain": strain[:, 0], **stresses}
         self._output.write(float(number), {"displacement": moved}, cells)
 
     def __enter__(self) -> StageFiles:

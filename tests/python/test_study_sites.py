@@ -65,9 +65,31 @@ def test_a_site_has_its_laws_weights_and_supports(tmp_path):
     assert fem.converged and fem.reaction("base")[1] == pytest.approx(-28e3)
 
 
+def test_a_site_may_be_a_half_section(tmp_path):
+    """Its weights and areas are those of one radian: the block is a cylinder of radius 1 m, area 1/2."""
+    supports = 'cell_size = 0.5\naxisymmetric = true\nsupports = {base = "fixed", left = "roller"}'
+    site = site_file.read_site(site_in(tmp_path, SITE.replace("cell_size = 0.5", supports)), MPI.COMM_WORLD)
+    fem = site.finite_elements(1)
+    fem.solve(site.load())
+    assert fem.geometry == mpm.Geometry.AXISYMMETRIC and fem.reaction("base")[1] == pytest.approx(-28e3 / 2)
+    particles = site.particles(3)
+    assert particles.particles.mass.sum() == pytest.approx(28e3 / 2 / 9.81, rel=1e-3)
+    scene = importlib.import_module("common.scenes").scene_of(particles, sorted(site.laws))
+    assert (
+        importlib.import_module("common.plots").axis_labels(scene.half_section)[0].startswith("$r$ [m] (half section")
+    )
+    frame = importlib.import_module("common.movie").particle_frame(particles, 0.0)
+    assert frame["volume"].sum() == pytest.approx(2.0)  # discs have the area of the section
+    folder = tmp_path / "collapse"
+    options = ["--site", str(tmp_path / "site.toml"), "--meshes", "1", "--output", str(folder)]
+    assert importlib.import_module("collapse").main(options) == 0
+    assert (folder / "mechanism.png").exists()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ("cell_size = 0.5", "cell_size = 0.5\naxisymmetric = 1", "axisymmetric is 1, expected true or false"),
         ("unit_weight = 18e3", "", "soils.upper: has no unit_weight"),
         ("cohesion = 9e3", "cohesionn = 9e3", "soils.upper: unknown key 'cohesionn'"),
         ("cohesion = 9e3", "cohesion = -1.0", "soils.upper: cohesion is '-1.0', expected a number at least 0"),

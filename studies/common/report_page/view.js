@@ -168,7 +168,7 @@ class View {
       c.lineTo(px, bottom + 4);
       c.fillText(shown(x), px, bottom + 15);
     }
-    c.fillText("x [m]", (MARGIN.left + right) / 2, bottom + 29);
+    c.fillText(this.movie.axes[0], (MARGIN.left + right) / 2, bottom + 29);
     c.textAlign = "right";
     for (const y of ticksY) {
       const py = this.oy - this.s * y;
@@ -181,7 +181,7 @@ class View {
     c.translate(11, (MARGIN.top + bottom) / 2);
     c.rotate(-Math.PI / 2);
     c.textAlign = "center";
-    c.fillText("y [m]", 0, 0);
+    c.fillText(this.movie.axes[1], 0, 0);
     c.restore();
   }
 }
