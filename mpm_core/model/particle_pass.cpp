@@ -141,7 +141,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
         model.energy.ahead +=
             Kind::template half_work_of_run<G>(stress_sum<G>(model.particles, run.first, run.last), scratch, i);
     }
-    else
+    else if constexpr (Kind::moves_moments)
       update_moments<G>(model.particles, options, run, i, scratch, moments, model.energy.ahead);
     gather_tractions(model.particles, shape, run.first, run.last, run.cell, field);
     if (run.scattered)
