@@ -23,8 +23,8 @@
 /// while |v| is not above rms(v'): a viscous drag, which is what makes a damped explicit slide creep.
 ///
 /// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation, one of second order
-/// (1 + 2 z) / (1 + z)^2 with z = (g omega dt)^2 (see implicit_step.h). That share of D is taken as resolved, and the
-/// rest as not.
+/// (1 + 2 z) / (1 + z)^2 with z = (g omega dt)^2 (see implicit_step.h). That fraction of D is taken as resolved, and
+/// the rest as not.
 
 #include <algorithm>
 #include <numbers>

@@ -3,14 +3,15 @@
 namespace mpm
 {
 template <int D>
-std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity, double load_share)
+std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity,
+                                       double load_fraction)
 {
   std::vector<Vector<D>> external(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
     for (int a = 0; a < D; ++a)
     {
       const double load = nodes[i].traction[a] + nodes[i].mass * gravity[a];
-      external[i][a] = load_share == 1 ? load : nodes[i].internal[a] + load_share * (load - nodes[i].internal[a]);
+      external[i][a] = load_fraction == 1 ? load : nodes[i].internal[a] + load_fraction * (load - nodes[i].internal[a]);
     }
   return external;
 }

@@ -11,7 +11,8 @@ namespace mpm
 /// @param gravity  at the end of the stage [m/s2]
 /// @param nodes    sums at the step's start
 template <int D>
-std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity, double load_share);
+std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity,
+                                       double load_fraction);
 
 /// @param owned  per node: 1 on exactly one of the ranks that share it
 template <class G, int D = G::dim>

@@ -22,7 +22,7 @@ void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step
                   });
     for (int k = 0; k < D + 2; ++k)
       for (int a = 0; a < D; ++a)
-        forces[facet.nodes[k]].ghost[a] += facet.share[k] * facet.jump[k] * jump[a];
+        forces[facet.nodes[k]].ghost[a] += facet.fraction[k] * facet.jump[k] * jump[a];
   }
 }
 
@@ -31,7 +31,8 @@ void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
 {
   std::size_t rows = 0;
   for (const GhostFacet<D>& facet : step.ghosts)
-    rows += static_cast<std::size_t>(std::ranges::count_if(facet.share, [](double share) { return share != 0; }));
+    rows +=
+        static_cast<std::size_t>(std::ranges::count_if(facet.fraction, [](double fraction) { return fraction != 0; }));
   tangent.expect(rows * (D + 2));
   for (const GhostFacet<D>& facet : step.ghosts)
   {
@@ -40,11 +41,11 @@ void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
     for (int k = 0; k < D + 2; ++k)
       for (int l = 0; l < D + 2; ++l)
       {
-        if (facet.share[k] == 0)
+        if (facet.fraction[k] == 0)
           continue;
         Matrix<D> block{};
         for (int a = 0; a < D; ++a)
-          block[a][a] = facet.share[k] * factor * facet.jump[k] * facet.jump[l];
+          block[a][a] = facet.fraction[k] * factor * facet.jump[k] * facet.jump[l];
         tangent.add(facet.nodes[k], facet.nodes[l], block);
       }
   }

@@ -54,9 +54,9 @@ GhostFacet<D> facet_between(const Mesh<D>& mesh, Index cell, int k, Index other)
       facet.jump[at] += (c == cell ? 1 : -1) * dot<D>(normal, mesh.shapes[c].gradient[l]) / length;
     }
   const bool shared = other >= mesh.owned_cells;
-  facet.share.fill(shared ? 0.5 : 1);
-  facet.share[D] = 1;
-  facet.share[D + 1] = shared ? 0 : 1;
+  facet.fraction.fill(shared ? 0.5 : 1);
+  facet.fraction[D] = 1;
+  facet.fraction[D + 1] = shared ? 0 : 1;
   return facet;
 }
 
@@ -71,8 +71,8 @@ GhostFacet<D> outer_facet(const Mesh<D>& mesh, Index cell, int k)
   const Vector<D> normal = mesh.shapes[cell].gradient[k];
   for (int l = 0, at = 0; l <= D; ++l)
     facet.jump[l == k ? D : at++] = dot<D>(normal, mesh.shapes[cell].gradient[l]) / norm<D>(normal);
-  facet.share.fill(1);
-  facet.share[D + 1] = 0;
+  facet.fraction.fill(1);
+  facet.fraction[D + 1] = 0;
   return facet;
 }
 

@@ -32,8 +32,8 @@ struct GhostFacet
   std::array<Index, D + 2>
       nodes; ///< those of the facet, then the one opposite in each cell, that of the owned cell first
   std::array<double, D + 2> jump; ///< [dN/dn] of each node [1/m]
-  /// Share of the force at each node that this rank adds: a facet to a ghost cell is on both ranks
-  std::array<double, D + 2> share;
+  /// Fraction of the force at each node that this rank adds: a facet to a ghost cell is on both ranks
+  std::array<double, D + 2> fraction;
   double stiffness; ///< |F| gamma_K G h
   double mass;      ///< |F| gamma_M rho h^3
 };

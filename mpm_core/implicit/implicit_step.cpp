@@ -49,7 +49,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   begin_first_stage(field, step);
   step.forces.assign(field.nodes.size(), {});
   step.external =
-      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_share);
+      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_fraction);
 }
 
 template <class G>
@@ -59,7 +59,7 @@ void start_second_stage(Model<G>& model, ImplicitStep<G>& step)
   begin_second_stage(field, step);
   impose_supports(step, field);
   step.external =
-      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_share);
+      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_fraction);
 }
 
 // --- Trial and residual: r = f_ext - f_int(u) - ghost penalty - inertia (I2), (I3)
@@ -117,10 +117,10 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
 
 namespace
 {
-/// PIC share of the step. Quasi-static: with grid velocities of zero it leaves the particles at rest.
+/// PIC fraction of the step. Quasi-static: with grid velocities of zero it leaves the particles at rest.
 /// @note Collective
 template <class G>
-double pic_share(const Model<G>& model, const ImplicitStep<G>& step)
+double pic_fraction(const Model<G>& model, const ImplicitStep<G>& step)
 {
   if (step.options.quasi_static)
     return 1;
@@ -164,7 +164,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   if (options.mixed_discretisation)
     average_strains(model.mesh, model.exchange, field, step.dt);
   find_acceleration(step, field);
-  const double pic = pic_share(model, step);
+  const double pic = pic_fraction(model, step);
   find_velocity_change(field, pic, step.dt);
   const auto start = model.particles;
   particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation, law_dt(step),

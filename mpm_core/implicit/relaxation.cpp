@@ -12,7 +12,7 @@ namespace mpm
 namespace
 {
 constexpr double margin = 1.05;
-constexpr double local_damping_share = 0.8; ///< beta, the customary value in FLAC
+constexpr double local_damping_fraction = 0.8; ///< beta, the customary value in FLAC
 
 /// Largest sum over a row of vertex k of |elastic stiffness of a whole cell|, and of the part that turns its stress
 /// [N/m]
@@ -76,7 +76,7 @@ std::vector<double> tangent_rows(const Mesh<D>& mesh, const MaterialPoints<D>& p
       sum += std::abs(jump);
     for (int k = 0; k < D + 2; ++k)
       rows[facet.nodes[k]] +=
-          facet.share[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
+          facet.fraction[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
   }
   sum_shared(exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
@@ -87,14 +87,14 @@ std::vector<double> tangent_rows(const Mesh<D>& mesh, const MaterialPoints<D>& p
 }
 
 /// Mass by the bound on J: a half at least for first order, a quarter for second order.
-constexpr double mass_share(RelaxationKind kind)
+constexpr double mass_fraction(RelaxationKind kind)
 {
   switch (kind)
   {
   case RelaxationKind::richardson:
     return 0.5;
   case RelaxationKind::local:
-    return 0.25 * (1 + local_damping_share);
+    return 0.25 * (1 + local_damping_fraction);
   case RelaxationKind::kinetic: // so that half a pseudo-step from rest brings the fastest mode to its end, and not
                                 // beyond
     return 0.5;
@@ -145,7 +145,7 @@ double next_damping(const NodeExchange& exchange, const ImplicitStep<G>& step, c
   case RelaxationKind::kinetic:
     return nodal_sum(exchange, [&](std::size_t i) { return dot<D>(relaxation.rate[i], step.residual[i]); }) < 0 ? 1 : 0;
   default:
-    return local_damping_share;
+    return local_damping_fraction;
   }
 }
 
@@ -183,7 +183,7 @@ Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, Relaxatio
   Relaxation<D> relaxation{
       kind, tangent_rows(model.mesh, material_points(model), model.exchange, model.fields.front(), step), {}, {}, {}};
   for (double& mass : relaxation.mass)
-    mass *= margin * mass_share(kind);
+    mass *= margin * mass_fraction(kind);
   relaxation.rate.assign(model.mesh.points.size(), {});
   relaxation.last.assign(model.mesh.points.size(), {});
   relaxation.report = find_residual(model, step, false);

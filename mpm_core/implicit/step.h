@@ -21,7 +21,7 @@ struct ImplicitOptions
   bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
   bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
   bool at_rest = false;        ///< laws are given all time, however long the step: stresses above the strength relax
-  double load_share = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
+  double load_fraction = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 
 /// Entries of a cell's gradient: du_b/dx_m at b * D + m, then the hoop strain in axial symmetry.

@@ -210,7 +210,7 @@ def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps:
     for _ in range(max_steps):
         while True:
             part = min(control.length, 1.0 - applied)
-            options.load_share = part / (1.0 - applied) if applied < 1.0 else 1.0
+            options.load_fraction = part / (1.0 - applied) if applied < 1.0 else 1.0
             reason = _attempt_without_time(stepper, model)
             if not reason:
                 break
