@@ -9,8 +9,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 
-def particle_site(mesh, laws, more=(), supports=ROLLERS, **options):
-    model = mpm.Model(bridge.background_mesh(*mesh), [*laws.values(), *more])
+def particle_site(mesh, laws, more=(), supports=ROLLERS, geometry=None, **options):
+    model = mpm.Model(bridge.background_mesh(*mesh), [*laws.values(), *more], geometry=geometry)
     return bridge.ParticleSite(model, {soil: k for k, soil in enumerate(laws)}, supports, **options)
 
 
@@ -30,13 +30,14 @@ WORKS = [
 ]
 
 
+@pytest.mark.parametrize("geometry", [None, bridge.Geometry.AXISYMMETRIC])
 @pytest.mark.parametrize("laws", [elastic, plastic])
-def test_particles_that_keep_their_places_have_the_stresses_of_the_finite_elements(tmp_path, laws):
-    """With the same cells both are the same equations: linear triangles, one stress in each."""
+def test_particles_that_keep_their_places_have_the_stresses_of_the_finite_elements(tmp_path, laws, geometry):
+    """With the same cells both are the same equations: linear triangles, one stress in each; of a trench or of a shaft."""
     mesh, soils = mesh_of("pit", tmp_path), SOILS["pit"]
     works = WORKS if laws is elastic else WORKS[:3]
-    fem = site_of(mesh, laws(soils), degree=1, first_step=1.0)
-    particles = particle_site(mesh, laws(soils), small_displacements=True, tolerance=1e-8)
+    fem = site_of(mesh, laws(soils), degree=1, first_step=1.0, geometry=geometry)
+    particles = particle_site(mesh, laws(soils), geometry=geometry, small_displacements=True, tolerance=1e-8)
     for stage in [IN_SITU, *works]:
         fem.carry_out(stage)
         particles.carry_out(stage)
