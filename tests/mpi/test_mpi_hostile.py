@@ -141,6 +141,28 @@ def test_a_partition_that_is_none_is_refused(comm, shared_path, cell):
         model.restore(path)
 
 
+@pytest.mark.parametrize("prefix", ["energy_", "order_"])
+def test_an_older_file_lacks_numbers_and_goes_on_alike(comm, shared_path, prefix):
+    """Neither the energy balance nor the count of particles out of order moves a particle."""
+    path = shared_path / "state.h5"
+    model, again = sliding_slope(comm), sliding_slope(comm)
+    list(model.explicit(0.05))
+    model.save(path)
+    if comm.rank == 0:
+        with h5py.File(path, "r+") as file:
+            older = [name for name in file["ranks"] if name.startswith(prefix)]
+            assert older
+            for name in older:
+                del file["ranks"][name]
+        stamped(path)
+    comm.barrier()
+    again.restore(path)
+    for each in (model, again):
+        list(each.explicit(0.1))
+    moved, expected = all_by_id(again)["position"], all_by_id(model)["position"]
+    np.testing.assert_allclose(moved, expected, rtol=1e-12, atol=0)
+
+
 def test_what_has_its_stamp_anew_and_is_right_is_taken(comm, shared_path):
     path = shared_path / "state.h5"
     model = sliding_slope(comm)
