@@ -150,7 +150,7 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
             law = law_at(parameters, 0.0, where)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
     others = {name: law_at(given, 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()}
-    site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, _supports(table, path, domain, facet_tags), [],
+    site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
     return site
@@ -215,7 +215,8 @@ def read_toml(path: Path, keys: Sequence[str], needed: Sequence[str]) -> dict:
     return table
 
 
-def _supports(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
+def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
+    """The supports that a site names; by default those of boundaries with the names of `DEFAULT_SUPPORTS`. Collective."""
     names = bridge.names_of(facet_tags)
     given = table.get("supports") or {name: kind for name, kind in DEFAULT_SUPPORTS.items() if name in names}
     if not given:

@@ -82,13 +82,14 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     if size is not None:
         constants["cell_size"] = size
     domain, cell_tags, facet_tags = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
-    soils = {name: _soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
-    boundary = [_condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
+    soils = {name: porous_soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
+    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
     varies = any(isinstance(getattr(c, key, None), tuple) for c in boundary for key in ("level", "rate"))
     return WaterSite(domain, cell_tags, facet_tags, soils, boundary, varies)
 
 
-def _soil(given: dict, where: str) -> water.PorousSoil:
+def porous_soil(given: dict, where: str) -> water.PorousSoil:
+    """The soil that a table describes; where: it stands, for messages."""
     for key in given:
         if key not in SOIL_KEYS:
             raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(SOIL_KEYS)}")
@@ -106,7 +107,8 @@ def _soil(given: dict, where: str) -> water.PorousSoil:
         raise mpm.InputError(f"{where}: {error}") from None
 
 
-def _condition(name: str, given: dict, where: str) -> Any:
+def condition(name: str, given: dict, where: str) -> Any:
+    """The boundary condition that the table of a boundary describes."""
     if given == {"seepage_face": True}:
         return water.SeepageFace(name)
     if len(given) != 1 or next(iter(given)) not in CONDITIONS:

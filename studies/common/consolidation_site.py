@@ -1,0 +1,125 @@
+"""A site of consolidation as a TOML file: mesh, soils with law and conductivity, supports, water, and pressures in time.
+
+`meshes/fill.toml` is an example. Its keys are those of the sites of seepage, and besides them
+
+    [soils.clay]                       # a physical group: conductivity and porosity, and
+    unit_weight = 17e3                 # N/m3, saturated
+    material = "mohr-coulomb"          # of effective stresses, and the parameters of the law, named as the options of the study slope
+
+    [supports]                         # as for sites of stages
+    [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]
+    [points]                           # name = [x, y]: places whose settlements are followed
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+from fenics_bridge.water.boundary import value_at
+
+from .site_file import law_at, read_toml, supports_of
+from .water_site import DAY, condition, porous_soil
+
+KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points")
+POROUS = ("conductivity", "porosity")
+
+
+@dataclass
+class ConsolidationSite:
+    """A site of consolidation as its file describes it, on its mesh.
+
+    mesh: domain, cell tags and facet tags; laws, soils, unit_weight: by name of the soil; pressures: numbers or tables in s
+    """
+
+    mesh: tuple
+    laws: dict[str, Any]
+    soils: dict[str, water.PorousSoil]
+    unit_weight: dict[str, float]
+    supports: list[bridge.Support]
+    boundary: list
+    pressures: dict[str, Any]
+    points: dict[str, np.ndarray]
+
+    def load(self, time: float) -> bridge.Load:
+        """Weights and pressures at a time [s]."""
+        return bridge.Load(self.unit_weight, {tag: value_at(given, time) for tag, given in self.pressures.items()})
+
+    def at_rest(self, element: water.Element) -> water.Consolidation:
+        """The ground at the beginning: in equilibrium under its weight, the pressures at time 0 and the steady flow. Collective.
+
+        Raises:
+            RunError: it cannot carry them.
+        """
+        domain, cell_tags, facet_tags = self.mesh
+        flow = water.Seepage(domain, self.soils, facet_tags, self.boundary, cell_tags=cell_tags)
+        flow.solve()
+        fem = bridge.QuasiStatic(
+            domain, self.laws, facet_tags, self.supports, element.value, cell_tags=cell_tags, options_prefix="rest_"
+        )
+        fem.reconfigure(pore_pressure=flow.pore_pressure())
+        fem.solve(self.load(0.0))
+        if not fem.converged:
+            raise mpm.RunError("the ground does not carry its weight and the pressures at the beginning")
+        model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
+                                    element=element, cell_tags=cell_tags)  # fmt: skip
+        model.initialise(fem, flow)
+        return model
+
+
+def read_consolidation_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> ConsolidationSite:
+    """Read a site of consolidation and make its mesh. Collective.
+
+    Args:
+        path: of the TOML file.
+        cell_size: [m], instead of the one in the file; for meshes with that constant.
+
+    Raises:
+        InputError: on all ranks, with the file, the key and what was expected.
+    """
+    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries", "points"))
+    constants = dict(table.get("constants", {}))
+    size = table.get("cell_size") if cell_size is None else cell_size
+    if size is not None:
+        constants["cell_size"] = size
+    mesh = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    laws, soils, weights = {}, {}, {}
+    for name, given in table["soils"].items():
+        where = f"{path}: soils.{name}"
+        if "unit_weight" not in given:
+            raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
+        weights[name] = float(given["unit_weight"])
+        soils[name] = porous_soil({key: given[key] for key in POROUS if key in given}, where)
+        laws[name] = law_at({k: v for k, v in given.items() if k not in (*POROUS, "unit_weight")}, 0.0, where)
+    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
+    pressures = {
+        name: _pressure(given, f"{path}: pressures.{name}") for name, given in table.get("pressures", {}).items()
+    }
+    points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
+    supports = supports_of(table, path, mesh[0], mesh[2])
+    return ConsolidationSite(mesh, laws, soils, weights, supports, boundary, pressures, points)
+
+
+def _pressure(given: Any, where: str) -> Any:
+    rows = given if isinstance(given, list) else [[0.0, given]]
+    try:
+        table = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        table = np.empty(0)
+    if table.ndim != 2 or table.shape[1] != 2 or not np.all(np.isfinite(table)) or np.any(np.diff(table[:, 0]) <= 0):
+        raise mpm.InputError(f"{where}: is {given!r}, expected a number or rows [days, Pa] of rising days")
+    return tuple((DAY * day, value) for day, value in table)
+
+
+def _point(given: Any, where: str) -> np.ndarray:
+    point = np.array(given, dtype=float) if isinstance(given, list) and len(given) == 2 else np.empty(0)
+    if point.shape != (2,):
+        raise mpm.InputError(f"{where}: is {given!r}, expected [x, y] in m")
+    return point
