@@ -1,5 +1,7 @@
 """Consolidation by coupled finite elements against closed forms, its balance of water, and pressures that do not oscillate."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from consolidation_cases import (
@@ -10,8 +12,14 @@ from consolidation_cases import (
     layer_excess,
     layer_settled,
 )
+from mpi4py import MPI
 
+import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge import water
+
+
+MESHES = Path(__file__).resolve().parents[2] / "meshes"
 
 
 # --- a layer under a load (Terzaghi) ---------------------------------------------------------------------------------
@@ -58,6 +66,35 @@ def test_stabilised_elements_do_not_overshoot_in_the_first_step(dim, ratio):
     column.model.advance(ratio * column.period / 12**2)
     assert column.nodal_excess().max() <= 1 + 1e-6
     assert column.nodal_excess().min() >= -1e-6
+
+
+RECTANGLE = """Point(1) = {0, 0, 0, 0.1}; Point(2) = {0.5, 0, 0, 0.1}; Point(3) = {0.5, 1, 0, 0.1}; Point(4) = {0, 1, 0, 0.1};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1};
+Physical Surface("soil") = {1};
+Physical Curve("base") = {1};
+Physical Curve("sides_x") = {2, 4};
+Physical Curve("top") = {3};
+"""
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-2, 0.2, 1.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nor_do_they_on_unstructured_meshes(dim, ratio, tmp_path):
+    (tmp_path / "rectangle.geo").write_text(RECTANGLE)
+    path, size = (tmp_path / "rectangle.geo", 0.1) if dim == 2 else (MESHES / "column.geo", 0.2)
+    domain, _, facet_tags = bridge.read_mesh(path, MPI.COMM_WORLD, dim, {"cell_size": size} if dim == 3 else None)
+    axes = np.eye(dim)
+    supports = [bridge.fixed("base"), bridge.roller("sides_x", axes[0])]
+    supports += [bridge.roller("sides_y", axes[1])] if dim == 3 else []
+    soil = mpm.LinearElastic(young=10e6, poisson=0.3)
+    mobility, weight, load = 1e-12, 1e-3, 10e3  # of water with next to no weight
+    model = water.Consolidation(
+        domain, soil, water.PorousSoil(mobility * weight), facet_tags, supports, [water.Head("top", 1.0)], unit_weight=weight,
+        load=bridge.Load(pressure={"top": load}), element=water.Element.STABILISED, water_modulus=np.inf,
+    )  # fmt: skip
+    model.advance(ratio * size**2 / (mobility * soil.p_wave_modulus))
+    assert model.pressure.x.array.max() < 1.02 * load
+    assert model.pressure.x.array.min() > -0.02 * load
 
 
 def test_elements_of_equal_order_overshoot_without_the_projection(monkeypatch):

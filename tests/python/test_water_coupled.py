@@ -1,5 +1,7 @@
 """Coupled finite elements of plastic soil: the undrained limit, Newton's method, states to begin with, what is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from consolidation_cases import BASE, ELEMENTS, GRAVITY_OF_WATER, LEFT, RIGHT, TOP, Column
@@ -11,6 +13,7 @@ from fenics_bridge import water
 from mpm_core import InputError
 
 comm = MPI.COMM_WORLD
+MESHES = Path(__file__).resolve().parents[2] / "meshes"
 CLAY = {"cohesion": 10e3, "friction_angle": 0.0, "dilation_angle": 0.0}
 
 
@@ -58,6 +61,25 @@ def test_undrained_biaxial_compression_fails_at_twice_the_cohesion(element):
     reports = model.run(1.0, 0.1, growth=1.0)
     assert reports[-1].converged
     assert model.reaction(TOP)[1] == pytest.approx(2.0 * 2 * CLAY["cohesion"], rel=1e-6)
+
+
+def test_a_strip_footing_on_clay_that_hardly_drains_carries_prandtls_load():
+    # q = (2 + pi) c at the limit, reached from above by finite elements; a footing that comes down by 4 % of its half-width.
+    parameters = {"width": 4.0, "depth": 2.0, "edge_size": 0.03, "near_size": 0.12, "far_size": 0.6}
+    domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", comm, parameters=parameters)
+    supports = [bridge.roller("axis", (1, 0)), bridge.roller("far", (1, 0)), bridge.fixed("base"),
+                bridge.prescribed("footing", (0.0, -0.02))]  # fmt: skip
+    soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, **CLAY)
+    model = water.Consolidation(domain, soil, water.PorousSoil(1e-17), facet_tags, supports, [water.Head("surface", 0.0)],
+                                unit_weight=1e-3, water_modulus=np.inf)  # fmt: skip
+    model.load = lambda time: bridge.Load(displacement=time)
+    pressures = []
+    for time in (0.8, 1.0):
+        assert model.run(time, 0.05, growth=1.3)[-1].converged
+        pressures.append(model.reaction("footing")[1] / 0.5)
+    limit = (2 + np.pi) * CLAY["cohesion"]
+    assert limit < pressures[1] < 1.06 * limit
+    assert pressures[1] - pressures[0] < 2e-3 * limit  # it has come to a limit
 
 
 # --- Newton's method and the balance ---------------------------------------------------------------------------------
