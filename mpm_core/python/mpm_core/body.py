@@ -13,6 +13,7 @@ from . import _core, partition
 from ._core import Geometry, InputError
 from .checks import positive
 from .collective import collectively
+from .conditions import Conditions
 from .mesh import Mesh, Tag, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
@@ -40,7 +41,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body:
+class Body(Conditions):
     """The part of a model that does not know how it is run; see `Model`."""
 
     def __init__(
@@ -57,6 +58,7 @@ class Body:
                 f"mesh is a {kind}, expected an mpm_core.Mesh; fenics_bridge.background_mesh(domain, cell_tags, facet_tags) makes "
                 "one of a mesh of DOLFINx"
             )
+        super().__init__()
         self.mesh = mesh
         self.comm: MPI.Comm = mesh.comm
         self.laws = list(laws) if isinstance(laws, (list, tuple)) else [laws]
@@ -71,9 +73,7 @@ class Body:
         suffix = {Geometry.PLANE_STRAIN: "2", Geometry.AXISYMMETRIC: "Axisymmetric", Geometry.SOLID: "3"}[self.geometry]
         self._core = getattr(_core, f"Model{suffix}")(mesh._core, self.laws, fields, MPI._addressof(self.comm))
         self._velocity_fields = fields or [0] * len(self.laws)
-        self._conditions: list[tuple[int, bool, list[float]]] = []
         self._space_watch: SpaceWatch | None = None
-        self._prescribed: dict[int, tuple[int, bool, list[float]]] = {}
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run
@@ -378,70 +378,3 @@ class Body:
         if self.comm.size > 1:
             partition.cut_anew(self)
         return self.imbalance()
-
-    # --- supports and loads --------------------------------------------------------------------------------------
-
-    def _set_supports(self, conditions: list[tuple[int, bool, list[float]]]) -> None:
-        collectively(self.comm, lambda: self._core.set_supports(conditions))
-        self._conditions = conditions
-
-    def _support(
-        self, facet_tag: Tag, whole: bool, vector: ArrayLike, name: str, *, replaced: Sequence[Any] = ()
-    ) -> list[tuple[int, bool, list[float]]]:
-        def checked() -> list[tuple[int, bool, list[float]]]:
-            components = [float(x) for x in floats(name, vector, (self.mesh.dim,))]
-            return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
-
-        new = collectively(self.comm, checked)
-        kept = [condition for condition in self._conditions if not any(condition is old for old in replaced)]
-        self._set_supports([*kept, *new])
-        return new
-
-    def fix(self, facet_tag: Tag) -> None:
-        """Hold the nodes on facets with this tag, given by number or name as in all that follow."""
-        self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
-
-    def roller(self, facet_tag: Tag, normal: ArrayLike) -> None:
-        """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
-        self._support(facet_tag, False, normal, "normal")
-
-    def prescribe(self, facet_tag: Tag, velocity: ArrayLike) -> None:
-        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
-        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
-        before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
-        conditions = self._support(tags, True, velocity, "velocity", replaced=before)
-        self._prescribed.update({condition[0]: condition for condition in conditions})
-
-    def release(self, facet_tag: Tag) -> None:
-        """Take away whatever holds the nodes on facets with this tag.
-
-        Raises:
-            InputError: nothing holds them.
-        """
-
-        def remaining() -> list[tuple[int, bool, list[float]]]:
-            tags = self.mesh.tags_of("facet", facet_tag)
-            for tag in tags:
-                if tag not in {condition[0] for condition in self._conditions}:
-                    raise InputError(f"facet_tag {facet_tag!r} is not supported")
-            return [condition for condition in self._conditions if condition[0] not in tags]
-
-        self._set_supports(collectively(self.comm, remaining))
-        kept = {condition[0] for condition in self._conditions}
-        self._prescribed = {tag: condition for tag, condition in self._prescribed.items() if tag in kept}
-
-    def outflow(self, facet_tag: Tag) -> None:
-        """Let particles leave the mesh through facets with this tag; they are counted in the report."""
-        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
-        self._core.outflow_tags = [*self._core.outflow_tags, *tags]
-
-    @property
-    def gravity(self) -> NDArray[np.float64]:
-        """Gravity [m/s2], shape (D,), as it is after any ramp. Not collective."""
-        return np.array(self._core.gravity)
-
-    def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
-        """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
-        components = floats("gravity", gravity, (self.mesh.dim,)).tolist()
-        self._core.gravity_ramp = positive("ramp", ramp, "s", zero=True)
-        self._core.gravity = components

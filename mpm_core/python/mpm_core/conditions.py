@@ -1,0 +1,95 @@
+"""Boundary conditions and gravity of a body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import InputError
+from .checks import positive
+from .collective import collectively
+from .mesh import Mesh, Tag, floats
+
+Condition: TypeAlias = tuple[int, bool, list[float]]
+"""Facet tag; whether the whole velocity is prescribed or only its part along a normal; that velocity or normal"""
+
+
+class Conditions:
+    """The part of a body that knows how its boundary is held and which gravity acts; see `Model`."""
+
+    mesh: Mesh
+    comm: MPI.Comm
+    _core: Any
+
+    def __init__(self) -> None:
+        self._conditions: list[Condition] = []
+        self._prescribed: dict[int, Condition] = {}
+
+    def _set_supports(self, conditions: list[Condition]) -> None:
+        collectively(self.comm, lambda: self._core.set_supports(conditions))
+        self._conditions = conditions
+
+    def _support(
+        self, facet_tag: Tag, whole: bool, vector: ArrayLike, name: str, *, replaced: Sequence[Any] = ()
+    ) -> list[Condition]:
+        def checked() -> list[Condition]:
+            components = [float(x) for x in floats(name, vector, (self.mesh.dim,))]
+            return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
+
+        new = collectively(self.comm, checked)
+        kept = [condition for condition in self._conditions if not any(condition is old for old in replaced)]
+        self._set_supports([*kept, *new])
+        return new
+
+    def fix(self, facet_tag: Tag) -> None:
+        """Hold the nodes on facets with this tag, given by number or name as in all that follow."""
+        self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
+
+    def roller(self, facet_tag: Tag, normal: ArrayLike) -> None:
+        """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
+        self._support(facet_tag, False, normal, "normal")
+
+    def prescribe(self, facet_tag: Tag, velocity: ArrayLike) -> None:
+        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
+        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
+        before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
+        conditions = self._support(tags, True, velocity, "velocity", replaced=before)
+        self._prescribed.update({condition[0]: condition for condition in conditions})
+
+    def release(self, facet_tag: Tag) -> None:
+        """Take away whatever holds the nodes on facets with this tag.
+
+        Raises:
+            InputError: nothing holds them.
+        """
+
+        def remaining() -> list[Condition]:
+            tags = self.mesh.tags_of("facet", facet_tag)
+            for tag in tags:
+                if tag not in {condition[0] for condition in self._conditions}:
+                    raise InputError(f"facet_tag {facet_tag!r} is not supported")
+            return [condition for condition in self._conditions if condition[0] not in tags]
+
+        self._set_supports(collectively(self.comm, remaining))
+        kept = {condition[0] for condition in self._conditions}
+        self._prescribed = {tag: condition for tag, condition in self._prescribed.items() if tag in kept}
+
+    def outflow(self, facet_tag: Tag) -> None:
+        """Let particles leave the mesh through facets with this tag; they are counted in the report."""
+        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
+        self._core.outflow_tags = [*self._core.outflow_tags, *tags]
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Gravity [m/s2], shape (D,), as it is after any ramp. Not collective."""
+        return np.array(self._core.gravity)
+
+    def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
+        """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
+        components = floats("gravity", gravity, (self.mesh.dim,)).tolist()
+        self._core.gravity_ramp = positive("ramp", ramp, "s", zero=True)
+        self._core.gravity = components
