@@ -1,11 +1,14 @@
-"""The layout of the core: which folder may include which, and that the compiled module is the one imported."""
+"""The layout: which folder of the core may include which, that Python modules import in no circle, which core is imported."""
 
+import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-CORE = Path(__file__).parents[2] / "mpm_core"
+ROOT = Path(__file__).parents[2]
+CORE = ROOT / "mpm_core"
 
 # The folders of the core from the lowest floor up, and what each may include besides itself; an include points down, never up.
 BELOW_STEPS = {"base", "mesh", "materials", "particles", "parallel", "transfer"}
@@ -59,6 +62,37 @@ def test_includes_of_the_core_name_their_floor(floor):
 def test_only_io_includes_hdf5():
     users = {floor for floor in MAY_SEE for source in sources(floor) if any("hdf5" in n for n in includes(source))}
     assert users <= {"io"}
+
+
+def imported(module, path, modules):
+    """Modules of a package that one of its modules imports when it runs, not only for its types."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for branch in [n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]:
+        branch.body = []
+    here = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (one.name for one in node.names if one.name in modules)
+        elif isinstance(node, ast.ImportFrom):
+            above = ".".join(here.split(".")[: len(here.split(".")) - node.level + 1])
+            base = ".".join(filter(None, [above if node.level else "", node.module]))
+            for one in node.names:
+                if f"{base}.{one.name}" in modules:
+                    yield f"{base}.{one.name}"
+                elif base in modules and one.name != "_core":
+                    yield base
+
+
+@pytest.mark.parametrize("package", ["mpm_core/python/mpm_core", "fenics_bridge", "studies/common", "talus"])
+def test_python_modules_import_in_no_circle(package):
+    folder = ROOT / package
+    modules = {}
+    for path in folder.rglob("*.py"):
+        parts = path.relative_to(folder.parent).with_suffix("").parts
+        modules[".".join(parts[:-1] if path.name == "__init__.py" else parts)] = path
+    graph = {name: set(imported(name, path, modules)) - {name} for name, path in modules.items()}
+    assert sum(map(len, graph.values())) >= len(graph) - 1  # the imports were found
+    list(TopologicalSorter(graph).static_order())  # CycleError names a circle
 
 
 def test_the_compiled_module_is_imported():
