@@ -1,4 +1,7 @@
-"""Starting a study on one rank or on several, so that signals end it cleanly."""
+"""Starting a study on one rank or on several, so that signals end it cleanly.
+
+``python -m talus.launch RANKS COMMAND ...`` runs any command on so many ranks.
+"""
 
 from __future__ import annotations
 
@@ -80,3 +83,10 @@ def _watched(command: list[str], variables: dict[str, str]) -> int:
             signal.signal(number, hand_on)
     code = child.wait()
     return code if code >= 0 else 128 - code
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(_watched([*launcher(int(sys.argv[1])), *sys.argv[2:]], dict(os.environ)))
+    except FileNotFoundError as error:
+        sys.exit(f"talus: {error}")

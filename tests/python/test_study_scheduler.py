@@ -77,8 +77,8 @@ def test_a_signal_in_advance_ends_in_a_checkpoint(tmp_path, whom, number):
 def test_the_end_of_studies_run_by_sigkill_leaves_no_ranks_behind(tmp_path):
     batch = job(tmp_path)
     everything = processes(batch.pid)
-    (shell,) = (p for p in everything if b"studies/run\0--ranks" in Path(f"/proc/{p}/cmdline").read_bytes())
-    os.kill(shell, signal.SIGKILL)
+    (launcher,) = (p for p in everything if b"-m\0talus.launch" in Path(f"/proc/{p}/cmdline").read_bytes())
+    os.kill(launcher, signal.SIGKILL)
     deadline = time.monotonic() + 30
     while any(Path(f"/proc/{p}").exists() for p in everything - {batch.pid}) and time.monotonic() < deadline:
         time.sleep(0.1)
