@@ -130,10 +130,7 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
     axisymmetric = table.get("axisymmetric", False)
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
-    constants = {**table.get("constants", {}), **({"cell_size": table["cell_size"]} if "cell_size" in table else {})}
-    if cell_size is not None:
-        constants["cell_size"] = cell_size
-    domain, cell_tags, facet_tags = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     soils, laws, weights = table["soils"], {}, {}
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
@@ -154,6 +151,13 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
                 list(others.values()), axisymmetric)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
     return site
+
+
+def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
+    """The mesh that the table of a site's file names, cell tags and facet tags; `cell_size` [m] instead of the one there."""
+    size = table.get("cell_size") if cell_size is None else cell_size
+    constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
+    return bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
 
 
 def cell_size_of(path: Path) -> float | None:

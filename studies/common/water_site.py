@@ -28,7 +28,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
 
-from .site_file import read_toml
+from .site_file import read_toml, site_mesh
 
 DAY = 86400.0
 MM_PER_DAY = 1e-3 / DAY
@@ -77,11 +77,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
         InputError: on all ranks, with the file, the key and what was expected.
     """
     table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries"))
-    constants = dict(table.get("constants", {}))
-    size = table.get("cell_size") if cell_size is None else cell_size
-    if size is not None:
-        constants["cell_size"] = size
-    domain, cell_tags, facet_tags = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     soils = {name: porous_soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
     boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
     varies = any(isinstance(getattr(c, key, None), tuple) for c in boundary for key in ("level", "rate"))
