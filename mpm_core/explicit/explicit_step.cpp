@@ -134,7 +134,10 @@ template <class G>
 void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
   for (VelocityField<G>& field : model.fields)
+  {
     field.integration.kind = options.integration;
+    field.integration.averaged = options.mixed_discretisation;
+  }
   model.last.dt = dt;
   switch (options.stress_update)
   {

@@ -35,6 +35,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.time = model.time;
   step.length = dt;
   field.integration.kind = options.integration;
+  field.integration.averaged = options.average_stress;
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   if (options.quasi_static)
@@ -151,8 +152,6 @@ void map_to_nodes_again(Model<G>& model, const ImplicitStep<G>& step)
   const bool shrinks = std::exchange(field.part_shrinks, false);
   map_to_nodes(model);
   field.part_shrinks = shrinks;
-  for (std::size_t i = 0; step.options.average_stress && i < step.forces.size(); ++i)
-    field.nodes[i].internal = step.forces[i].internal;
 }
 } // namespace
 

@@ -63,7 +63,7 @@ TrialStrain<D> cell_strain(const Mesh<D>& mesh, const VelocityField<G>& field, c
     add_hoop(strain, hoop);
   }
   if (step.options.mixed_discretisation)
-    set_volumetric<G>(strain, mean_volumetric_strain<D>(mesh.cells[cell], field.volumetric_strain));
+    set_volumetric<G>(strain, mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain));
   if (step.options.hold_positions)
   {
     make_small<D>(strain);

@@ -12,7 +12,8 @@ namespace
 template <class G, int D = G::dim>
 void find_whole_cells(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
-  auto& [kind, fills, whole, dual_cells, dual_nodes, mean_gradients] = field.integration;
+  auto& fills = field.integration.fills;
+  auto& whole = field.integration.whole;
   const auto fill = [&](Index c) // its particles' volume, its own
   {
     return std::array<double, 2>{field.moments[c].volume, cell_volume<G>(mesh.shapes[c])};
@@ -52,10 +53,9 @@ void gather_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Part
   sum_shared(exchange, integration.dual_nodes);
 }
 
-/// Internal forces (14) of what the cells integrate: a function of a filled cell, volume times mean stress where it is
-/// full, the sum over its particles where it is not.
-template <class G, class Stress, int D = G::dim>
-void replace_internal_forces(const Mesh<D>& mesh, const Stress& full_stress, VelocityField<G>& field)
+/// Internal forces (14) of what the cells integrate.
+template <class G, int D = G::dim>
+void replace_internal_forces(const Mesh<D>& mesh, VelocityField<G>& field)
 {
   for (NodeSums<D>& node : field.nodes)
     node.internal = {};
@@ -63,9 +63,7 @@ void replace_internal_forces(const Mesh<D>& mesh, const Stress& full_stress, Vel
   {
     if (field.moments[c].mass == 0)
       continue;
-    Working<G> stress = field.moments[c].stress;
-    if (field.integration.whole[c])
-      stress = full_stress(c);
+    const Working<G> stress = integrated_stress(mesh, field, c);
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D> force = internal_force<G>(stress, mesh.shapes[c], k);
@@ -82,15 +80,37 @@ Working<G> scaled_stress(Working<G> stress, double factor)
     component *= factor;
   return stress;
 }
+
+/// The mean stress of a full cell by dual domains.
+template <int D>
+std::array<double, n_symmetric<D>> dual_stress(const Mesh<D>& mesh, const CellIntegration<D>& integration, Index cell)
+{
+  std::array<const DualStress<D>*, D + 1> nodes;
+  for (int k = 0; k <= D; ++k)
+    nodes[k] = &integration.dual_nodes[mesh.cells[cell][k]];
+  return dual_mean<D>(integration.dual_cells[cell], nodes);
+}
 } // namespace
+
+template <class G, int D>
+Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  const CellIntegration<D>& integration = field.integration;
+  const Working<G>& sum = field.moments[cell].stress;
+  if (integration.kind == Integration::particles || !integration.whole[cell])
+    return sum;
+  const double volume = cell_volume<G>(mesh.shapes[cell]);
+  if constexpr (!G::has_hoop)
+    if (integration.kind == Integration::dual_domain)
+      return scaled_stress<G>(dual_stress<D>(mesh, integration, cell), volume);
+  return scaled_stress<G>(sum, volume / field.moments[cell].volume);
+}
 
 template <class G, int D>
 void integrate_mixed(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
   find_whole_cells(mesh, exchange, field);
-  const auto of_mean = [&](Index c)
-  { return scaled_stress<G>(field.moments[c].stress, cell_volume<G>(mesh.shapes[c]) / field.moments[c].volume); };
-  replace_internal_forces(mesh, of_mean, field);
+  replace_internal_forces(mesh, field);
 }
 
 template <class G, int D>
@@ -99,14 +119,7 @@ void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const P
 {
   find_whole_cells(mesh, exchange, field);
   gather_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
-  const auto of_dual_mean = [&](Index c)
-  {
-    std::array<const DualStress<D>*, D + 1> nodes;
-    for (int k = 0; k <= D; ++k)
-      nodes[k] = &field.integration.dual_nodes[mesh.cells[c][k]];
-    return scaled_stress<G>(dual_mean<D>(field.integration.dual_cells[c], nodes), cell_volume<G>(mesh.shapes[c]));
-  };
-  replace_internal_forces(mesh, of_dual_mean, field);
+  replace_internal_forces(mesh, field);
 }
 
 template <class G, int D>
@@ -157,6 +170,7 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template Working<G> integrated_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                          \
   template void integrate_mixed(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                                \
   template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \
   template Matrix<G::dim> dual_gradient(const Mesh<G::dim>&, const VelocityField<G>&, const Vector<G::dim>&, Index);

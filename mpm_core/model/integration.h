@@ -24,6 +24,12 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
+/// What a cell integrates [N m]: the mean stress over its volume where it is full, the sum over its particles where it
+/// is not, and in all cells when they are left to their particles.
+/// @pre the internal forces of this step have been integrated: the full cells are known
+template <class G, int D = G::dim>
+Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell);
+
 /// Puts the internal force of mixed integration in the place of the particles' sum, on this rank: a full cell
 /// integrates the mean stress of its particles over its volume.
 /// @post field.integration.whole tells which cells are full

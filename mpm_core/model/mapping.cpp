@@ -39,6 +39,8 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if constexpr (!G::has_hoop)
     if (field.integration.kind == Integration::dual_domain)
       integrate_dual_domains(mesh, exchange, particles, runs, field);
+  if (field.integration.averaged)
+    average_forces(mesh, exchange, field);
 }
 
 template <class G>
@@ -73,7 +75,7 @@ void find_velocity_change(VelocityField<G>& field, double pic_share, double dt)
 template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
 {
-  const auto of_cell = [&](Index c) -> VolumetricStrain
+  const auto of_cell = [&](Index c) -> VolumeMean
   {
     double divergence = 0;
     for (int k = 0; k <= D; ++k)
@@ -85,34 +87,66 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
     }
     return {dt * divergence, integrated_volume(mesh, field, c)};
   };
-  average_volumetric_strain(mesh, field.part, of_cell, exchange, field.volumetric_strain);
+  average_over_nodes(mesh, field.part, of_cell, exchange, field.volumetric_strain);
+}
+
+namespace
+{
+/// Sum of the mean of the normal components of a stress times volume.
+template <class G>
+double mean_of(const Working<G>& stress)
+{
+  double sum = 0;
+  for (int k : normal_component<G>)
+    sum += stress[k];
+  return sum / G::n_normal;
+}
+
+/// The cells' change of mean stress times volume when it is averaged over nodes, handed to `take` cell by cell.
+template <class G, class StressOf, class Take>
+void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                         StressOf&& stress_of, std::span<VolumeMean> nodes, Take&& take)
+{
+  const auto of_cell = [&](Index c) -> VolumeMean
+  {
+    const double volume = integrated_volume(mesh, field, c);
+    return {volume > 0 ? mean_of<G>(stress_of(c)) / volume : 0, volume};
+  };
+  average_over_nodes<G::dim>(mesh, field.part, of_cell, exchange, nodes);
+  for (Index c : field.part.cells)
+    take(c, integrated_volume(mesh, field, c) * mean_of_nodes<G::dim>(mesh.cells[c], nodes) - mean_of<G>(stress_of(c)));
+}
+} // namespace
+
+template <class G, int D>
+void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
+                      std::span<Working<G>> stress)
+{
+  const auto stress_of = [&](Index c) -> const Working<G>& { return stress[c]; };
+  average_mean_stress<G>(mesh, exchange, field, stress_of, field.mean_stress,
+                         [&](Index c, double change)
+                         {
+                           for (int k : normal_component<G>)
+                             stress[c][k] += change;
+                         });
 }
 
 template <class G, int D>
-void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
-                      std::span<Working<G>> stress)
+void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
-  const auto mean = [&](Index c)
-  {
-    double sum = 0;
-    for (int k : normal_component<G>)
-      sum += stress[c][k];
-    return sum / G::n_normal;
-  };
-  const auto of_cell = [&](Index c) -> VolumetricStrain
-  {
-    const double volume = integrated_volume(mesh, field, c);
-    return {volume > 0 ? mean(c) / volume : 0, volume};
-  };
-  std::vector<VolumetricStrain> nodes(mesh.points.size());
-  average_volumetric_strain<D>(mesh, field.part, of_cell, exchange, nodes);
-  for (Index c : field.part.cells)
-  {
-    const double average = mean_volumetric_strain<D>(mesh.cells[c], nodes);
-    const double change = integrated_volume(mesh, field, c) * average - mean(c);
-    for (int k : normal_component<G>)
-      stress[c][k] += change;
-  }
+  const auto stress_of = [&](Index c) { return integrated_stress(mesh, field, c); };
+  average_mean_stress<G>(mesh, exchange, field, stress_of, field.mean_stress,
+                         [&](Index c, double change)
+                         {
+                           for (int k = 0; k <= D; ++k)
+                           {
+                             Vector<D>& force = field.nodes[mesh.cells[c][k]].internal;
+                             for (int a = 0; a < D; ++a)
+                               force[a] += change * mesh.shapes[c].gradient[k][a];
+                             if constexpr (G::has_hoop)
+                               force[0] += change * hoop_gradient<G>(mesh.shapes[c]);
+                           }
+                         });
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -122,7 +156,8 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const Velocit
   template void find_start_velocity(VelocityField<G>&);                                                                \
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
   template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \
-  template void average_stresses(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, std::span<Working<G>>);
+  template void average_stresses(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, std::span<Working<G>>);        \
+  template void average_forces(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -45,8 +45,13 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
 /// @param stress  of each owned cell [N m]
 /// @note Collective
 template <class G, int D = G::dim>
-void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
+
+/// The same for the internal forces of a field on this rank: adds what the averaged mean stresses change.
+/// @note Collective
+template <class G, int D = G::dim>
+void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field);
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
 ///

@@ -30,8 +30,9 @@ template <int D>
 struct CellIntegration
 {
   Integration kind = Integration::particles; ///< of the run under way
-  std::vector<std::array<double, 2>> fills;  ///< per node: volumes of particles and of cells around it
-  std::vector<unsigned char> whole;          ///< per owned cell, at the step's start: 1 where full; not with particles
+  bool averaged = false; ///< mean stresses averaged over nodes, as strains are in a run with nodal mixed discretisation
+  std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it
+  std::vector<unsigned char> whole;         ///< per owned cell, at the step's start: 1 where full; not with particles
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< with dual domains, as are the mean gradients of nodes
   std::vector<MeanGradient<D>> mean_gradients;
 };
@@ -54,11 +55,11 @@ struct VelocityField
   double least_mass = 0; ///< nodes below this mass are not moved [kg]
 
   // How its nodes move
-  std::vector<Support<D>> supports;                ///< its boundary conditions
-  std::vector<Vector<D>> start_velocity;           ///< v_i at the start of the step
-  std::vector<Vector<D>> acceleration;             ///< a_i
-  std::vector<Vector<D>> velocity_change;          ///< of the nodes, as the particles take it
-  std::vector<Vector<D>> velocity;                 ///< v_i that moves and strains the particles
-  std::vector<VolumetricStrain> volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
+  std::vector<Support<D>> supports;                       ///< its boundary conditions
+  std::vector<Vector<D>> start_velocity;                  ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;                    ///< a_i
+  std::vector<Vector<D>> velocity_change;                 ///< of the nodes, as the particles take it
+  std::vector<Vector<D>> velocity;                        ///< v_i that moves and strains the particles
+  std::vector<VolumeMean> mean_stress, volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
 };
 } // namespace mpm

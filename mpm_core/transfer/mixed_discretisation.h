@@ -9,27 +9,27 @@
 
 namespace mpm
 {
-/// Volumetric strain of a cell with its filled volume, or of a node, the average over the cells around it weighted by
-/// theirs, with their sum. Plain doubles, so that shared nodes are summed in one message.
-struct VolumetricStrain
+/// Volumetric strain or mean stress of a cell with its filled volume, or of a node, the mean over the cells around it
+/// weighted by theirs, with their sum. Plain doubles, so that shared nodes are summed in one message.
+struct VolumeMean
 {
   double value;
   double volume; ///< [m^D]
 };
 
-/// Volumetric strains at the nodes of a part of the mesh: averages over the filled cells around each node (method of
-/// Detournay & Dzik 2006; volume weights keep the tangent symmetric).
-/// @param of_cell  strain of a cell and its filled volume, 0 where it is empty; a callable Index -> VolumetricStrain
+/// Means over the filled cells around each node of a part of the mesh (method of Detournay & Dzik 2006; with volume
+/// weights this followed by `mean_of_nodes` is its own transpose).
+/// @param of_cell  value of a cell and its filled volume, 0 where it is empty; a callable Index -> VolumeMean
 /// @note Collective
 template <int D, class OfCell>
-void average_volumetric_strain(const Mesh<D>& mesh, const MeshPart& part, OfCell&& of_cell, NodeExchange& exchange,
-                               std::span<VolumetricStrain> nodes)
+void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, OfCell&& of_cell, NodeExchange& exchange,
+                        std::span<VolumeMean> nodes)
 {
   for (Index node : part.nodes)
     nodes[node] = {};
   for (Index c : part.cells)
   {
-    const VolumetricStrain cell = of_cell(c);
+    const VolumeMean cell = of_cell(c);
     for (Index node : mesh.cells[c])
     {
       nodes[node].value += cell.value * cell.volume;
@@ -42,9 +42,9 @@ void average_volumetric_strain(const Mesh<D>& mesh, const MeshPart& part, OfCell
       nodes[node].value /= nodes[node].volume;
 }
 
-/// Volumetric strain of a cell: the mean of its nodes' values.
+/// The mean of the values of a cell's nodes
 template <int D>
-inline double mean_volumetric_strain(const std::array<Index, D + 1>& cell, std::span<const VolumetricStrain> nodes)
+inline double mean_of_nodes(const std::array<Index, D + 1>& cell, std::span<const VolumeMean> nodes)
 {
   double sum = 0;
   for (Index node : cell)

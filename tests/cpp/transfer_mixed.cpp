@@ -25,12 +25,12 @@ template <int D>
 std::vector<double> averaged(const Mesh<D>& mesh, const std::vector<double>& volume, std::vector<double> theta)
 {
   NodeExchange exchange; // one rank: nothing is shared
-  std::vector<VolumetricStrain> nodes(mesh.points.size());
-  const auto of_cell = [&](Index c) -> VolumetricStrain { return {theta[c], volume[c]}; };
-  average_volumetric_strain(mesh, test::whole(mesh), of_cell, exchange, nodes);
+  std::vector<VolumeMean> nodes(mesh.points.size());
+  const auto of_cell = [&](Index c) -> VolumeMean { return {theta[c], volume[c]}; };
+  average_over_nodes(mesh, test::whole(mesh), of_cell, exchange, nodes);
   for (Index c = 0; c < mesh.n_cells(); ++c)
     if (volume[c] > 0)
-      theta[c] = mean_volumetric_strain<D>(mesh.cells[c], nodes);
+      theta[c] = mean_of_nodes<D>(mesh.cells[c], nodes);
   return theta;
 }
 } // namespace
