@@ -146,7 +146,7 @@ void undo(Model<G>& model, const Particles<G::dim>& start)
 /// soil has just left keep the velocities of this step until the next one.
 /// @note Collective
 template <class G>
-void map_to_nodes_again(Model<G>& model, const ImplicitStep<G>& step)
+void map_to_nodes_again(Model<G>& model)
 {
   VelocityField<G>& field = model.fields.front();
   const bool shrinks = std::exchange(field.part_shrinks, false);
@@ -183,7 +183,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   model.totals.particle_steps += model.particles.size();
   if (options.quasi_static) // without inertia, what the loads do beyond the stresses' work goes nowhere
     start_energy_balance(model);
-  map_to_nodes_again(model, step);
+  map_to_nodes_again(model);
   return true;
 }
 

@@ -161,7 +161,8 @@ class Model(Body):
             damping: local damping alpha, in [0, 1).
             pic: fraction of the particles' own velocities that the grid's takes the place of in a critical time step, in [0, 1]; 0 is
                 FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
-            nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            nmd: average volumetric strains over nodes (nodal mixed discretisation), and mean stresses for the nodal forces by the
+                transpose, so that both do the same work.
             integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             allow_unstable: take ``dt`` even above the critical time step.
