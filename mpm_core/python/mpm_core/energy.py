@@ -51,8 +51,7 @@ class EnergyWatch:
 
 
 _ADVICE = (
-    "particles that cross cells and too long steps do this: docs/energy.md says what each choice of "
-    "scheme costs"
+    "particles that cross cells and too long steps do this: docs/energy.md says what each choice of " "scheme costs"
 )
 
 
