@@ -67,13 +67,20 @@ def test_pictures(implicit):
 
 
 def test_explicit_scheme_comes_to_the_same_rest(implicit, tmp_path):
-    """At the same Poisson ratio and on the same mesh; an explicit run is at rest up to a thousandth of its forces."""
+    """At the same Poisson ratio and on the same mesh; an explicit run is at rest up to a thousandth of its forces.
+
+    With NMD it also averages mean stresses, which moving implicit particles do not: it converges to the same, a little sooner.
+    """
     explicit = run(tmp_path, "--schemes", "explicit", "--meshes", "2", "--reference-mesh", "1")
     for case in ("cook", "footing"):
         for row in (row for row in explicit[case] if row["elements"] != "Taylor-Hood"):
             same = [other["value"] for other in implicit[1][case] if other["elements"] == row["elements"]
                     and (other["divisions"], other["poisson"]) == (row["divisions"], row["poisson"])]  # fmt: skip
-            assert not same or row["value"] == pytest.approx(same[0], rel=5e-3)
+            if same and row["elements"] == "plain":
+                assert row["value"] == pytest.approx(same[0], rel=5e-3)
+            elif same:
+                error = abs(same[0] - row["reference"])
+                assert 0.8 * error < abs(row["value"] - row["reference"]) < 1.005 * error
     assert min(select(explicit["slope"], elements="plain")) > 0.5 > max(select(explicit["slope"], elements="NMD"))
 
 
