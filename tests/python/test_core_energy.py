@@ -146,7 +146,9 @@ def test_the_balance_begins_anew_when_particles_are_changed():
         mpm.tresca(young=200e3, poisson=0.49, shear_strength=1e3),
         mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0, dilation_angle=25.0),
         mpm.Undrained(
-            mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0), water_modulus=2e6, porosity=0.4
+            mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0),
+            water_modulus=2e6,
+            porosity=0.4,
         ),
     ],
     ids=["Tresca", "dilating", "undrained"],
@@ -155,7 +157,9 @@ def test_yielding_soil_with_averaged_strains_keeps_its_energy(law):
     # The nodes' forces do the work of the particles' stresses only if these are averaged by the transpose of what averages the
     # strains. With forces of the stresses as they are, each of these slides gains energy from nothing.
     size, cells = 1.0, 12
-    model = mpm.Model(box([2 * cells, cells], [2 * size, size], diagonals="alternating", body=([0, 0], [0.8, 0.8])), law)
+    model = mpm.Model(
+        box([2 * cells, cells], [2 * size, size], diagonals="alternating", body=([0, 0], [0.8, 0.8])), law
+    )
     model.seed(density=2000.0, per_cell=6, cell_tag=1)
     model.roller(1, normal=(1, 0))
     model.fix(3)
