@@ -125,9 +125,14 @@ def _nodal_pressure(domain, pore_pressure):
 def _seepage_forces(space, p, there, radius):
     """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
 
-    By Gauss' theorem: the integral of p div v over what is there, less that of p n v over its surface.
+    By Gauss' theorem: the integral of p div v over what is there, less that of p n v over its surface. Suction does not pull at
+    the surface, so that its part of the second integral is taken out again.
     """
-    form = -weighted(there * ufl.inner(ufl.grad(p), ufl.TestFunction(space)), radius) * ufl.dx
+    test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(space.mesh), ufl.min_value(p, 0.0)
+    outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels
+    form = -weighted(there * ufl.inner(ufl.grad(p), test), radius) * ufl.dx
+    form += weighted(there * suction * ufl.inner(normal, test), radius) * ufl.ds
+    form += weighted(suction("+") * ufl.inner(outward, test("+")), radius) * ufl.dS
     return assembled(fem.form(form), space).array.copy()
 
 

@@ -7,6 +7,7 @@ from fenics_bridge.water.coupled import Element
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import PorousSoil
+from fenics_bridge.water.standing import standing_water
 
 __all__ = [
     "AlwaysSaturated",
@@ -24,4 +25,5 @@ __all__ = [
     "SeepageFace",
     "Tabulated",
     "VanGenuchten",
+    "standing_water",
 ]

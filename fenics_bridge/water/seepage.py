@@ -2,7 +2,8 @@
 
     d(theta)/dt + div q = 0,    q = -k_r k grad h,    h = p / gamma_w + z
 
-with the water content theta = S (n + (n / K_w + m_v) p). It is discretised by Lagrange elements and backward Euler; the water
+with the water content theta = S (n + n p / K_w + m_v (p - w)), w being the total vertical stress that standing water adds: so
+soil that cannot drain hands a change of that load on to its water (van der Kamp and Gale 1983). It is discretised by Lagrange elements and backward Euler; the water
 content is lumped and its change, not its derivative, is taken over a step, so that water is conserved whatever the step
 (Celia, Bouloutas and Zarba 1990). Seepage faces and rain are a complementarity problem: p is at most zero, outflow at least
 zero, and one of the two is zero. PETSc solves it together with the flow, so that no exit point is guessed.
@@ -39,13 +40,15 @@ class Seepage:
     """
 
     def __init__(self, domain, soil, facet_tags, boundary, cell_tags=None, degree=1, unit_weight=WATER_WEIGHT,
-                 water_modulus=WATER_MODULUS, options_prefix="seepage_"):  # fmt: skip
+                 water_modulus=WATER_MODULUS, options_prefix="seepage_", loading=None):  # fmt: skip
         """
         soil: PorousSoil, or {cell tag or name: PorousSoil}; facet_tags, cell_tags: of DOLFINx
         boundary: list of Head, Reservoir, SeepageFace, Flux and Rain; where none is given the boundary is impervious. Where
             conditions meet at a node, a prescribed head holds before the others.
         degree: of the elements, 1 or 2; unit_weight: of water [N/m3]; water_modulus: bulk modulus of water [Pa]
         options_prefix: of the PETSc options of the solver
+        loading: function of positions (n, D) [m] and time [s] that returns the vertical total stress (n,) [Pa, compression
+            positive] that changes in time, such as `standing_water(...)`; it acts through the compressibility of the soils
         Raises InputError, on all ranks. Collective.
         """
         comm = domain.comm
@@ -59,6 +62,7 @@ class Seepage:
         space = compat.function_space(domain, "Lagrange", degree)
         self.pressure_head = fem.Function(space, name="pressure_head")
         self._old = fem.Function(space)
+        self._loading, self._load, self._old_load = loading, fem.Function(space), fem.Function(space)
         self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         self._dt, self._sharpness = fem.Constant(domain, 1.0), fem.Constant(domain, 1.0)
         self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags)
@@ -67,12 +71,22 @@ class Seepage:
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
         self.boundary = list(boundary)
         self._take_boundary()
+        self._set_load()
         self.iterations = 0
         self._reaction = np.zeros(len(self._applied.height))
 
     def _take_boundary(self):
         if self._applied.take(self.boundary):
             self._steady = self._transient = None
+
+    def _set_load(self):
+        """The loading at the present time."""
+        if self._loading is None:
+            return
+        points = self._load.function_space.tabulate_dof_coordinates()[:, : self._dim]
+        load = np.broadcast_to(np.asarray(self._loading(points, self.time), dtype=float), len(points))
+        agree(self.domain.comm, None if np.all(np.isfinite(load)) else "loading: it gives values that are not finite")
+        self._load.x.array[:] = load
 
     # --- solving -----------------------------------------------------------------------------------------------------
 
@@ -82,6 +96,7 @@ class Seepage:
         missing = "boundary: no head, reservoir, seepage face or rain; without one the steady pressure is undetermined"
         agree(self.domain.comm, None if heads else missing)
         self._take_boundary()
+        self._set_load()
         if self._steady is None:
             self._steady = self._problem(transient=False)
         failure = self._solve(self._steady)
@@ -115,11 +130,13 @@ class Seepage:
         if self._transient is None:
             self._transient = self._problem(transient=True)
         self._dt.value = dt
-        self._old.x.array[:] = self.pressure_head.x.array
+        self._old.x.array[:], self._old_load.x.array[:] = self.pressure_head.x.array, self._load.x.array
         self.time += dt
+        self._set_load()
         failure = self._solve(self._transient)
         if failure:
             self.time -= dt
+            self._load.x.array[:] = self._old_load.x.array
         return not failure
 
     def _solve(self, problem):
@@ -148,9 +165,9 @@ class Seepage:
             form += permeability * ufl.inner(k * (ufl.grad(psi) + self._up), ufl.grad(test)) * flow
             lagged += permeability * ufl.inner(k * ufl.grad(trial), ufl.grad(test)) * flow
             if transient:
-                now, before = (self._water_content(soil, p) for p in (psi, self._old))
-                form += (now - before) / (self._largest * self._dt) * test * self._lumped(dx)
-                slope = ufl.derivative(now, psi, trial)
+                change = self._change_of_water(soil)
+                form += change / (self._largest * self._dt) * test * self._lumped(dx)
+                slope = ufl.derivative(change, psi, trial)
                 lagged += slope / (self._largest * self._dt) * test * self._lumped(dx)
         form -= self._applied.inflow_form(test)
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
@@ -160,10 +177,21 @@ class Seepage:
         rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
         return dx(metadata=rule if self._degree == 1 else {"quadrature_degree": QUADRATURE[self._degree]})
 
-    def _water_content(self, soil, psi):
-        pressure = self.unit_weight * psi
+    def _water_content(self, soil, psi, load):
+        return soil.retention.saturation(-self.unit_weight * psi) * (soil.porosity + self._held(soil, psi, load))
+
+    def _held(self, soil, psi, load):
+        """Water [-] by which saturated soil has more than its porosity."""
         storage = soil.porosity / self.water_modulus + soil.compressibility
-        return soil.retention.saturation(-pressure) * (soil.porosity + storage * pressure)
+        held = storage * self.unit_weight * psi
+        return held if self._loading is None else held - soil.compressibility * load
+
+    def _change_of_water(self, soil):
+        """Change of the water content since the step began; small differences are taken first, for the sake of round-off."""
+        psi, old = self.pressure_head, self._old
+        now, before = (soil.retention.saturation(-self.unit_weight * p) for p in (psi, old))
+        gained = self._held(soil, psi - old, self._load - self._old_load)
+        return now * gained + (now - before) * (soil.porosity + self._held(soil, old, self._old_load))
 
     # --- results -----------------------------------------------------------------------------------------------------
 
@@ -178,7 +206,7 @@ class Seepage:
     def stored_water(self):
         """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
         if self._stored is None:
-            content = [self._water_content(soil, self.pressure_head) for soil in self._soils]
+            content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._soils]
             self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))
         return self.domain.comm.allreduce(fem.assemble_scalar(self._stored))
 

@@ -42,3 +42,20 @@ def test_rain_on_a_slope_does_not_depend_on_the_number_of_ranks():
         inflows.append([1e6 * flow.inflow(tag) for tag in (bridge.LEFT, bridge.SLOPE, bridge.CREST)])
         assert sum(inflows[-1]) == pytest.approx(0.0, abs=1e-9)
     assert inflows[1] == pytest.approx(inflows[0], rel=1e-8)
+
+
+def test_standing_water_loads_the_pores_alike_on_every_number_of_ranks():
+    points, heads = np.array([[1.0, 0.5], [2.5, 0.6], [3.4, 0.1]]), []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        mesh = bridge.slope_mesh(comm, height=2.0, angle=45.0, crest=2.0, cell_size=0.25, kind="fitted")
+        domain, _, facet_tags = bridge.soil_mesh(*mesh)
+        boundary = [water.Reservoir(bridge.SLOPE, ((0.0, 1.8), (1e4, 0.4))), water.Reservoir(bridge.LEFT, 1.8)]
+        standing = water.standing_water(domain, facet_tags, boundary[:1])
+        soil = water.PorousSoil(1e-8, compressibility=1e-7, retention=water.VanGenuchten(1e-4, 2.0))
+        flow = water.Seepage(domain, soil, facet_tags, boundary, loading=standing)
+        flow.solve()
+        for _ in range(4):
+            assert flow.advance(2.5e3)
+        heads.append(bridge.evaluate_at(points, p=flow.pressure_head)["p"][:, 0])
+        heads[-1] = np.append(heads[-1], flow.stored_water())
+    assert heads[1] == pytest.approx(heads[0], rel=1e-8, abs=1e-8)
