@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))  # cases that tests on one rank use too
+PYTHON_TESTS = Path(__file__).parents[1] / "python"
+sys.path[:0] = [str(PYTHON_TESTS / room) for room in (".", "laws", "io")]  # what tests on one rank use too
 
 
 LIMIT = float(os.environ.get("TALUS_TEST_LIMIT", 300))

@@ -1,15 +1,9 @@
 """Meshes cut by hand into parts for several ranks, so that tests choose who owns what."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
+from core_cases import box
 
 import mpm_core as mpm
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
-
-from core_cases import box  # noqa: E402
 
 
 def bands(centres, size):

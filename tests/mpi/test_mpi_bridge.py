@@ -1,20 +1,10 @@
 """The bridge gives the same on 1, 2 and 3 ranks: `mpirun -n N python3 -m pytest tests/mpi`."""
 
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
-from partitions import all_by_id, assert_same
-
-import fenics_bridge as bridge
-import mpm_core as mpm
-from fenics_bridge.mesh.tagged import owned_cells
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
-from axisymmetric_cases import cylinder_fem, cylinder_particles  # noqa: E402
+from axisymmetric_cases import cylinder_fem, cylinder_particles
 from bridge_cases import (
     MESHES,
     POISSON,
@@ -22,10 +12,16 @@ from bridge_cases import (
     YOUNG,
     column,
     column_stress,
-    interior_points,  # noqa: E402
+    interior_points,
     slope_model,
     slope_particles,
 )
+from mpi4py import MPI
+from partitions import all_by_id, assert_same
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.mesh.tagged import owned_cells
 
 COMM = MPI.COMM_WORLD
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]

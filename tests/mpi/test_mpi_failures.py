@@ -1,19 +1,15 @@
 """An error on one rank ends all ranks with its message, in whatever phase of a run; none waits for ever."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mpm_core.output import ParticleOutput
 from partitions import scattered, sliding_slope
+from test_laws_failure import Fragile
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
-
-from test_laws_failure import Fragile  # noqa: E402
 
 
 class Case:

@@ -1,22 +1,17 @@
 """Laws with states of their own on several ranks: the same motion and states whoever owns the cells, in every scheme."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from partitions import all_by_id, assert_same, bands, scattered, sliding_slope
+from test_laws_external import VonMises
+from test_laws_failure import Fragile
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-
-PYTHON_TESTS = Path(__file__).parents[1] / "python"
-sys.path.insert(0, str(PYTHON_TESTS))
-
-from test_laws_external import VonMises  # noqa: E402
-from test_laws_failure import Fragile  # noqa: E402
 
 ELASTIC = {"young": 4e6, "poisson": 0.3}
 SOIL = mpm.MohrCoulomb(**ELASTIC, cohesion=1e3, friction_angle=25.0)
@@ -43,7 +38,7 @@ def umat(comm, tmp_path_factory):
     """The Fortran UMAT, compiled on the first rank."""
     library = comm.bcast(str(tmp_path_factory.mktemp("umat") / "umat_von_mises.so"))
     if comm.rank == 0:
-        source = PYTHON_TESTS / "umat_von_mises.f90"
+        source = Path(__file__).parents[1] / "python" / "umat_von_mises.f90"
         subprocess.run(["gfortran", "-shared", "-fPIC", "-O1", "-o", library, source], check=True)
     comm.barrier()
     return mpm.Umat(library, properties=[4e6, 0.3, 3e3], n_variables=1, plastic_strain_variable=1, p_wave_modulus=6e6)

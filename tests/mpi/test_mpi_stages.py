@@ -1,14 +1,11 @@
 """Stages of construction give the same on 1, 2 and 3 ranks: against sums by hand and a site on one rank."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
-from stage_cases import ROLLERS, SOILS, mesh_of, site_of, weights  # noqa: E402
+from stage_cases import ROLLERS, SOILS, mesh_of, site_of, weights
 
 import fenics_bridge as bridge
 import mpm_core as mpm

@@ -1,0 +1,150 @@
+"""The command ``talus``: it finds studies, begins new ones, runs them, and hands signals on to all ranks."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import tomllib
+
+import mpm_core
+
+ROOT = Path(__file__).parents[3]
+BUILD = Path(mpm_core.__file__).parents[2]
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)]),
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+}
+ENVIRONMENT.pop("TALUS_STUDIES", None)
+SMALL = ["--cell-size", "1", "--time", "0.05", "--frames", "2"]
+
+
+def talus(folder, *words, **more):
+    return subprocess.run([sys.executable, "-m", "talus", *map(str, words)], cwd=folder, capture_output=True, text=True,
+                          timeout=120, env={**ENVIRONMENT, **more})  # fmt: skip
+
+
+@pytest.fixture
+def begun(tmp_path):
+    """A folder with a new study."""
+    assert talus(tmp_path, "new", "mine").returncode == 0
+    return tmp_path
+
+
+def test_all_studies_are_listed_with_their_purpose(tmp_path):
+    listed = talus(tmp_path, "list").stdout.splitlines()
+    names = {line.split()[0] for line in listed}
+    assert {path.stem for path in (ROOT / "studies").glob("*.py")} | {"verification"} == names
+    assert all(len(line.split()) > 3 for line in listed)
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["run"], "no study is named, expected one of these"),
+        (["run", "nosuch"], "there is no study 'nosuch', expected one of these"),
+        (["run", "nosuch.py"], "there is no study 'nosuch.py'"),
+        (["run", "--ranks", "0", "slope"], "--ranks is '0', expected a whole number from 1 on"),
+        (["run", "--ranks"], "--ranks is '', expected a whole number from 1 on"),
+        (["new", "my-slope"], "the name is 'my-slope', expected letters, digits and underscores"),
+        (["new", "slope"], "the name is 'slope', which is that of a study of Talus"),
+        (["completion", "csh"], "invalid choice: 'csh'"),
+        (["sing"], "invalid choice: 'sing'"),
+    ],
+)
+def test_wrong_words_are_named(tmp_path, words, message):
+    done = talus(tmp_path, *words)
+    assert done.returncode == 2 and message in done.stderr and "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_new_study_leaves_what_is_there(begun):
+    (begun / "mine.py").write_text("mine")
+    done = talus(begun, "new", "mine")
+    assert (
+        done.returncode == 2 and "mine.py is there already" in done.stderr and (begun / "mine.py").read_text() == "mine"
+    )
+
+
+def test_a_new_study_runs_as_it_is(begun):
+    done = talus(begun, "run", "mine", *SMALL)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((begun / "results" / "mine" / "summary.json").read_text())
+    assert summary["finished_run"] and 0 < summary["largest_displacement_m"] < 9.81 * 0.05**2
+    assert summary["initial_out_of_balance_ratio"] < 1e-6
+    assert "talus run mine --parameters" in (begun / "results" / "mine" / "parameters.toml").read_text()
+    assert (begun / "results" / "mine" / "report.html").exists() and (
+        begun / "results" / "mine" / "particles.xdmf"
+    ).exists()
+
+
+def test_studies_of_another_folder(begun, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (begun / "notes.py").write_text('"""No study."""')
+    assert " mine " not in talus(elsewhere, "list").stdout
+    listed = talus(elsewhere, "list", TALUS_STUDIES=str(begun)).stdout
+    assert listed.split()[0] == "mine" and "notes" not in listed
+    for name, more in (("mine", {"TALUS_STUDIES": str(begun)}), (begun / "mine.py", {})):
+        helped = talus(elsewhere, "run", name, "--help", **more)
+        assert helped.returncode == 0 and "usage: talus run mine" in helped.stdout
+
+
+def test_ctrl_c_reaches_all_ranks(begun):
+    child = subprocess.Popen([sys.executable, "-m", "talus", "run", "--ranks", "2", "mine", *SMALL, "--time", "1e4", "--frames",
+                              "1000000"], cwd=begun, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)  # fmt: skip
+    rows, deadline = begun / "results" / "mine" / "history.csv", time.monotonic() + 90
+    while (
+        not (rows.exists() and rows.read_text().count("\n") > 2)
+        and time.monotonic() < deadline
+        and child.poll() is None
+    ):
+        time.sleep(0.1)
+    child.send_signal(signal.SIGINT)
+    _, errors = child.communicate(timeout=90)
+    assert child.returncode == 128 + signal.SIGUSR1, errors
+    summary = json.loads((begun / "results" / "mine" / "summary.json").read_text())
+    assert summary["ranks"] == 2 and summary["stopped_because"].startswith("interrupted at")
+
+
+def test_info_names_versions_and_solvers(tmp_path):
+    lines = dict(line.split(":", 1) for line in talus(tmp_path, "info").stdout.splitlines())
+    assert lines["program"].strip() == mpm_core.__version__
+    assert {"dolfinx", "petsc", "gmsh", "linear solvers", "processors", "studies"} <= set(lines)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_the_shell_completes_studies(tmp_path):
+    script = "\n".join([
+        f'talus() {{ {sys.executable} -m talus "$@"; }}', 'source <(talus completion bash)',
+        'COMP_WORDS=(talus run slo) COMP_CWORD=2; _talus; echo "${COMPREPLY[@]}"',
+        'COMP_WORDS=(talus in) COMP_CWORD=1; _talus; echo "${COMPREPLY[@]}"',
+    ])  # fmt: skip
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, env=ENVIRONMENT
+    )
+    assert done.stdout.split() == ["slope", "slope_schemes", "info"], done.stderr
+
+
+def test_the_installed_package_holds_all_that_studies_need(tmp_path):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert project["project"]["scripts"] == {"talus": "talus.command:main"}
+    if shutil.which("cmake") is None or not (BUILD / "cmake_install.cmake").exists():
+        pytest.skip("needs the build folder")
+    subprocess.run(["cmake", "--install", BUILD, "--prefix", tmp_path], check=True, capture_output=True, timeout=60)
+    for package in project["tool"]["scikit-build"]["wheel"]["packages"]:  # which pip adds to what CMake installs
+        shutil.copytree(ROOT / package, tmp_path / Path(package).name, dirs_exist_ok=True)
+    work = tmp_path / "work"
+    work.mkdir()
+    done = talus(work, "run", "element_test", "--steps", "5", PYTHONPATH=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((work / "results" / "element_test" / "summary.json").read_text())
+    assert summary["finished_run"] and summary["versions"]["git_revision"] == "installed"
+    assert (tmp_path / "talus" / "meshes" / "embankment.toml").exists()
+    assert str(tmp_path / "talus" / "studies") in talus(work, "info", PYTHONPATH=str(tmp_path)).stdout

@@ -1,0 +1,186 @@
+"""What holds for every study: its help, the file that repeats a run, and the page of a run."""
+
+import importlib
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import NEEDED, move_slider, open_page, picture, started
+from matplotlib.figure import Figure
+
+STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
+
+SMALL = {
+    "balance": "--cell-size 0.5 --mesh fitted --particles-per-cell 1 --time 0.02 --frames 2",
+    "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
+    "collapse_schemes": "--cell-size 0.5 --meshes 1 --elements P1",
+    "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
+    "consolidation": "--days 20 --first-step 5 --growth 2 --frames 2",
+    "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
+    "element_test": "--steps 5",
+    "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",
+    "excavation": "--cell-size 3 --elements P1",
+    "footing": "--cell-size 0.25 --meshes 1 --elements P1",
+    "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
+    "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
+    "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
+    "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
+    "scaling": "--side-2d 4 --side-3d 2 --steps 2",
+    "seepage": "--cell-size 2 --days 20 --frames 2",
+    "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
+    "slope_schemes": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 " "--longer-steps 1",
+    "verification": "--quick --cases column",
+}
+"""Each study at a size that takes a second or less; a new study needs its line here."""
+ON_TWO_RANKS = ("balance",)
+WITH_PARTICLES = ("balance", "compare_fem", "embankment", "handover", "retrogression", "slope", "slope_schemes")
+NAMES = sorted(
+    [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
+)
+WITHOUT_PICTURES = ("scaling", "verification")
+"""The latter has pictures of each case, and one file of results for all"""
+TIMED = re.compile("seconds|date$|per_second|finished$|versions|not_written|^output$|^parameters_file$")
+
+
+def main(name, arguments):
+    """Run a study in this process, or on two ranks if it needs them."""
+    if name in ON_TWO_RANKS and "--help" not in arguments:
+        launch = ["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", sys.executable]
+        # What MPI has put into the environment of this process, past os.environ, is not for another run of it.
+        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        command = [*launch, STUDIES / f"{name}.py", *map(str, arguments)]
+        return subprocess.run(command, timeout=120, env={**os.environ, **root}).returncode
+    if (STUDIES / f"{name}.py").exists():
+        module = importlib.import_module(name)
+    else:
+        sys.path.insert(0, str(STUDIES / name))
+        spec = importlib.util.spec_from_file_location(f"{name}_main", STUDIES / name / "__main__.py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    program, sys.argv[0] = sys.argv[0], f"{name}.py"
+    try:
+        return module.main([str(word) for word in arguments])
+    finally:
+        sys.argv[0] = program
+
+
+def untimed(value):
+    """Results without what depends on the computer's clock, and on where the results are."""
+    if isinstance(value, dict):
+        return {key: untimed(one) for key, one in value.items() if not TIMED.search(key)}
+    return [untimed(one) for one in value] if isinstance(value, list) else value
+
+
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory):
+    """Folder and exit code of a small run of a study; run once."""
+    known = {}
+
+    def run(name):
+        if name not in known:
+            folder = tmp_path_factory.mktemp(name)
+            known[name] = folder, main(name, [*SMALL[name].split(), "--output", folder])
+        return known[name]
+
+    return run
+
+
+def test_every_study_is_run_here():
+    assert sorted(SMALL) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_gives_units_and_defaults(name, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(name, ["--help"])
+    assert ended.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"usage: studies/run {name}" in text
+    numbers = re.findall(r"--[a-z0-9-]+ X (.*?)(?= --[a-z]|$)", text)
+    without_unit = [line for line in numbers if "[" not in line]
+    assert without_unit == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_is_repeated_by_its_file_of_parameters_even_without_pictures(name, first_run, tmp_path, monkeypatch):
+    folder, code = first_run(name)
+    drawn_first = []
+
+    def fail(*_, **__):
+        drawn_first.append(not (tmp_path / "summary.json").exists())
+        raise ValueError("out of ink")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    assert code == 0
+    text = (folder / "parameters.toml").read_text()
+    assert f"studies/run {name} --parameters" in text
+    assert main(name, ["--parameters", folder / "parameters.toml", "--output", tmp_path]) == 0
+    assert (tmp_path / "parameters.toml").read_text() == text
+    summary = "verification.json" if name == "verification" else "summary.json"
+    one, other = (untimed(json.loads((place / summary).read_text())) for place in (folder, tmp_path))
+    assert_alike(one, other, name)
+    if name not in (*ON_TWO_RANKS, *WITHOUT_PICTURES):  # the former do not run in this process
+        reasons = json.loads((tmp_path / summary).read_text())["not_written"]
+        assert len(reasons) == len(drawn_first) > 0 and not any(drawn_first)
+        assert all("ValueError: out of ink" in reason for reason in reasons)
+
+
+def assert_alike(one, other, where):
+    """The same but for round-off: explicit steps repeat to the last bit, finite elements and implicit steps to 1e-10."""
+    assert type(one) is type(other), where
+    if isinstance(one, dict):
+        assert one.keys() == other.keys(), where
+        for key, value in one.items():
+            assert_alike(value, other[key], f"{where}: {key}")
+    elif isinstance(one, list):
+        assert len(one) == len(other), where
+        for k, (a, b) in enumerate(zip(one, other)):
+            assert_alike(a, b, f"{where}[{k}]")
+    elif isinstance(one, float):
+        assert other == pytest.approx(one, rel=1e-8, abs=1e-12, nan_ok=True), where
+    else:
+        assert one == other, where
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_has_everything_in_it(name, first_run):
+    folder, _ = first_run(name)
+    page = (folder / "report.html").read_text()
+    assert "http://" not in page.replace("http://www.w3.org/2000/svg", "") and "https://" not in page
+    assert page.count("data:image/png") >= len(list(folder.glob("*.png")))
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))
+    assert bool(data["movies"]) == (name in WITH_PARTICLES)
+    for movie in data["movies"]:
+        assert movie["count"] > 0 and {"x", "y", "radius"} < set(movie["fields"])
+    options = re.findall(r"^([a-z0-9-]+) = ", (folder / "parameters.toml").read_text(), re.MULTILINE)
+    assert options and all(f'<td class="name">{option}</td>' in page for option in options)
+
+
+PLACES = "return page.player.views.map((v) => Array.from({ length: v.movie.count }, (_, i) => v.screenOf(i)))"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with started() as driver:
+        yield driver
+
+
+@NEEDED
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_opens_and_its_slider_moves_the_particles(name, first_run, browser):
+    open_page(browser, first_run(name)[0] / "report.html")
+    assert browser.get_log("browser") == []
+    shown = picture(browser)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 50  # not blank
+    if name in WITH_PARTICLES:
+        places = []
+        for frame in (0, int(browser.execute_script("return document.getElementById('time').max"))):
+            move_slider(browser, frame)
+            places.append(browser.execute_script(PLACES))
+        assert places[0] != places[1]

@@ -1,0 +1,69 @@
+"""The studies handover and compare_fem, small."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+
+
+def summary_of(name, folder, *options):
+    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(folder), *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_every_hand_over_is_in_equilibrium(tmp_path):
+    summary = summary_of("handover", tmp_path, "--time", "0.6")
+    assert 20e3 < summary["collapse_unit_weight_of_the_finite_elements"] < 27e3  # linear triangles are too stiff
+    first, *rest = summary["handovers"]
+    assert first["share_of_collapse"] == 0 and first["out_of_balance_ratio_before"] is None
+    assert all(row["out_of_balance_ratio_before"] < 1e-8 and row["newly_yielded_share"] == 0 for row in rest)
+    assert all(row["crest_displacement_m"] > 0.05 for row in rest)
+    assert (tmp_path / "runout_over_share.png").exists() and (tmp_path / "crest_over_time.png").exists()
+
+
+def test_particles_converge_to_the_finite_elements(tmp_path):
+    """Linear triangles against quadratic ones, small strains: second order where little yields."""
+    summary = summary_of("compare_fem", tmp_path, "--cell-size", "0.1", "--meshes", "2")
+    rows = {(row["unit_weight"], row["cell_size_m"]): row for row in summary["comparisons"]}
+    for unit_weight in (5e3, 10e3, 15e3, 20e3):
+        coarse, fine = rows[unit_weight, 0.2], rows[unit_weight, 0.1]
+        assert fine["displacement_difference_l2"] < 0.75 * coarse["displacement_difference_l2"]
+        assert fine["out_of_balance_ratio"] < 1e-4
+    assert rows[5e3, 0.1]["displacement_difference_l2"] < 0.3 * rows[5e3, 0.2]["displacement_difference_l2"]
+    assert summary["crest_displacement_difference_on_finest_mesh"]["10000"] < 0.03
+    assert (tmp_path / "convergence.png").exists() and (tmp_path / "side_by_side_10kN.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("handover", ["--cohesion", "0"], ["--cohesion", "no slope stands"]),
+        (
+            "compare_fem",
+            ["--cohesion", "1", "--cell-size", "0.2", "--meshes", "1"],
+            ["carries none of the unit weights"],
+        ),
+    ],
+)
+def test_slopes_that_do_not_stand_are_refused(tmp_path, name, options, words):
+    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(tmp_path), *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 2 and "Traceback" not in result.stderr
+    assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_hand_over_of_particles_that_move(tmp_path):
+    summary = summary_of("handover", tmp_path, "--time", "0.1", "--move")
+    rows = [row for row in summary["handovers"] if row["share_of_collapse"] > 0]
+    assert all(row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_share"] < 0.01 for row in rows)
+
+
+def test_soft_soil_too_within_the_effect_of_its_deformed_shape(tmp_path):
+    summary = summary_of("compare_fem", tmp_path, "--cell-size", "0.1", "--meshes", "1", "--young", "200e3")
+    assert summary["crest_displacement_difference_on_finest_mesh"]["10000"] < 0.03

@@ -1,0 +1,98 @@
+"""The studies of laws: element tests from the command line, the slope of other soils, and retrogression, all small."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+
+
+def study(name, folder, *options):
+    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(folder), *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_drained_triaxial_test_ends_at_the_strength(tmp_path):
+    # sigma_1 = N sigma_3 + 2 c sqrt(N), N = (1 + sin phi) / (1 - sin phi) = 3 for 30 degrees
+    result = study("element_test", tmp_path, "--test", "drained", "--friction-angle", "30", "--cohesion", "5e3",
+                   "--pressure", "20e3", "--young", "2e6")  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    assert summary(tmp_path)["q_Pa"] == pytest.approx(2 * 20e3 + 2 * 5e3 * 3**0.5, rel=1e-9)
+    assert all((tmp_path / name).stat().st_size > 0 for name in ("stress_path.png", "history.csv"))
+
+
+def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path):
+    # By water that is stiff, and by constant volume: q = M p', p' = p_c/2 (2 p_0/p_c)^(kappa/lambda) from p_0 = p_c
+    for k, options in enumerate((["--test", "undrained"], ["--undrained", "--water-modulus", "2e9"])):
+        clay = ["--material", "cam-clay", "--attraction", "0", "--preconsolidation", "20e3", "--pressure", "20e3"]
+        result = study("element_test", tmp_path / str(k), *clay, *options)
+        assert result.returncode == 0, result.stderr
+        end = summary(tmp_path / str(k))
+        assert end["p_Pa"] == pytest.approx(10e3 * 2 ** (0.02 / 0.1), rel=1e-2)
+        assert end["q_Pa"] == pytest.approx(end["p_Pa"], rel=1e-2)
+
+
+def test_a_law_of_ones_own(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "class Spring:\n"
+        "    n_state, p_wave_modulus = 1, 1e6\n"
+        "    def update(self, strain_increment, stress, state, tangent):\n"
+        "        stress += 1e6 * strain_increment\n"
+        "        if tangent is not None:\n"
+        "            for k in range(stress.shape[1]):\n"
+        "                tangent[:, k, k] = 1e6\n"
+    )
+    result = study(
+        "element_test", tmp_path / "out", "--python-law", f"{tmp_path / 'mine.py'}:Spring", "--pressure", "0"
+    )
+    assert result.returncode == 0, result.stderr
+    assert summary(tmp_path / "out")["q_Pa"] == pytest.approx(1e6 * 0.2)
+
+
+@pytest.mark.parametrize(
+    "options, named",
+    [(["--material", "marble"], "--material: is 'marble', expected one of"), (["--poisson", "0.6"], "--poisson: is '0.6'"),
+     (["--material", "cam-clay", "--swelling-slope", "0.2"], "compression = 0.1"), (["--python-law", "no.py:X"], "no.py:X"),
+     (["--umat", "no.so"], "no.so")],
+)  # fmt: skip
+def test_bad_options_are_named(tmp_path, options, named):
+    result = study("element_test", tmp_path, *options)
+    assert result.returncode == 2
+    assert named in result.stderr
+
+
+def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
+    small = [
+        "--cell-size",
+        "1",
+        "--crest",
+        "8",
+        "--runout-length",
+        "6",
+        "--height",
+        "4",
+        "--angle",
+        "45",
+        "--mesh",
+        "crossed",
+    ]
+    soil = ["--unit-weight", "24e3", "--cohesion", "24e3", "--reference-length", "1", "--disturbed", "2"]
+    result = study("retrogression", tmp_path, *small, *soil, "--time", "3", "--frames", "3", "--meshes", "two")
+    assert result.returncode == 0, result.stderr
+    found = summary(tmp_path)["cells"]
+    assert set(found) == {"1_m", "0.5_m"}
+    for size, run in found.items():
+        assert run["initial_out_of_balance_ratio"] < 1e-6
+        assert run["time_s"] == 3 or run["at_rest"]
+        last = (tmp_path / f"history_{size.removesuffix('_m')}.csv").read_text().splitlines()[-1]
+        assert float(last.split(",")[5]) > 0  # share of particles that yield
+        assert float(last.split(",")[3]) > 0
+    for name in ("meshes.png", "history_0.5.csv", "displacement_1.png"):
+        assert (tmp_path / name).stat().st_size > 0

@@ -1,0 +1,85 @@
+"""Parameters of a study from a TOML file, and back to one."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+
+from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
+from studies.common.parameters import write_parameters
+
+
+def parser():
+    p = study_parser("A study.")
+    p.prog = "studies/run slope"
+    add_number(p, "--cell-size", 0.1, "m", "side of the squares", above=0)
+    add_number(p, "--dt", None, "s", "time step (default: half of the critical one)", above=0)
+    add_count(p, "--frames", 120, "times at which particles are stored")
+    add_choice(p, "--initial", "fem", ("fem", "zero"), "initial stresses")
+    add_switch(p, "--nmd", False, "average volumetric strains over nodes")
+    add_flag(p, "--paper", "the paper exactly")
+    return p
+
+
+def parse(tmp_path, text, *arguments):
+    path = tmp_path / "given.toml"
+    path.write_text(text)
+    return parser().parse_args(["--parameters", str(path), *arguments])
+
+
+def test_the_file_gives_values_of_every_kind(tmp_path):
+    options = parse(tmp_path, "cell-size = 1\ndt = 1e-4\nframes = 3\ninitial = 'zero'\nnmd = true\npaper = true")
+    assert (options.cell_size, options.dt, options.frames) == (1.0, 1e-4, 3)
+    assert (options.initial, options.nmd, options.paper) == ("zero", True, True)
+
+
+def test_the_command_line_wins_over_the_file(tmp_path):
+    options = parse(tmp_path, "frames = 3\nnmd = true\ndt = 0.5", "--frames", "7", "--no-nmd")
+    assert (options.frames, options.nmd, options.dt) == (7, False, 0.5)
+
+
+def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
+    first = parser().parse_args(["--cell-size", "0.30000000000000004", "--initial", "zero", "--output", "elsewhere"])
+    write_parameters(tmp_path / "parameters.toml", first.parameters(), first.study)
+    second = parser().parse_args(["--parameters", str(tmp_path / "parameters.toml")])
+    different = {name for name, value in vars(second).items() if value != getattr(first, name)}
+    assert different == {"output", "parameters_file"}
+    text = (tmp_path / "parameters.toml").read_text()
+    assert "studies/run slope --parameters" in text
+    assert "cell-size = 0.30000000000000004  # side of the squares [m]" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("heigth = 1", "given.toml: unknown key 'heigth', expected some of cell-size, dt,"),
+        ("output = 'x'", "unknown key 'output'"),
+        ("cell-size = 'big'", "given.toml: cell-size is 'big', expected a number"),
+        ("cell-size = -1", "given.toml: cell-size is '-1', expected a number above 0 m"),
+        ("cell-size = [1]", "given.toml: cell-size is [1], expected a number"),
+        ("cell-size = true", "given.toml: cell-size is True, expected a number"),
+        ("frames = 2.5", "given.toml: frames is '2.5', expected a whole number from 1 on"),
+        ("initial = 'all'", "given.toml: initial is 'all', expected one of fem, zero"),
+        ("nmd = 1", "given.toml: nmd is 1, expected true or false"),
+        ("cell-size 1", "given.toml is not TOML"),
+    ],
+)
+def test_mistakes_name_file_key_and_what_was_expected(tmp_path, capsys, text, message):
+    with pytest.raises(SystemExit) as ended:
+        parse(tmp_path, text)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_that_is_not_there(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        parser().parse_args(["--parameters", str(tmp_path / "none.toml")])
+    assert "cannot read --parameters" in capsys.readouterr().err
+
+
+def test_an_option_that_is_not_there_names_its_neighbour(capsys):
+    with pytest.raises(SystemExit):
+        parser().parse_args(["--cell-siez", "1"])
+    assert "unrecognized arguments: --cell-siez 1; did you mean --cell-size?" in capsys.readouterr().err

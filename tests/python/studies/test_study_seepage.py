@@ -1,0 +1,78 @@
+"""The study seepage: its site files, and the flow that it reports."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from mpm_core import InputError
+
+STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
+SITE = (STUDIES.parent / "meshes" / "dam.toml").read_text()
+
+
+def read(text, folder):
+    from common.water_site import read_water_site
+
+    path = folder / "site.toml"
+    path.write_text(text.replace('"dam.geo"', f'"{STUDIES.parent}/meshes/dam.geo"'))
+    return read_water_site(path, MPI.COMM_WORLD, 3.0)
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("conductivity = 1e-8", "conductivity = 0.0", "soils.core: conductivity: got 0.0"),
+        ("conductivity = 1e-8", "permeability = 1e-8", "soils.core: unknown key 'permeability'"),
+        ("n = 1.4, ", "", "soils.core: .*missing.*'n'"),
+        ("[soils.core]", "[soils.clay]", "no cell has the name 'clay'"),
+        ("reservoir = 0.0", 'reservoir = "full"', "boundaries.downstream: reservoir is 'full'"),
+        ("reservoir = 0.0", "level = 0.0", "boundaries.downstream: has .*expected one of head, reservoir"),
+        ("rain = 0.0", "rain = -1.0", "rate is -1"),
+        ("[15.0, 3.0]", "[5.0, 3.0]", "rising times"),
+        ('mesh = "dam.geo"', 'mesh = "no.geo"', "there is no file"),
+    ],
+)
+def test_a_wrong_site_is_named(old, new, words, tmp_path):
+    assert old in SITE
+    with pytest.raises(InputError, match=words):
+        read(SITE.replace(old, new), tmp_path).seepage(1)
+
+
+def test_the_flow_of_a_homogeneous_block_is_darcys(tmp_path, capsys):
+    import seepage
+
+    lines = ['SetFactory("OpenCASCADE");', "DefineConstant[ cell_size = 1 ];", "Rectangle(1) = {0, 0, 0, 4, 2};",
+             'Physical Surface("sand") = {1};', 'Physical Curve("left") = {4};', 'Physical Curve("right") = {2};',
+             "Mesh.MeshSizeMax = cell_size;"]  # fmt: skip
+    (tmp_path / "block.geo").write_text("\n".join(lines) + "\n")
+    (tmp_path / "block.toml").write_text(
+        'mesh = "block.geo"\n[soils.sand]\nconductivity = 1e-5\n'
+        "[boundaries.left]\nhead = 5.0\n[boundaries.right]\nhead = 3.0\n"
+    )
+    folder = tmp_path / "results"
+    assert seepage.main(["--site", str(tmp_path / "block.toml"), "--output", str(folder)]) == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    darcy = 86400 * 1e-5 * (5.0 - 3.0) / 4.0 * 2.0
+    assert summary["steady_inflow_left_m2_per_day"] == pytest.approx(darcy, rel=1e-9)
+    assert summary["steady_inflow_right_m2_per_day"] == pytest.approx(-darcy, rel=1e-9)
+    assert (folder / "seepage_steady.png").stat().st_size > 10_000
+    assert f"left: {1000 * darcy:.4g} litres" in capsys.readouterr().out
+
+
+def test_the_history_of_a_drawdown_balances(tmp_path):
+    import seepage
+
+    folder = tmp_path / "results"
+    arguments = ["--cell-size", "2", "--days", "20", "--frames", "2", "--output", str(folder)]
+    assert seepage.main(arguments) == 0
+    rows = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+    inflow = sum(rows[name] for name in rows.dtype.names if name.startswith("inflow"))
+    # Backward Euler: what came in over a step is the inflow at its end times its length.
+    change, came = np.diff(rows["stored_water_m2"]), np.diff(rows["time_days"]) * inflow[1:]
+    assert came == pytest.approx(change, abs=1e-6 * rows["stored_water_m2"][0])
+    assert rows["stored_water_m2"][-1] < rows["stored_water_m2"][0]

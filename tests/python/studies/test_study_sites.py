@@ -1,0 +1,176 @@
+"""Sites of several soils from TOML: collapse and safety studies on them, and how mistakes in the file are named."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "studies"))
+site_file = importlib.import_module("common.site_file")
+
+BLOCK = """
+SetFactory("OpenCASCADE");
+DefineConstant[ cell_size = 0.5 ];
+Rectangle(1) = {0, 0, 0, 1, 1}; Rectangle(2) = {0, 1, 0, 1, 1};
+Coherence;
+Physical Surface("lower") = {1}; Physical Surface("upper") = {2};
+e = 0.01;
+Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, 1 + e, e, e}};
+Physical Curve("left") = {Curve In BoundingBox{-e, -e, -e, e, 2 + e, e}};
+Mesh.MeshSizeMax = cell_size;
+"""
+WITH_AIR = """
+Rectangle(3) = {1, 0, 0, 2, 2};
+Coherence;
+Physical Surface("air") = {3};
+"""
+SITE = """
+mesh = "block.geo"
+cell_size = 0.5
+[soils.lower]
+unit_weight = 10e3
+material = "tresca"
+young = 5e6
+poisson = 0.45
+shear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}
+[soils.upper]
+unit_weight = 18e3
+cohesion = 9e3
+friction_angle = 0.0
+young = 5e6
+"""
+
+
+def site_in(folder, text=SITE):
+    (folder / "block.geo").write_text(BLOCK)
+    (folder / "site.toml").write_text(text)
+    return folder / "site.toml"
+
+
+def test_a_site_has_its_laws_weights_and_supports(tmp_path):
+    site = site_file.read_site(site_in(tmp_path), MPI.COMM_WORLD)
+    assert site.soils == ["lower", "upper"] and site.unit_weight == {"lower": 10e3, "upper": 18e3}
+    assert [support.facet_tag for support in site.supports] == ["base", "left"]
+    assert site.supports[0].displacement is None and site.supports[1].displacement == (0.0, None)
+    strengths = sorted(law.cohesion for law in site.laws.values())
+    assert strengths[0] == 9e3 and 30e3 < strengths[1] < strengths[-1] < 40e3  # 1 to 2 m below the top
+    fem = site.finite_elements(1)
+    fem.solve(site.load())
+    assert fem.converged and fem.reaction("base")[1] == pytest.approx(-28e3)
+
+
+def test_a_site_may_be_a_half_section(tmp_path):
+    """Its weights and areas are those of one radian: the block is a cylinder of radius 1 m, area 1/2."""
+    supports = 'cell_size = 0.5\naxisymmetric = true\nsupports = {base = "fixed", left = "roller"}'
+    site = site_file.read_site(site_in(tmp_path, SITE.replace("cell_size = 0.5", supports)), MPI.COMM_WORLD)
+    fem = site.finite_elements(1)
+    fem.solve(site.load())
+    assert fem.geometry == mpm.Geometry.AXISYMMETRIC and fem.reaction("base")[1] == pytest.approx(-28e3 / 2)
+    particles = site.particles(3)
+    assert particles.particles.mass.sum() == pytest.approx(28e3 / 2 / 9.81, rel=1e-3)
+    scene = importlib.import_module("common.scenes").scene_of(particles, sorted(site.laws))
+    assert (
+        importlib.import_module("common.plots").axis_labels(scene.half_section)[0].startswith("$r$ [m] (half section")
+    )
+    frame = importlib.import_module("common.movie").particle_frame(particles, 0.0)
+    assert frame["volume"].sum() == pytest.approx(2.0)  # discs have the area of the section
+    folder = tmp_path / "collapse"
+    options = ["--site", str(tmp_path / "site.toml"), "--meshes", "1", "--output", str(folder)]
+    assert importlib.import_module("collapse").main(options) == 0
+    assert (folder / "mechanism.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("cell_size = 0.5", "cell_size = 0.5\naxisymmetric = 1", "axisymmetric is 1, expected true or false"),
+        ("unit_weight = 18e3", "", "soils.upper: has no unit_weight"),
+        ("cohesion = 9e3", "cohesionn = 9e3", "soils.upper: unknown key 'cohesionn'"),
+        ("cohesion = 9e3", "cohesion = -1.0", "soils.upper: cohesion is '-1.0', expected a number at least 0"),
+        ("top = 2.0", "bottom = 2.0", "soils.lower: got .* expected {value = , per_metre = , top = }"),
+        ('mesh = "block.geo"', "", "has no 'mesh'"),
+        ("[soils.upper]", "[soils.sand]", "no cell has the name 'sand'"),
+        ('"tresca"', '"clay"', "soils.lower: material is 'clay', expected one of"),
+        ("cell_size = 0.5", "cell_size = 0.5\nsize = 1", "unknown key 'size'"),
+        ("cell_size = 0.5", 'cell_size = 0.5\nsupports = {base = "glued"}', "supports.base is 'glued', expected 'fixed' or 'roller'"),
+        ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{fill = ["sand"]}]', "soil 'sand' is not among the soils lower, upper"),
+        ("cell_size = 0.5", "cell_size = 0.5\nstages = [{full = []}]", r"stages\[0\]: unknown key 'full'"),
+        ("cell_size = 0.5", "cell_size = [", "is not TOML"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_file_is_named(tmp_path, old, new, message):
+    def use():
+        site_file.read_site(site_in(tmp_path, SITE.replace(old, new)), MPI.COMM_WORLD).finite_elements(1)
+
+    with pytest.raises(mpm.InputError, match=message):
+        use()
+
+
+def test_without_friction_more_weight_is_as_less_strength(tmp_path):
+    """Only c / gamma counts: collapse and safety give the same factor, to the widths of their last steps (2e-3 of it each).
+
+    The upper 1 m (c 9 kPa, 18 kN/m3) stands free on its right: limit analysis has at least 2 c / (gamma H) = 1.
+    """
+    path, factors = site_in(tmp_path), {}
+    for study, key in (("safety", "factor_of_safety"), ("collapse", "collapse_weight_factor")):
+        folder = tmp_path / study
+        assert importlib.import_module(study).main(["--site", str(path), "--meshes", "1", "--output", str(folder)]) == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        factors[study] = summary[key], summary["failed_at"]
+        assert summary["failure_shown"] and (folder / "mechanism.png").exists()
+    (low, high), (lower, higher) = factors.values()
+    assert low >= 1 and max(low, lower) <= min(high, higher) + 4e-3 * low
+    assert high - low <= 4e-3 * low
+
+
+def test_particles_give_a_second_opinion(tmp_path):
+    """Linear finite elements and particles on the same cells, of a site with room to move and of a slope."""
+    path = site_in(tmp_path, SITE)
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    for options in (
+        ["--site", path],
+        ["--cell-size", 0.2, "--crest", 1, "--unit-weight", 20e3, "--no-without-dilation"],
+    ):
+        folder = tmp_path / f"{len(options)}"
+        arguments = [*options, "--elements", "P1", "--meshes", 1, "--start", 0.7, "--particles", "--output", folder]
+        assert importlib.import_module("safety").main([str(word) for word in arguments]) == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["failure_shown_by_particles"]
+        assert summary["factor_of_safety_by_particles"] == pytest.approx(summary["factor_of_safety"], rel=0.02)
+
+
+def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
+    """The upper metre, which stands free with 2 c / (gamma H) = 1, so with c = 9 kPa, has 36 kPa.
+
+    Divided by 1.2 nothing yields, and all stays where the elements had it; divided by 8 it falls, by the order of g t^2 / 2.
+    """
+    slope, path = importlib.import_module("slope"), site_in(tmp_path, SITE.replace("9e3", "36e3"))
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    moved = {}
+    for factor in (1.2, 8.0):
+        folder = tmp_path / f"{factor}"
+        options = f"--site {path} --factor {factor} --time 0.4 --frames 4 --particles-per-cell 3 --no-pictures --output {folder}"
+        assert slope.main(options.split()) == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["newly_yielded_share"] == 0
+        moved[factor] = summary["largest_displacement_m"]
+        assert (folder / "report.html").exists() and not list(folder.glob("*.png"))
+    assert moved[1.2] < 1e-6 and 0.05 < moved[8.0] < 9.81 / 2 * 0.4**2
+
+
+def test_a_site_that_does_not_carry_its_weight_does_not_slide(tmp_path):
+    path = site_in(tmp_path, SITE.replace("9e3", "1e3"))
+    with pytest.raises(
+        mpm.InputError, match=r"site.toml: its soils carry [2-6]\d.\d% of their weight only: .*mechanism"
+    ):
+        importlib.import_module("slope").main(["--site", str(path), "--output", str(tmp_path / "results")])

@@ -1,0 +1,126 @@
+"""The study slope: the paper's number, its files, its errors and its end by Ctrl-C."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+FILES = ["figure_2_mesh.png", "figure_3_displacement.png", "figure_4_shear_strain.png", "figure_5_vertical_stress.png",
+         "figure_6_crest.png", "particles/000000.h5", "particles.xdmf", "mesh/mesh.h5", "mesh.xdmf", "history.csv",
+         "summary.json"]  # fmt: skip
+
+
+def command(folder, *options):
+    return [sys.executable, str(STUDIES / "slope.py"), "--output", str(folder), *options]
+
+
+def slope(folder, *options):
+    return subprocess.run(command(folder, *options), capture_output=True, text=True, timeout=300)
+
+
+def history(folder):
+    with open(folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def test_the_papers_slope_slides_as_far_as_in_an_independent_code(tmp_path):
+    # Independent explicit code, same data, any time step from 1e-4 to 4e-3 s: 0.11 m at 0.9 s, 0.28 m at 8.7 s, 0.36 m
+    # at 17 s, 0.41 to 0.42 m at 34.8 s, rising fast at first and creeping later.
+    result = slope(tmp_path, "--initial", "zero", "--dt", "4e-3", "--frames", "50")
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["soil_cells"] == 640 and summary["particles"] == 6400 and summary["steps"] == 8700
+    assert 0.41 * 0.92 < summary["crest_displacement_m"] < 0.43 * 1.08
+    curve = history(tmp_path)
+    at = np.interp([0.9, 8.7, 17.0], curve["time_s"], curve["crest_displacement_m"])
+    assert at == pytest.approx([0.11, 0.28, 0.36], rel=0.15)
+    assert np.all(np.diff(curve["time_s"]) > 0)
+    energy = summary["energy_J_per_m"]
+    spent = sum(energy[name] for name in ("kinetic_energy", "damping_work", "unexplained_energy"))
+    assert abs(summary["unexplained_share_of_energy"]) == pytest.approx(
+        abs(energy["unexplained_energy"]) / energy["external_work"], rel=1e-9
+    )
+    assert energy["external_work"] - spent > energy["plastic_work"] > 0
+
+
+def test_a_short_run_writes_all_it_promises(tmp_path):
+    result = slope(tmp_path, "--time", "0.5", "--frames", "3")
+    assert result.returncode == 0, result.stderr
+    assert all((tmp_path / name).stat().st_size > 0 for name in FILES)
+    assert list(tmp_path.glob("slide.*"))
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["finished_run"] and summary["time_s"] == 0.5
+    # FEM and particles share the cells, so the particles start in equilibrium.
+    assert summary["initial_out_of_balance_ratio"] < 1e-9
+    assert {"program", "dolfinx", "petsc", "compiler", "git_revision"} <= set(summary["versions"])
+    assert summary["parameters"]["unit_weight"] == 80e3 and summary["particle_steps_per_second"] > 0
+    assert len(history(tmp_path)["time_s"]) == 4
+
+
+def test_frames_by_steps_are_for_the_files_alone(tmp_path):
+    small = ("--initial", "zero", "--cell-size", "0.2", "--crest", "1.2", "--particles-per-cell", "3")
+    result = slope(tmp_path, *small, "--time", "0.3", "--frames", "4", "--frame-steps", "7")
+    assert result.returncode == 0, result.stderr
+    stored = len(history(tmp_path)["time_s"])
+    steps = json.loads((tmp_path / "summary.json").read_text())["steps"]
+    assert stored > steps // 7 >= 5
+    assert [len(list((tmp_path / name).glob("0*.h5"))) for name in ("particles", "mesh")] == [stored, stored]
+    drawn = re.search(r'"times":(\[[^]]*\])', (tmp_path / "report.html").read_text())
+    assert json.loads(drawn.group(1)) == pytest.approx(np.linspace(0, 0.3, 5))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--height", "-1"], ["--height", "-1", "above 0"]),
+        (["--poisson", "0.5"], ["--poisson", "0.5"]),
+        (["--friction-angle", "90"], ["--friction-angle", "90"]),
+        (["--dilation-angle", "30"], ["--dilation-angle", "30", "--friction-angle"]),
+        (["--particles-per-cell", "0"], ["--particles-per-cell", "0"]),
+        (["--particles-per-cell", "7"], ["per_cell", "7", "6", "10"]),
+        (["--cell-size", "0.3"], ["0.3", "height"]),
+        (["--dt", "1"], ["dt", "1 s", "critical"]),
+        (["--output", "/proc/nowhere"], ["/proc/nowhere"]),
+        (["--frames", "100000000"], ["--frames", "100000000", "bytes of memory, but there are"]),
+    ],
+)
+def test_wrong_options_are_named(tmp_path, options, words):
+    result = slope(tmp_path, "--time", "0.1", *options)
+    assert result.returncode == 2
+    assert all(word in result.stderr for word in words), result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_background_mesh_that_is_too_short_ends_the_run_with_the_place_and_keeps_what_there_is(tmp_path):
+    result = slope(tmp_path, "--runout-length", "0.1", "--damping", "0", "--time", "3", "--frames", "30")
+    assert result.returncode == 1
+    assert "left the background mesh" in result.stderr and "Traceback" not in result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert not summary["finished_run"] and "left the background mesh" in summary["stopped_because"]
+    assert len(history(tmp_path)["time_s"]) > 1 and (tmp_path / "figure_4_shear_strain.png").exists()
+
+
+def test_ctrl_c_ends_cleanly(tmp_path):
+    process = subprocess.Popen(command(tmp_path, "--time", "1000", "--frames", "4000"), stderr=subprocess.PIPE, text=True,
+                               env={**os.environ})  # fmt: skip
+    rows = tmp_path / "history.csv"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not (rows.exists() and rows.read_text().count("\n") > 3):
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "interrupted" in errors and "written" in errors
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert not summary["finished_run"] and summary["time_s"] < 1000
+    assert all((tmp_path / name).exists() for name in FILES)

@@ -1,0 +1,39 @@
+"""The study slope starts from elasto-plastic equilibrium."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDY = Path(__file__).parents[3] / "studies" / "slope.py"
+
+
+def slope(folder, *options):
+    command = [sys.executable, str(STUDY), "--output", str(folder), "--time", "0.05", "--frames", "1", *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+@pytest.mark.parametrize("options", [[], ["--nmd", "--mesh", "gmsh"], ["--angle", "60"]])
+def test_particles_are_in_equilibrium_at_once_and_none_yields_anew(tmp_path, options):
+    """Finite elements and particles share the cells, so what balances the one balances the other."""
+    result = slope(tmp_path, *options, "--initial-unit-weight", "10e3")
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["initial_out_of_balance_ratio"] < 1e-8
+    assert summary["equilibrated_out_of_balance_ratio"] < 1e-8
+    assert summary["newly_yielded_share"] == 0 and summary["returned_to_strength_share"] == 0
+
+
+def test_initial_unit_weight_beyond_collapse_is_named_with_what_the_slope_carries(tmp_path):
+    result = slope(tmp_path, "--initial-unit-weight", "40e3")
+    assert result.returncode == 2 and "Traceback" not in result.stderr
+    assert "--initial-unit-weight is 40000 N/m3" in result.stderr and "does not carry" in result.stderr
+    # Linear triangles of 0.1 m are some 20 % too stiff at collapse, which is near 20 kN/m3 without dilation.
+    assert 20e3 < float(result.stderr.split("above ")[1].split()[0]) < 26e3
+
+
+def test_elastic_start_is_in_equilibrium_too(tmp_path):
+    assert slope(tmp_path, "--initial", "elastic").returncode == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["initial_out_of_balance_ratio"] < 1e-8
