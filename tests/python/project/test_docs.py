@@ -1,5 +1,7 @@
 """Every Python block in the README and in docs/ runs, page by page, and every option named there exists."""
 
+import functools
+import inspect
 import os
 import re
 import subprocess
@@ -8,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import fenics_bridge.water
 import mpm_core
 
 ROOT = Path(__file__).parents[3]
@@ -141,3 +144,28 @@ def test_every_public_name_of_the_core_is_in_the_reference():
     reference = (ROOT / "docs/api/mpm_core.md").read_text()
     missing = [one for one in mpm_core.__all__ if one != "__version__" and f"mpm_core.{one}" not in reference]
     assert missing == []
+
+
+def named_in_the_glossary():
+    """(module, dotted name, argument or None) of each name in the column of names of the glossary."""
+    rows = re.findall(r"^\|(.*?)\|(.*?)\|(.*?)\|(.*?)\|$", (ROOT / "docs/guide/glossary.md").read_text(), re.MULTILINE)
+    names = [name for _, _, names, _ in rows for name in re.findall(r"`([^`]+)`", names)]
+    return [re.fullmatch(r"(mpm|bridge)\.([\w.]+)(?:\((\w+)=\))?", name).groups() for name in names]
+
+
+def attribute(owner, name):
+    """An attribute of a class, or None for one that only its objects have."""
+    declared = inspect.get_annotations(owner) if inspect.isclass(owner) else {}
+    return None if name in declared else getattr(owner, name)
+
+
+@pytest.mark.parametrize(("module", "name", "argument"), named_in_the_glossary())
+def test_names_in_the_glossary_exist(module, name, argument):
+    found = functools.reduce(attribute, name.split("."), {"mpm": mpm_core, "bridge": fenics_bridge}[module])
+    assert argument is None or argument in inspect.signature(found).parameters
+
+
+def test_no_term_of_the_glossary_stands_there_twice():
+    rows = re.findall(r"^\| (.+?) \|", (ROOT / "docs/guide/glossary.md").read_text(), re.MULTILINE)
+    terms = [term for row in rows if row not in ("term", "---") for term in row.split(", ")]
+    assert len(terms) > 50 and len(terms) == len(set(terms))
