@@ -34,7 +34,7 @@ template <class G>
 void update_particles(Model<G>& model, const ExplicitOptions& options, double dt, bool stress, PhaseClock& clock)
 {
   clock.begin(Phase::particles);
-  particle_pass(model, {dt, true, stress, options.pic_share, options.mixed_discretisation, dt});
+  particle_pass(model, {dt, true, stress, options.pic_fraction, options.mixed_discretisation, dt});
   agree_on_failure(model);
   if (model.failure)
     return;
@@ -63,10 +63,10 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     // The second mapping, m_i v_i = sum m_p N_i v_p (19) with v_p from (18), comes before (18) here: sum m_p N_i dt
     // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
     clock.begin(Phase::mapping);
-    find_velocity_change(field, options.pic_share, dt);
+    find_velocity_change(field, options.pic_fraction, dt);
     scatter_momentum<G>(mesh, field.part, field.moments, field.velocity_change, field.velocity);
     sum_shared(exchange, field.velocity);
-    find_mapped_velocity(1 - options.pic_share, field);
+    find_mapped_velocity(1 - options.pic_fraction, field);
     clock.begin(Phase::momentum);
     add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
     clock.begin(Phase::averaging);
@@ -89,7 +89,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     find_start_velocity(field);
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
-    find_velocity_change(field, options.pic_share, dt);
+    find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
     clock.begin(Phase::averaging);
@@ -121,7 +121,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   for (VelocityField<G>& field : model.fields)
   {
     find_acceleration(gravity, options.damping, dt, field);
-    find_velocity_change(field, options.pic_share, dt);
+    find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     work_at_end += add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
   }
@@ -221,9 +221,9 @@ double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, 
   return std::sqrt(squared);
 }
 
-double pic_share_of_step(double share, double dt, double critical)
+double pic_fraction_of_step(double fraction, double dt, double critical)
 {
-  return share == 0 ? 0 : -std::expm1(dt / critical * std::log1p(-share)); // 1 for a share of 1
+  return fraction == 0 ? 0 : -std::expm1(dt / critical * std::log1p(-fraction)); // 1 for a fraction of 1
 }
 
 #define INSTANTIATE(G)                                                                                                 \

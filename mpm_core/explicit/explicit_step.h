@@ -17,8 +17,8 @@ enum class StressUpdate
 struct ExplicitOptions
 {
   StressUpdate stress_update = StressUpdate::modified_last;
-  double damping = 0;   ///< local damping alpha of FLAC, in [0, 1)
-  double pic_share = 0; ///< of a step, in [0, 1]
+  double damping = 0;      ///< local damping alpha of FLAC, in [0, 1)
+  double pic_fraction = 0; ///< of a step, in [0, 1]
   bool mixed_discretisation = false;
   Integration integration = Integration::particles;
 };
@@ -42,8 +42,8 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 template <int D>
 double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, MPI_Comm comm);
 
-/// The PIC share of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the step:
-/// 1 - (1 - share)^(dt / dt_cr).
-/// @param share  of a critical time step, in [0, 1]
-double pic_share_of_step(double share, double dt, double critical);
+/// The PIC fraction of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the
+/// step: 1 - (1 - fraction)^(dt / dt_cr).
+/// @param fraction  of a critical time step, in [0, 1]
+double pic_fraction_of_step(double fraction, double dt, double critical);
 } // namespace mpm

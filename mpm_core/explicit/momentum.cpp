@@ -41,14 +41,14 @@ void find_advanced_velocity(double dt, VelocityField<G>& field)
 }
 
 template <class G>
-void find_mapped_velocity(double keep, VelocityField<G>& field)
+void find_mapped_velocity(double flip_fraction, VelocityField<G>& field)
 {
   for (Index i : field.part.nodes)
   {
     const auto& node = field.nodes[i];
     const double per_mass = node.mass > field.least_mass ? 1 / node.mass : 0;
     for (int a = 0; a < G::dim; ++a)
-      field.velocity[i][a] = (keep * node.momentum[a] + field.velocity[i][a]) * per_mass;
+      field.velocity[i][a] = (flip_fraction * node.momentum[a] + field.velocity[i][a]) * per_mass;
   }
   for (const auto& support : field.supports)
     impose<G::dim>(support, field.velocity[support.node]);

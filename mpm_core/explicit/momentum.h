@@ -15,10 +15,10 @@ void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt,
 template <class G>
 void find_advanced_velocity(double dt, VelocityField<G>& field);
 
-/// v_i from `velocity`, the momentum by which the nodes change that of the particles, and what is kept of the momentum
-/// of the step's start; with boundary conditions.
+/// v_i from `velocity`, the momentum by which the nodes change that of the particles, and the FLIP fraction of the
+/// momentum of the step's start; with boundary conditions.
 template <class G>
-void find_mapped_velocity(double keep, VelocityField<G>& field);
+void find_mapped_velocity(double flip_fraction, VelocityField<G>& field);
 
 /// Work done in the step, added to totals. Forces act at the step's start, so their displacement is the mean of the one
 /// before and the one after: the energy balance of the leap-frog scheme.

@@ -97,7 +97,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
     {
       const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
       dt = next_step(model, run, critical);
-      of_step.pic_share = pic_share_of_step(run.pic, dt, critical);
+      of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }
     explicit_step(model, of_step, dt);
     if (model.failure)

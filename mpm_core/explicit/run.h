@@ -11,7 +11,7 @@ struct RunOptions
   double until = 0;            ///< time at which to stop, met exactly [s]
   std::optional<double> dt;    ///< step [s]; by default `courant` times the critical one
   double courant = 0.5;        ///< alpha_c of (17)
-  double pic = 0;              ///< PIC share of a critical time step, in [0, 1]; takes the place of that of a step
+  double pic = 0;              ///< PIC fraction of a critical time step, in [0, 1]; takes the place of that of a step
   bool allow_unstable = false; ///< take `dt` even above the critical step
   std::int64_t max_steps = 0;  ///< return earlier, after this many steps
 };

@@ -128,7 +128,7 @@ double pic_fraction(const Model<G>& model, const ImplicitStep<G>& step)
   if (step.options.pic == 0)
     return 0;
   const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
-  return pic_share_of_step(step.options.pic, step.dt, critical);
+  return pic_fraction_of_step(step.options.pic, step.dt, critical);
 }
 
 /// Makes the particles those of the step's start again.

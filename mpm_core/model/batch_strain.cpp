@@ -38,7 +38,7 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
       prefetch(field.moments[next]);
     }
     const AffineField<D> fields[]{affine_field<D>(mesh, cell, change), affine_field<D>(mesh, cell, velocity)};
-    scratch.motion[r - batch.first_run] = {1 - options.pic_share, fields[0], scaled<D>(fields[1], options.dt)};
+    scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, fields[0], scaled<D>(fields[1], options.dt)};
   }
 }
 

@@ -65,11 +65,11 @@ void find_start_velocity(VelocityField<G>& field)
 }
 
 template <class G>
-void find_velocity_change(VelocityField<G>& field, double pic_share, double dt)
+void find_velocity_change(VelocityField<G>& field, double pic_fraction, double dt)
 {
   for (Index i : field.part.nodes)
     for (int a = 0; a < G::dim; ++a)
-      field.velocity_change[i][a] = dt * field.acceleration[i][a] + pic_share * field.start_velocity[i][a];
+      field.velocity_change[i][a] = dt * field.acceleration[i][a] + pic_fraction * field.start_velocity[i][a];
 }
 
 template <class G, int D>

@@ -27,10 +27,10 @@ void map_to_nodes(Model<G>& model);
 template <class G>
 void find_start_velocity(VelocityField<G>& field);
 
-/// What the nodes add to the velocities of particles over dt [s]: dt a_i, and with a PIC share that much of the grid's
-/// velocity, which takes the place of the particles' own.
+/// What the nodes add to the velocities of particles over dt [s]: dt a_i, and with a PIC fraction that much of the
+/// grid's velocity, which takes the place of the particles' own.
 template <class G>
-void find_velocity_change(VelocityField<G>& field, double pic_share, double dt);
+void find_velocity_change(VelocityField<G>& field, double pic_fraction, double dt);
 
 /// Volumetric strains of the nodes over dt [s] from the field's `velocity`, averages over the cells around them (nodal
 /// mixed discretisation).

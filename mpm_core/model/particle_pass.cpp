@@ -35,7 +35,7 @@ void update_failed(Model<G>& model, const Batch& batch, const PointBatch<D>& poi
 /// v + s (w - v), which costs m s d . (v - s d / 2) with d = v - w.
 template <class G, int D = G::dim>
 double pic_loss(const Mesh<D>& mesh, const Particles<D>& particles, const VelocityField<G>& field, const Run& run,
-                double share)
+                double pic_fraction)
 {
   const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
   const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
@@ -47,7 +47,7 @@ double pic_loss(const Mesh<D>& mesh, const Particles<D>& particles, const Veloci
       double w = nodal.value[a];
       for (int b = 0; b < D; ++b)
         w += nodal.gradient[a][b] * (particles.position[b][p] - centre[b]);
-      const double v = particles.velocity[a][p], change = share * (v - w);
+      const double v = particles.velocity[a][p], change = pic_fraction * (v - w);
       sum += particles.mass[p] * change * (v - 0.5 * change);
     }
   return sum;
@@ -116,8 +116,8 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   VelocityField<G>& field = field_of(model, batch.material);
   auto& runs = model.order.runs;
   find_motions(model.mesh, field, runs, options, batch, scratch);
-  for (std::size_t r = batch.first_run; options.move && options.pic_share > 0 && r < batch.last_run; ++r)
-    model.energy.pic_loss += pic_loss(model.mesh, model.particles, field, runs[r], options.pic_share);
+  for (std::size_t r = batch.first_run; options.move && options.pic_fraction > 0 && r < batch.last_run; ++r)
+    model.energy.pic_loss += pic_loss(model.mesh, model.particles, field, runs[r], options.pic_fraction);
   if (options.move)
     for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
       runs[r].scattered = !move_particles<D>(model.particles, runs[r].first, runs[r].last,

@@ -9,13 +9,13 @@ namespace mpm
 /// What the pass does.
 struct PassOptions
 {
-  double dt;          ///< [s]
-  bool move;          ///< velocities (18) and positions (20)
-  bool stress;        ///< strain increment and stress update
-  double pic_share;   ///< share of the grid's velocity in the particle's, 0 is FLIP
-  bool averaged;      ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
-  double law_dt;      ///< duration of the increment for laws [s]; infinite where they are given all time
-  bool small = false; ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
+  double dt;           ///< [s]
+  bool move;           ///< velocities (18) and positions (20)
+  bool stress;         ///< strain increment and stress update
+  double pic_fraction; ///< fraction of the grid's velocity in the particle's, 0 is FLIP
+  bool averaged;       ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
+  double law_dt;       ///< duration of the increment for laws [s]; infinite where they are given all time
+  bool small = false;  ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal

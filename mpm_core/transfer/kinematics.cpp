@@ -27,7 +27,7 @@ inline void move_piece(Piece<2 * D>& piece, const CellShape<D>& shape, const Cel
     }
     moved[a] = xi[a] + u;
     piece[a] += u;
-    piece[D + a] = motion.keep * piece[D + a] + change;
+    piece[D + a] = motion.flip_fraction * piece[D + a] + change;
   }
   for (int k = 0; k <= D; ++k)
   {

@@ -7,7 +7,7 @@
 
 namespace mpm
 {
-/// Moves the particles [first, last) of a cell: v_p = keep v_p + sum N_i change_i (18),
+/// Moves the particles [first, last) of a cell: v_p = flip_fraction v_p + sum N_i change_i (18),
 /// x_p += sum N_i displacement_i (20).
 /// @returns whether each particle is still inside of the cell (and finite)
 template <int D>

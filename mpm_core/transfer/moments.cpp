@@ -144,8 +144,8 @@ void move(CellMoments<G>& moments, const CellMotion<D>& motion)
   {
     const double f = motion.change.value[a];
     const Vector<D>& df = motion.change.gradient[a];
-    double value = motion.keep * moments.momentum[a] + mass * f;
-    Row first = motion.keep * components<D>(moments.momentum_xi[a]) + f * xi;
+    double value = motion.flip_fraction * moments.momentum[a] + mass * f;
+    Row first = motion.flip_fraction * components<D>(moments.momentum_xi[a]) + f * xi;
     for (int b = 0; b < D; ++b)
     {
       value += df[b] * centre[b];

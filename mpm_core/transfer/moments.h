@@ -56,11 +56,11 @@ inline AffineField<D> scaled(AffineField<D> field, double factor)
   return field;
 }
 
-/// Motion of a cell's particles over a step: v_p = keep v_p + change(x_p), x_p += displacement(x_p)
+/// Motion of a cell's particles over a step: v_p = flip_fraction v_p + change(x_p), x_p += displacement(x_p)
 template <int D>
 struct CellMotion
 {
-  double keep; ///< 1 in FLIP
+  double flip_fraction; ///< 1 - PIC fraction
   AffineField<D> change;
   AffineField<D> displacement;
 };

@@ -158,7 +158,7 @@ TYPED_TEST(NodesTest, MappingConservesSums)
 
 TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
 {
-  // v_p = keep v_p + f(x_p), then x_p += u(x_p) with affine f and u: the moments follow without the particles.
+  // v_p = flip_fraction v_p + f(x_p), then x_p += u(x_p) with affine f and u: the moments follow without the particles.
   constexpr int D = TypeParam::value;
   const Mesh<D> mesh = test::box<D>(1).mesh();
   Particles<D> particles = random_particles(mesh, 60);

@@ -36,7 +36,7 @@ def change_over_1000_steps(model, **scheme):
 
 @pytest.mark.parametrize("dim", DIMS)
 @pytest.mark.parametrize("law", [ELASTIC, SOIL], ids=["elastic", "Mohr-Coulomb"])
-@pytest.mark.parametrize("scheme", SCHEMES, ids=["MUSL", "PIC share", "NMD", "USF"])
+@pytest.mark.parametrize("scheme", SCHEMES, ids=["MUSL", "PIC fraction", "NMD", "USF"])
 def test_mass_and_momentum_of_a_free_body_stay(dim, law, scheme):
     model = free_body(dim, law, speed=0.2, mean=0.05)
     cells = by_id(model, "cell")

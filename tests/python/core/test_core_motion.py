@@ -28,7 +28,7 @@ def falling_body(dim):
         {"integration": mpm.Integration.MIXED},
         {"integration": mpm.Integration.DUAL_DOMAIN},
     ],
-    ids=["MUSL", "NMD", "PIC share", "USF", "mixed integration", "dual domains"],
+    ids=["MUSL", "NMD", "PIC fraction", "USF", "mixed integration", "dual domains"],
 )
 def test_free_fall_is_exact(dim, scheme):
     model = falling_body(dim)
