@@ -146,8 +146,11 @@ class Seepage:
         low, high = heads.min(initial=np.inf), heads.max(initial=-np.inf)
         comm = self.domain.comm
         size = comm.allreduce(float(high), MPI.MAX) - comm.allreduce(float(low), MPI.MIN)
-        if problem is self._transient:  # so that the water of a long step, too, is conserved to round-off
-            size = min(size, self.stored_water() / (self._largest * float(self._dt.value)))
+        if (
+            problem is self._transient
+        ):  # all water, over the step: long steps, too, are to conserve it, short ones have its round-off
+            water = self.stored_water() / (self._largest * float(self._dt.value))
+            size = max(min(size, water), 1e-3 * water)
         failure = problem.solve(fixed, values, upper, size)
         self.iterations = problem.iterations
         if not failure:
