@@ -16,6 +16,7 @@ import numpy as np
 from common.field_plots import save_curves
 from common.figures import Pictures
 from common.files import OutputError
+from common.flow_steps import FlowSteps
 from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
@@ -34,8 +35,6 @@ from fenics_bridge import water
 from fenics_bridge.compat import cell_dofs
 
 comm = MPI.COMM_WORLD
-FEW_ITERATIONS, SHORTEST = 7, 1e-6
-"""Newton's iterations up to which the next step is longer, and the shortest step over the whole time"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -95,21 +94,18 @@ class Files:
 
 def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None]) -> str | None:
     """The flow in time, with steps as long as Newton's method takes well. Returns why it ended early, if it did. Collective."""
-    end, dt = DAY * a.days, DAY * a.days / 200
-    frames = list(np.linspace(0.0, end, a.frames + 1)[1:])
+    end = DAY * a.days
+    steps = FlowSteps(flow, end)
     with Progress("seepage", a.days, comm, unit="days") as progress:
-        for frame in frames:
-            while flow.time < frame * (1 - 1e-12):
-                step = min(dt, frame - flow.time)
-                if not flow.advance(step):
-                    dt = 0.4 * step
-                    if dt < SHORTEST * end:
-                        return f"steps of {step:.3g} s do not converge at {flow.time / DAY:.3g} days"
-                    continue
-                files.row()
-                progress.show(flow.time / DAY, len(files.history))
-                if flow.iterations <= FEW_ITERATIONS:
-                    dt = min(1.5 * max(dt, step), end / 50)
+
+        def made() -> None:
+            files.row()
+            progress.show(flow.time / DAY, len(files.history))
+
+        for frame in np.linspace(0.0, end, a.frames + 1)[1:]:
+            stopped = steps.until(frame, made)
+            if stopped:
+                return stopped
             files.frame()
             pictures.append(flow_picture(flow, f"After {flow.time / DAY:.3g} days"))
     return None

@@ -7,7 +7,7 @@ from fenics_bridge.water.coupled import Element
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import PorousSoil
-from fenics_bridge.water.standing import standing_water
+from fenics_bridge.water.standing import ground_line, standing_water
 
 __all__ = [
     "AlwaysSaturated",
@@ -25,5 +25,6 @@ __all__ = [
     "SeepageFace",
     "Tabulated",
     "VanGenuchten",
+    "ground_line",
     "standing_water",
 ]

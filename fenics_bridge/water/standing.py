@@ -23,7 +23,7 @@ def standing_water(domain, facet_tags, boundary, unit_weight=WATER_WEIGHT):
     agree(domain.comm, None if dim == 2 else f"domain: has {dim} dimensions, expected a plane section")
     reservoirs = [condition for condition in boundary if isinstance(condition, Reservoir)]
     agree(domain.comm, None if reservoirs else "boundary: has no Reservoir, expected one or more")
-    grounds = [(condition, _ground(domain, facet_tags, condition.facet_tag)) for condition in reservoirs]
+    grounds = [(condition, ground_line(domain, facet_tags, condition.facet_tag)) for condition in reservoirs]
     close = 1e-9 * max(
         (np.ptp(line) for _, ground in grounds for line in ground), default=0.0
     )  # round-off of coordinates
@@ -39,8 +39,11 @@ def standing_water(domain, facet_tags, boundary, unit_weight=WATER_WEIGHT):
     return pressure
 
 
-def _ground(domain, facet_tags, tag):
-    """The surface at the facets of a tag as a line: x rising and the highest y at each, (k,) [m]. Collective."""
+def ground_line(domain, facet_tags, tag):
+    """The surface at the facets of a tag as a line: x rising and the highest y at each, (k,) [m]. Collective.
+
+    Raises InputError, on all ranks, for an unknown tag.
+    """
     facets = tagged_facets(domain.comm, facet_tags, tag, "boundary")
     nodes = domain.geometry.x[facet_nodes(domain, facets).ravel()][:, :2]
     x, y = np.concatenate(domain.comm.allgather(nodes)).T

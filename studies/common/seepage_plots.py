@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -15,12 +15,14 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 import fenics_bridge as bridge
 from fenics_bridge import water
+from fenics_bridge.water.boundary import value_at
 
 from .field_plots import Field, gathered
 from .figures import save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
 
 HEAD = Quantity("Total head", "m", colours="viridis")
+PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
 TABLE = "#1f6fd0"
 
 
@@ -29,30 +31,51 @@ class FlowPicture:
     """A flow for pictures, on the first rank.
 
     head: pressure head at the corners of all cells [m]; velocity: at the corners too, averaged over cells [m/s]
+    unit_weight: of water [N/m3]; levels: standing water, lines (k, 2) from point to point [m]
     """
 
     name: str
     head: Field
     velocity: np.ndarray
+    unit_weight: float
+    levels: list[np.ndarray] = field(default_factory=list)
 
     @property
     def total(self) -> np.ndarray:
         """Total head at the corners [m]."""
         return self.head.values[:, 0] + self.head.points[:, 1]
 
+    def values(self, quantity: Quantity) -> np.ndarray:
+        """HEAD or PRESSURE at the corners, as shown."""
+        return self.total if quantity is HEAD else quantity.scale * self.unit_weight * self.head.values[:, 0]
 
-def flow_picture(flow: water.Seepage, name: str) -> FlowPicture | None:
-    """The flow as it is now; None but on the first rank. Collective."""
+
+def flow_picture(flow: water.Seepage, name: str, reservoirs: Sequence[tuple] = ()) -> FlowPicture | None:
+    """The flow as it is now; None but on the first rank. Collective.
+
+    Args:
+        reservoirs: to be shown: (condition, x, y), with the line of the ground below each.
+    """
     head, velocity = gathered(flow.pressure_head), gathered(bridge.nodal_average(flow.velocity()))
-    return None if head is None or velocity is None else FlowPicture(name, head, velocity.values)
+    if head is None or velocity is None:
+        return None
+    levels = [_level(value_at(condition.level, flow.time), x, y) for condition, x, y in reservoirs]
+    return FlowPicture(name, head, velocity.values, flow.unit_weight, levels)
 
 
-def save_flow(path: Path, pictures: Sequence[FlowPicture]) -> None:
-    """One panel for each flow, above one another, with one scale of the head."""
+def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The surface of the water above the ground: (k, 2) [m], not a number where there is none."""
+    along = np.linspace(x[0], x[-1], 1000)
+    return np.column_stack([along, np.where(np.interp(along, x, y) < level, level, np.nan)])
+
+
+def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> None:
+    """One panel for each flow, above one another, with one scale of the head, or of the pore pressure."""
     points = pictures[0].head.points
     low, high = points.min(axis=0), points.max(axis=0)
-    every = np.concatenate([picture.total for picture in pictures])
+    every = np.concatenate([picture.values(quantity) for picture in pictures])
     ticks = ROUND_TICKS.tick_values(every.min(), every.max())
+    fastest = max(float(np.linalg.norm(picture.velocity, axis=1).max()) for picture in pictures)
     limits, aspect = (ticks[0], ticks[-1]), (high[1] - low[1]) / (high[0] - low[0])
     levels = np.linspace(*limits, 21)
     with paper_style():
@@ -60,33 +83,40 @@ def save_flow(path: Path, pictures: Sequence[FlowPicture]) -> None:
                                       squeeze=False, layout="constrained")  # fmt: skip
         for axes, picture in zip(panels[:, 0], pictures):
             triangles = Triangulation(*picture.head.points.T, picture.head.cells)
-            axes.tricontourf(triangles, picture.total, levels, cmap=HEAD.colours)
-            axes.tricontour(triangles, picture.total, levels[1:-1], colors="black", linewidths=0.35, alpha=0.6)
-            _flow_lines(axes, triangles, picture, low, high)
+            axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours)
+            axes.tricontour(
+                triangles, picture.values(quantity), levels[1:-1], colors="black", linewidths=0.35, alpha=0.6
+            )
+            _flow_lines(axes, triangles, picture, (low, high), fastest)
             pressure_head = picture.head.values[:, 0]
             if pressure_head.min() < 0 < pressure_head.max():
                 axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
+            for line in picture.levels:
+                axes.plot(*line.T, color=TABLE, linewidth=1.8)
             axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
             axes.set_title(picture.name, loc="left", pad=3)
             axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
         panels[-1, 0].set_xlabel("$x$ [m]")
         bar = figure.colorbar(
-            ScalarMappable(Normalize(*limits), HEAD.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
+            ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
         )
-        bar.set_label(HEAD.label)
+        bar.set_label(quantity.label)
         save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
-def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, low: np.ndarray, high: np.ndarray) -> None:
-    """Flow lines through the saturated soil, where water moves at all."""
+def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, box: tuple, fastest: float) -> None:
+    """Flow lines through the saturated soil, where water moves at all.
+
+    fastest: velocity in all pictures [m/s]; a millionth of it is round-off in water at rest
+    """
+    low, high = box
     x, y = (np.linspace(a, b, n) for a, b, n in zip(low, high, (240, 120)))
     grid = np.meshgrid(x, y)
     u, v, p = (LinearTriInterpolator(triangles, values)(*grid)
                for values in (*picture.velocity.T, picture.head.values[:, 0]))  # fmt: skip
     speed = np.hypot(u, v)
-    fastest = speed.max()
-    if not fastest > 0:
+    if not speed.max() > 1e-6 * fastest:
         return
-    still = speed.mask | (speed.filled(0) < 1e-4 * fastest) | (p.filled(-1) < 0)
+    still = speed.mask | (speed.filled(0) < 1e-4 * speed.max()) | (p.filled(-1) < 0)
     axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color="white", linewidth=0.6, density=0.9,
                     arrowsize=0.6)  # fmt: skip

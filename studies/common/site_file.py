@@ -126,7 +126,11 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Sit
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = _table(path)
+    return site_of(_table(path), path, comm, cell_size)
+
+
+def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
+    """The site that a table describes, as `read_site` has it from a file; path: of the file, for its mesh and messages."""
     axisymmetric = table.get("axisymmetric", False)
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")

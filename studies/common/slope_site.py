@@ -1,0 +1,119 @@
+"""A site of slopes under water that rises, falls or rains on them: mesh, soils with law and conductivity, supports, and water.
+
+`meshes/drawdown.toml` is an example. The file has the keys of a site of stages (but for the stages) and
+those of a site of seepage: each soil has a law of effective stresses, a unit weight, conductivity and a retention curve. Cells of
+the mesh that no soil names are air, or water, into which the soil may slide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+from fenics_bridge import water
+from fenics_bridge.water.boundary import value_at
+
+from .site_file import Site, read_toml, site_of
+from .water_site import SOIL_KEYS, condition, porous_soil
+
+KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries")
+MECHANICAL = ("mesh", "cell_size", "constants", "supports")
+
+
+@dataclass
+class SlopeSite:
+    """A slope and its water as a file describes them.
+
+    site: mesh, laws, weights and supports; porous: {soil: PorousSoil}; boundary: of `fenics_bridge.water`
+    body: domain, cell tags and facet tags of the soil alone
+    """
+
+    site: Site
+    porous: dict[str, water.PorousSoil]
+    boundary: list
+    body: tuple
+
+    def seepage(self, boundary: list | None = None) -> water.Seepage:
+        """The flow in linear elements, at rest; its reservoirs load the soil as well. Collective."""
+        domain, cell_tags, facet_tags = self.body
+        boundary = self.boundary if boundary is None else boundary
+        return water.Seepage(domain, self.porous, facet_tags, boundary, cell_tags=cell_tags, loading=self.standing())
+
+    def standing(self) -> Callable | None:
+        """Pressure of the water on the ground by positions and time, as of `standing_water`; None without a reservoir. Collective."""
+        domain, _, facet_tags = self.body
+        any_there = any(isinstance(condition, water.Reservoir) for condition in self.boundary)
+        return water.standing_water(domain, facet_tags, self.boundary) if any_there else None
+
+    def ground(self) -> list[tuple]:
+        """Reservoirs, each with the line of the ground below it: (condition, x, y). Collective."""
+        domain, _, facet_tags = self.body
+        return [
+            (c, *water.ground_line(domain, facet_tags, c.facet_tag))
+            for c in self.boundary
+            if isinstance(c, water.Reservoir)
+        ]
+
+    def elements(
+        self, degree: int, pore_pressure: Callable, laws: dict | None = None, **options: Any
+    ) -> bridge.QuasiStatic:
+        """Elements of the soil, unloaded, under given pore pressures. Collective."""
+        domain, cell_tags, facet_tags = self.body
+        site = self.site
+        fem = bridge.QuasiStatic(
+            domain, laws or site.laws, facet_tags, site.supports, degree, cell_tags=cell_tags, **options
+        )
+        fem.reconfigure(pore_pressure=pore_pressure)
+        return fem
+
+    def times(self, end: float) -> list[float]:
+        """Times [s] up to an end at which a table of the boundary conditions has a corner."""
+        tables = [value for c in self.boundary for value in (getattr(c, "level", None), getattr(c, "rate", None))]
+        return sorted({time for table in tables if isinstance(table, tuple) for time, _ in table if 0 < time <= end})
+
+    def boundary_at(self, time: float) -> list:
+        """The boundary conditions with the values that they have at a time [s], for good."""
+        return [_held(condition, time) for condition in self.boundary]
+
+
+def _held(condition: Any, time: float) -> Any:
+    names = [name for name in ("level", "rate") if hasattr(condition, name)]
+    return replace(condition, **{name: value_at(getattr(condition, name), time) for name in names})
+
+
+def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, slower: float = 1.0) -> SlopeSite:
+    """Read a site of slopes and make its mesh. Collective.
+
+    Args:
+        path: of the TOML file.
+        cell_size: [m], instead of the one in the file.
+        slower: factor on the times of all tables.
+
+    Raises:
+        InputError: on all ranks, with the file, the key and what was expected.
+    """
+    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries"))
+    porous, soils = {}, {}
+    for name, given in table["soils"].items():
+        porous[name] = porous_soil({k: v for k, v in given.items() if k in SOIL_KEYS}, f"{path}: soils.{name}")
+        soils[name] = {k: v for k, v in given.items() if k not in SOIL_KEYS}
+    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
+    mechanical = {key: table[key] for key in MECHANICAL if key in table} | {"soils": soils}
+    site = site_of(mechanical, path, comm, cell_size)
+    body = bridge.soil_mesh(site.domain, site.cell_tags, site.facet_tags, tag=site.soils)
+    return SlopeSite(site, porous, [_slower(one, slower) for one in boundary], body)
+
+
+def _slower(condition: Any, factor: float) -> Any:
+    tables = {
+        name: getattr(condition, name)
+        for name in ("level", "rate")
+        if isinstance(getattr(condition, name, None), tuple)
+    }
+    rows = {name: tuple((factor * time, value) for time, value in table) for name, table in tables.items()}
+    return replace(condition, **rows)

@@ -1,0 +1,65 @@
+"""Pictures of slopes and their water: factor of safety over time, pore pressures, the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .field_plots import Field, gathered, save_mechanism
+from .figures import Pictures, save_figure
+from .plots import CURVES, paper_style
+from .seepage_plots import PRESSURE, save_flow
+from .water_site import DAY
+from .water_slopes import Instant, lowest
+
+CAPTIONS = {
+    "pore_pressure": "Pore pressure, negative where it is suction, with flow lines, the water table and standing water (blue)",
+    "factor_of_safety": "Factor of safety over time",
+    "mechanism": "Mechanism in which the slope fails at the time of the lowest factor, its strength divided by the factor",
+}
+MOST_PANELS = 4
+
+
+def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[str, float]) -> Pictures:
+    """All pictures of a slope in time; limits: factors of safety by name, drawn as lines. Collective."""
+    worst = lowest(list(instants))
+    field: Field | None = gathered(worst.safety.mechanism)
+    if field is None:
+        return {}
+    shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
+    title = f"{worst.time / DAY:.3g} days: factor of safety {worst.safety.value:.2f}"
+    return {
+        "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
+        "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),
+        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
+    }
+
+
+def _chosen(instants: Sequence[Instant], worst: Instant) -> list[Instant]:
+    """The first, the worst and the last instant, and one between the first two."""
+    k = next(k for k, instant in enumerate(instants) if instant is worst)
+    numbers = sorted({0, k // 2, k, len(instants) - 1})
+    return [instants[n] for n in numbers[:MOST_PANELS]]
+
+
+def save_factors(path: Path, instants: Sequence[Instant], limits: Mapping[str, float]) -> None:
+    """The factor of safety over time, with lines for its limits and for 1."""
+    days = np.array([instant.time for instant in instants]) / DAY
+    factors = np.array([instant.safety.value for instant in instants])
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
+        axes.plot(days, factors, "o-", color=CURVES[0], markersize=3, label="in time")
+        for k, (name, value) in enumerate(limits.items()):
+            axes.axhline(value, color=CURVES[k + 1], linestyle=("--", "-.", ":")[k % 3], linewidth=1.1, label=name)
+        axes.axhline(1.0, color="black", linewidth=0.7)
+        every = [*factors, *limits.values(), 1.0]
+        margin = 0.08 * (max(every) - min(every))
+        axes.set(xlabel="Time [days]", ylabel="Factor of safety [-]", xlim=(0, days[-1] or 1.0),
+                 ylim=(min(every) - margin, max(every) + margin))  # fmt: skip
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(fontsize=8)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

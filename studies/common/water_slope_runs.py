@@ -1,0 +1,58 @@
+"""A study of a slope and its water: factor of safety over time, its limits, and the slide where it fails."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from time import perf_counter
+
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+
+from .collapse_runs import UNDECIDED
+from .page import Page
+from .results import open_results
+from .slope_site import SlopeSite, read_slope_site
+from .summary import write_summary
+from .water_site import DAY
+from .water_slope_plots import CAPTIONS, slope_pictures
+from .water_slopes import failure_time, follow, lowest
+
+comm = MPI.COMM_WORLD
+
+
+def water_slope_study(a: Namespace, limits_of: Callable[[Namespace, SlopeSite], dict[str, bridge.Collapse]]) -> int:
+    """Carry out a study of a slope and its water; returns its exit code. Collective.
+
+    Args:
+        a: options, with those of `add_water_slope_options`.
+        limits_of: function of options and site that returns factors of safety to compare with, by name.
+    """
+    start = perf_counter()
+    folder = open_results(a, comm)
+    slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
+    limits = limits_of(a, slope)
+    instants, history, stopped = follow(a, slope, folder)
+    worst, failed = lowest(instants), failure_time(instants)
+    shown = all(found.failed for found in [*limits.values(), *(instant.safety for instant in instants)])
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped,
+        "factor_of_safety_at_start": instants[0].safety.value, "lowest_factor_of_safety": worst.safety.value,
+        "lowest_factor_time_days": worst.time / DAY, "failure_time_days": None if failed is None else failed / DAY,
+        "last_factor_of_safety": instants[-1].safety.value, "failure_shown": shown,
+        "limits": [{"limit": name, "factor_of_safety": found.value} for name, found in limits.items()],
+        "wall_seconds": perf_counter() - start,
+    }  # fmt: skip
+    values = {name: found.value for name, found in limits.items()}
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), slope_pictures(folder, instants, values))
+    if comm.rank == 0:
+        fails = "stands" if failed is None else f"fails after {failed / DAY:.3g} days"
+        print(f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {worst.time / DAY:.3g} days")
+        for name, value in values.items():
+            print(f"{name}: {value:.3f}")
+        if stopped:
+            print(f"the run ended early: {stopped}", file=sys.stderr)
+        print(f"results in {folder}")
+    return 1 if stopped else 0 if shown else UNDECIDED

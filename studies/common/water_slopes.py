@@ -1,0 +1,156 @@
+"""Factor of safety of a slope while its water rises or falls: seepage in time, and strength reduction at chosen times.
+
+The flow gives pore pressures, and suctions; finite elements on effective stresses find the factor at each time. Nothing goes back
+from the soil to the flow, but that standing water loads the pores as well as the soil.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.output import MeshOutput
+
+import fenics_bridge as bridge
+from fenics_bridge import water
+
+from .flow_steps import FlowSteps
+from .history import History
+from .options import add_choice, add_count, add_number, add_switch
+from .progress import Progress
+from .results import ROOT
+from .seepage_plots import FlowPicture, flow_picture
+from .slope_site import SlopeSite
+from .water_site import DAY
+
+comm = MPI.COMM_WORLD
+FIRST_STEP, TOLERANCE = 0.1, 0.005
+"""Of the factor of safety: the first step, and the width of the last one as a fraction of it"""
+
+
+def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suction: bool) -> None:
+    """Options of a slope and its water: the site's file, by default one of `meshes/`, its times, its elements."""
+    p = parser
+    p.add_argument("--site", type=Path, default=ROOT / "meshes" / f"{site}.toml", metavar="FILE",
+                   help=f"TOML file of mesh, soils, supports and water (default: meshes/{site}.toml)")  # fmt: skip
+    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles for the factor of safety")
+    add_number(p, "--days", days, "days", "time that is followed", above=0)
+    add_number(p, "--slower", 1.0, "-", "factor on the times of all tables of the site", above=0)
+    add_count(p, "--factor-times", 6, "times, evenly over --days, at which the factor of safety is found, beside the beginning, "
+              "the corners of the site's tables and three times before each of them")  # fmt: skip
+    add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
+    add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives to soil of less "
+               "dilation; otherwise with the flow that the site gives")  # fmt: skip
+    add_switch(p, "--suction", suction, "suction times effective saturation adds to effective stress (Bishop)")
+
+
+@dataclass
+class Instant:
+    """The slope at one time.
+
+    time: [s]; safety: its factor; pore_pressure: function of positions; picture: of the flow, on the first rank
+    """
+
+    time: float
+    safety: bridge.Collapse
+    pore_pressure: Callable
+    picture: FlowPicture | None
+
+
+def safety(a: Namespace, slope: SlopeSite, pore_pressure: Callable, title: str) -> bridge.Collapse:
+    """The factor of safety under given pore pressures. Collective.
+
+    Args:
+        a: options with elements, start and davis.
+        title: for the line that is printed.
+    """
+    fem = slope.elements(int(a.elements[1]), pore_pressure)
+    reduce = bridge.davis_reduced_strength if a.davis else bridge.reduced_strength
+    found = bridge.factor_of_safety(
+        fem, slope.site.load(), start=a.start, first_step=FIRST_STEP, tolerance=TOLERANCE, reduce=reduce
+    )
+    if comm.rank == 0:
+        print(f"{title}: factor of safety {found.value:.3f}{'' if found.failed else ' at least'}", file=sys.stderr)
+    return found
+
+
+def steady_safety(a: Namespace, slope: SlopeSite, time: float, title: str) -> bridge.Collapse:
+    """The factor of safety under the steady flow that belongs to the boundary conditions at a time [s]. Collective."""
+    flow = slope.seepage(slope.boundary_at(time))
+    flow.solve()
+    return safety(a, slope, flow.pore_pressure(a.suction), title)
+
+
+class Files:
+    """What is written as time goes on: the factors, and frames for ParaView. A context manager."""
+
+    def __init__(self, flow: water.Seepage, folder: Path) -> None:
+        self._flow = flow
+        mesh = bridge.background_arrays(flow.domain)
+        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
+        self._output = MeshOutput(folder / "slope", comm, self._points, mesh["cells"][own])
+        columns = ["time_days", "factor_of_safety", "failed_at_factor", "stored_water_m2"]
+        self.history = History(folder / "factors.csv", columns, comm)
+
+    def add(self, instant: Instant) -> None:
+        """Add the factor, the pressures and the mechanism of an instant, at which the flow is. Collective."""
+        flow, found = self._flow, instant.safety
+        self.history.add(time_days=instant.time / DAY, factor_of_safety=found.value, failed_at_factor=found.failed_at,
+                         stored_water_m2=flow.stored_water())  # fmt: skip
+        there = bridge.evaluate_at(self._points, p=flow.pressure_head, u=found.mechanism)
+        head = there["p"][:, 0]
+        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self._points[:, -1],
+                  "acting_pore_pressure": instant.pore_pressure(self._points), "mechanism": there["u"]}  # fmt: skip
+        self._output.write(instant.time, fields, {})
+
+    def __enter__(self) -> Files:
+        self.history.__enter__()
+        return self
+
+    def __exit__(self, *error) -> None:
+        self.history.__exit__(*error)
+        self._output.close()
+
+
+def follow(a: Namespace, slope: SlopeSite, folder: Path) -> tuple[list[Instant], History, str | None]:
+    """The slope from the steady flow of the beginning on; returns also why it ended early, if it did. Collective."""
+    end = DAY * a.days
+    flow = slope.seepage()
+    flow.solve()
+    steps, instants, stopped = FlowSteps(flow, end), [], None
+    corners = np.array([0.0, *slope.times(end)])
+    between = np.interp(np.arange(0, len(corners) - 0.75, 0.25), np.arange(len(corners)), corners)
+    times = np.unique(np.round([*between, *np.linspace(0.0, end, a.factor_times + 1)], 6))
+    with Files(flow, folder) as files, Progress("water and slope", a.days, comm, unit="days") as progress:
+        for time in times:
+            stopped = steps.until(time)
+            if stopped:
+                break
+            days = f"{time / DAY:.3g} days"
+            pressure = flow.pore_pressure(a.suction)
+            picture = flow_picture(flow, f"After {days}" if time else "At the beginning", slope.ground())
+            instants.append(Instant(time, safety(a, slope, pressure, days), pressure, picture))
+            files.add(instants[-1])
+            progress.show(flow.time / DAY, len(instants))
+    return instants, files.history, stopped
+
+
+def failure_time(instants: list[Instant]) -> float | None:
+    """Time [s] at which the factor falls below 1, between two instants by a straight line; None where it does not."""
+    for before, after in zip([instants[0], *instants], instants):
+        if after.safety.value < 1.0:
+            fell = before.safety.value - after.safety.value
+            share = (before.safety.value - 1.0) / fell if fell > 0 else 1.0
+            return before.time + share * (after.time - before.time)
+    return None
+
+
+def lowest(instants: list[Instant]) -> Instant:
+    """The instant of the lowest factor."""
+    return min(instants, key=lambda instant: instant.safety.value)

@@ -1,0 +1,56 @@
+"""A bank whose reservoir falls: its factor of safety over time by finite elements.
+
+The site is a TOML file (`meshes/drawdown.toml` unless another is given): mesh, soils, supports, and the level of the reservoir in
+time. Seepage in time gives pore pressures, strength reduction the factor of safety at chosen times. Its limits stand beside it:
+slow drawdown, by the steady flow under the last levels, and fast drawdown without drainage, where pore pressures fall by the
+weight of the water that left (Morgenstern 1963). `--slower` stretches the times of the drawdown.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+import numpy as np
+from common.files import OutputError
+from common.options import study_parser
+from common.ranks import run_study
+from common.slope_site import SlopeSite
+from common.water_slope_runs import water_slope_study
+from common.water_site import DAY
+from common.water_slopes import add_water_slope_options, safety, steady_safety
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_water_slope_options(p, "drawdown", days=60.0, suction=False)
+    return p
+
+
+def limits(a: Namespace, slope: SlopeSite) -> dict[str, bridge.Collapse]:
+    """Factors of safety after drawdown that is slow, and fast, without limit. Collective."""
+    standing, end = slope.standing(), DAY * a.days
+    if standing is None:
+        raise mpm.InputError(f"{a.site}: no boundary has a reservoir, expected one whose level falls")
+    flow = slope.seepage()
+    flow.solve()
+    before = flow.pore_pressure()
+
+    def undrained(x: np.ndarray) -> np.ndarray:
+        return np.maximum(before(x) - standing(x, 0.0) + standing(x, end), 0.0)
+
+    return {
+        "slow drawdown, steady flow": steady_safety(a, slope, end, "slow drawdown"),
+        "fast drawdown, no drainage": safety(a, slope, undrained, "fast drawdown"),
+    }
+
+
+def main(arguments: list[str] | None = None) -> int:
+    return water_slope_study(parser().parse_args(arguments), limits)
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)
