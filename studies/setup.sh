@@ -11,7 +11,7 @@ log=$build/setup.log
 
 # What a study needs. ninja, git and ffmpeg could be done without, but make it faster or nicer. OpenBLAS, without threads of its
 # own, factorises matrices some ten times as fast as the BLAS that is there by default.
-packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev libptscotch-dev pkg-config pybind11-dev
+packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev libptscotch-dev libeigen3-dev pkg-config pybind11-dev
   python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
   python3-numpy libopenblas0-serial python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.
@@ -122,7 +122,7 @@ installed_packages() { dpkg-query -W -f '${db:Status-Status} ${Package}\n' 2>/de
 install_missing() {
   [[ -z $python || $(readlink -f "$python") == /usr/bin/python3* ]] || return 0
   if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
-    [[ -n $python ]] || say "this system has no apt-get; needed are CMake, a C++20 compiler, MPI, parallel HDF5, pybind11," \
+    [[ -n $python ]] || say "this system has no apt-get; needed are CMake, a C++20 compiler, MPI, parallel HDF5, Eigen, pybind11," \
       "GoogleTest, and for Python: DOLFINx, gmsh, mpi4py, petsc4py, matplotlib"
     return 0
   fi

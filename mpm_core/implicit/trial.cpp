@@ -1,6 +1,6 @@
 #include "implicit/trial.h"
 
-#include "base/determinant.h"
+#include "base/eigen.h"
 #include "implicit/cell_tangent.h"
 #include "model/batches.h"
 #include "model/integration.h"
@@ -46,7 +46,7 @@ double growth(const Matrix<D>& velocity_gradient, double dt)
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
       f[i][j] = dt * velocity_gradient[i][j] + (i == j ? 1.0 : 0.0);
-  return determinant(f);
+  return as_eigen<D>(f).determinant();
 }
 
 template <class G, int D = G::dim>

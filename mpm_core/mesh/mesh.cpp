@@ -1,6 +1,6 @@
 #include "mesh/mesh.h"
 
-#include "base/determinant.h"
+#include "base/eigen.h"
 
 #include <algorithm>
 #include <cmath>
@@ -56,22 +56,6 @@ void check_input(const MeshInput<D>& input)
                               " does not exist, the mesh has ", nodes, " nodes"));
 }
 
-/// Gradients of vertices 1..D are the rows of the inverse of the edge matrix, transposed.
-void inverse_rows(const Matrix<2>& e, double det, Matrix<2>& rows)
-{
-  rows[0] = {e[1][1] / det, -e[1][0] / det};
-  rows[1] = {-e[0][1] / det, e[0][0] / det};
-}
-
-void inverse_rows(const Matrix<3>& e, double det, Matrix<3>& rows)
-{
-  for (int i = 0; i < 3; ++i)
-  {
-    const Vector<3>&a = e[(i + 1) % 3], &b = e[(i + 2) % 3];
-    rows[i] = {(a[1] * b[2] - a[2] * b[1]) / det, (a[2] * b[0] - a[0] * b[2]) / det, (a[0] * b[1] - a[1] * b[0]) / det};
-  }
-}
-
 template <int D>
 CellShape<D> make_shape(const Mesh<D>& mesh, Index cell)
 {
@@ -92,18 +76,17 @@ CellShape<D> make_shape(const Mesh<D>& mesh, Index cell)
   for (int i = 0; i < D; ++i)
     shape.centre[i] += x0[i];
 
-  const double det = determinant(edges);
+  const double det = as_eigen<D>(edges).determinant();
   shape.volume = std::abs(det) / (D == 2 ? 2 : 6);
   if (!(std::abs(det) > 1e-12 * std::pow(longest, D)))
     throw InputError(show("cells: cell ", cell, " with its first node at ", show_point<D>(x0), " has ",
                           D == 2 ? "area " : "volume ", shape.volume, ", expected a positive value"));
-  Matrix<D> rows;
-  inverse_rows(edges, det, rows);
+  const Eigen::Matrix<double, D, D> inverse = as_eigen<D>(edges).inverse(); // column k: gradient of vertex k + 1
   for (int k = 0; k < D; ++k)
     for (int i = 0; i < D; ++i)
     {
-      shape.gradient[k + 1][i] = rows[k][i];
-      shape.gradient[0][i] -= rows[k][i];
+      shape.gradient[k + 1][i] = inverse(i, k);
+      shape.gradient[0][i] -= inverse(i, k);
     }
   return shape;
 }

@@ -104,17 +104,19 @@ double mean_of(const Working<G>& stress)
 
 /// The cells' change of mean stress times volume when it is averaged over nodes, handed to `take` cell by cell.
 template <class G, class StressOf, class Take>
-void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
-                         StressOf&& stress_of, std::span<VolumeMean> nodes, Take&& take)
+void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
+                         StressOf&& stress_of, Take&& take)
 {
+  field.mean_stress.resize(mesh.points.size());
   const auto of_cell = [&](Index c) -> VolumeMean
   {
     const double volume = integrated_volume(mesh, field, c);
     return {volume > 0 ? mean_of<G>(stress_of(c)) / volume : 0, volume};
   };
-  average_over_nodes<G::dim>(mesh, field.part, of_cell, exchange, nodes);
+  average_over_nodes<G::dim>(mesh, field.part, of_cell, exchange, field.mean_stress);
   for (Index c : field.part.cells)
-    take(c, integrated_volume(mesh, field, c) * mean_of_nodes<G::dim>(mesh.cells[c], nodes) - mean_of<G>(stress_of(c)));
+    take(c, integrated_volume(mesh, field, c) * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) -
+                mean_of<G>(stress_of(c)));
 }
 } // namespace
 
@@ -123,7 +125,7 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
                       std::span<Working<G>> stress)
 {
   const auto stress_of = [&](Index c) -> const Working<G>& { return stress[c]; };
-  average_mean_stress<G>(mesh, exchange, field, stress_of, field.mean_stress,
+  average_mean_stress<G>(mesh, exchange, field, stress_of,
                          [&](Index c, double change)
                          {
                            for (int k : normal_component<G>)
@@ -135,7 +137,7 @@ template <class G, int D>
 void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
 {
   const auto stress_of = [&](Index c) { return integrated_stress(mesh, field, c); };
-  average_mean_stress<G>(mesh, exchange, field, stress_of, field.mean_stress,
+  average_mean_stress<G>(mesh, exchange, field, stress_of,
                          [&](Index c, double change)
                          {
                            for (int k = 0; k <= D; ++k)

@@ -128,7 +128,6 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
   field.nodes.assign(nodes, {});
   for (auto* values : {&field.start_velocity, &field.acceleration, &field.velocity_change, &field.velocity})
     values->assign(nodes, {});
-  field.mean_stress.resize(nodes);
   field.volumetric_strain.resize(nodes);
   field.part = {};
   field.left.clear();

@@ -55,11 +55,12 @@ struct VelocityField
   double least_mass = 0; ///< nodes below this mass are not moved [kg]
 
   // How its nodes move
-  std::vector<Support<D>> supports;                       ///< its boundary conditions
-  std::vector<Vector<D>> start_velocity;                  ///< v_i at the start of the step
-  std::vector<Vector<D>> acceleration;                    ///< a_i
-  std::vector<Vector<D>> velocity_change;                 ///< of the nodes, as the particles take it
-  std::vector<Vector<D>> velocity;                        ///< v_i that moves and strains the particles
-  std::vector<VolumeMean> mean_stress, volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
+  std::vector<Support<D>> supports;          ///< its boundary conditions
+  std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
+  std::vector<Vector<D>> acceleration;       ///< a_i
+  std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it
+  std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
+  std::vector<VolumeMean> volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
+  std::vector<VolumeMean> mean_stress;       ///< of the nodes; empty until first used with it
 };
 } // namespace mpm
