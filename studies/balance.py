@@ -1,8 +1,8 @@
-"""Load balance: a slope that slides over the ranks' parts of the mesh, as it was cut at first, and cut anew on the way.
+"""Load balance: a slope that slides across the ranks' parts of the mesh, with the first partition and with repartition.
 
-DOLFINx cuts the background mesh by cells. Soil fills only some of them, so ranks have unequal numbers of particles from the
-start, and other ones as the slope slides; each step waits for the rank that has most. The run is done twice: with the first
-cut, and with one by the number of particles (PT-SCOTCH) whenever the most on a rank exceed the mean by the threshold.
+DOLFINx partitions the background mesh by cells. Soil fills only some of them, so that ranks have unequal numbers of particles
+from the start, which change as the slope slides; each step waits for the rank with most particles. The slope slides twice: with
+the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds the threshold.
 """
 
 from __future__ import annotations
@@ -36,26 +36,31 @@ def parser() -> ArgumentParser:
     add_slope_options(p)
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
     add_number(
-        p, "--threshold", 1.2, "-", "most particles on a rank over their mean at which the mesh is cut anew", above=1
+        p,
+        "--threshold",
+        1.2,
+        "-",
+        "load imbalance at which the mesh is repartitioned: maximum over mean particles per rank",
+        above=1,
     )
     add_count(p, "--frames", 60, "times at which particles are counted")
     return p
 
 
 @dataclass
-class Run:
-    """One slide; `imbalance` is the most particles on a rank over the mean, at each time."""
+class Slide:
+    """One slide; `imbalance` is the load imbalance at each time."""
 
     time: list[float] = field(default_factory=list)
     imbalance: list[float] = field(default_factory=list)
     frames: list[dict | None] = field(default_factory=list)
-    cuts: int = 0
+    repartitions: int = 0
     seconds: float = 0.0
 
 
-def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -> Run:
+def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -> Slide:
     """Run the slope without damping from zero stress. Collective."""
-    run, model = Run(), case.model
+    run, model = Slide(), case.model
 
     def look(time: float) -> None:
         run.time.append(time)
@@ -65,7 +70,7 @@ def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -
             "position": p.position, "volume": p.volume, "id": p.id, "rank": np.full(len(p), float(comm.rank))
         }))  # fmt: skip
 
-    with Progress("as cut at first" if threshold is None else "cut anew", until, comm) as progress:
+    with Progress("first partition" if threshold is None else "repartition", until, comm) as progress:
         look(0.0)
         started = perf_counter()
         for report in model.explicit(until, every=until / frames, pic=0.02, rebalance=threshold):
@@ -73,11 +78,11 @@ def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -
             look(report.time)
             progress.show(report.time, report.steps)
             started = perf_counter()
-    run.cuts = model.cuts
+    run.repartitions = model.repartitions
     return run
 
 
-def difference(one: Run, other: Run) -> float:
+def difference(one: Slide, other: Slide) -> float:
     """Largest distance between particles of two runs at their ends [m]; on the first rank."""
     if comm.rank != 0:
         return 0.0
@@ -93,26 +98,26 @@ def main(arguments: list[str] | None = None) -> int:
         raise mpm.InputError("one rank is always balanced; run the study on several, by --ranks 4")
     folder = open_results(a, comm)
     cases = [build_slope(a, comm) for _ in range(2)]
-    runs = {"as cut at first": slide(cases[0], a.time, a.frames, None),
-            "cut anew": slide(cases[1], a.time, a.frames, a.threshold)}  # fmt: skip
+    runs = {"first partition": slide(cases[0], a.time, a.frames, None),
+            "repartition": slide(cases[1], a.time, a.frames, a.threshold)}  # fmt: skip
     scene = cases[0].scene()
-    first, anew = runs.values()
+    first, repartitioned = runs.values()
     results = {
-        "mean_imbalance_as_cut_at_first": float(np.mean(first.imbalance)),
-        "mean_imbalance_cut_anew": float(np.mean(anew.imbalance[1:])),
-        "cuts": anew.cuts,
-        "largest_difference_m": difference(first, anew),
+        "mean_imbalance_first_partition": float(np.mean(first.imbalance)),
+        "mean_imbalance_repartitioned": float(np.mean(repartitioned.imbalance[1:])),
+        "repartitions": repartitioned.repartitions,
+        "largest_difference_m": difference(first, repartitioned),
         "wall_seconds": {name: run.seconds for name, run in runs.items()},
     }
     page, pictures = None, {}
     if scene is not None:
         pictures["imbalance"] = lambda: save_history(
             folder / "imbalance.png", np.array(first.time), {name: run.imbalance for name, run in runs.items()},
-            "Most particles on a rank over their mean [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
+            "Load imbalance: maximum over mean particles per rank [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
         page = Page(movies=[Movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
-                    captions={"imbalance": "Most particles on a rank over their mean"})  # fmt: skip
-        print(f"most particles on a rank over their mean: {results['mean_imbalance_as_cut_at_first']:.2f} as cut at first, "
-              f"{results['mean_imbalance_cut_anew']:.2f} cut anew, {anew.cuts} times; results in {folder}")  # fmt: skip
+                    captions={"imbalance": "Load imbalance: maximum over mean number of particles per rank"})  # fmt: skip
+        print(f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
+              f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions; results in {folder}")  # fmt: skip
     write_summary(folder, a, results, comm, page, pictures)
     return 0
 

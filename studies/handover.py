@@ -1,8 +1,8 @@
 """When to hand over: the load at which particles take over from FEM, and what it changes in the final run-out.
 
-The slope is brought to elasto-plastic equilibrium by FEM under a share of the unit weight at which it collapses; particles take
-that over; then the unit weight is raised at once to its full value and the slope slides, as in the study slope. A share of zero
-is the slide from nothing.
+The slope is brought to elasto-plastic equilibrium by FEM under a fraction of the unit weight at which it collapses, and
+particles take over its stresses. Then the unit weight is raised at once to its full value and the slope slides, as in the study
+slope. With a fraction of zero the slide starts from zero stress.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
-SHARES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
-"""Of the unit weight at collapse of the finite elements, at which particles take over."""
+FRACTIONS = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
+"""Fractions of the unit weight at collapse of the finite elements, at which particles take over."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
     return np.array(rows), frames
 
 
-def run(a: Namespace, share: float, unit_weight: float) -> dict:
+def run(a: Namespace, fraction: float, unit_weight: float) -> dict:
     """One hand-over and slide; its results for the summary."""
     case = build_slope(a, comm)
     watch = Watch(case)  # of the particles as seeded, before the hand-over may move them
@@ -96,9 +96,9 @@ def run(a: Namespace, share: float, unit_weight: float) -> dict:
     before = fem_frame(case.model, case.fem, 0.0, undeformed) if case.fem else None
     history, frames = slide(case, watch)
     if comm.rank == 0:
-        print(f"handed over at {share:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
+        print(f"handed over at {fraction:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
               file=sys.stderr, flush=True)  # fmt: skip
-    return {"share": share, "unit_weight": unit_weight, "report": report, "history": history, "frames": frames,
+    return {"fraction": fraction, "unit_weight": unit_weight, "report": report, "history": history, "frames": frames,
             "before": before, "scene": case.scene()}  # fmt: skip
 
 
@@ -106,14 +106,14 @@ def run(a: Namespace, share: float, unit_weight: float) -> dict:
 
 
 def drawn(runs: list[dict], folder: Path) -> Pictures:
-    """Run-out over the share, and over time."""
-    shares = np.array([run["share"] for run in runs])
-    final = {"run-out": (100 * shares, np.array([run["history"][-1, 1] for run in runs])),
-             "displacement at the crest": (100 * shares, np.array([run["history"][-1, 2] for run in runs]))}  # fmt: skip
-    crest = {f"{run['share']:.0%}": run["history"][:, 2] for run in runs}
+    """Run-out over the fraction of the collapse load, and over time."""
+    fractions = np.array([run["fraction"] for run in runs])
+    final = {"run-out": (100 * fractions, np.array([run["history"][-1, 1] for run in runs])),
+             "displacement at the crest": (100 * fractions, np.array([run["history"][-1, 2] for run in runs]))}  # fmt: skip
+    crest = {f"{run['fraction']:.0%}": run["history"][:, 2] for run in runs}
     return {
-        "runout_over_share": lambda: save_curves(
-            folder / "runout_over_share.png", final, ("Unit weight at hand-over [% of collapse]", "At the end [m]"),
+        "runout_over_fraction": lambda: save_curves(
+            folder / "runout_over_fraction.png", final, ("Unit weight at hand-over [% of collapse]", "At the end [m]"),
             limits=((-2, 102), (0, None))),
         "crest_over_time": lambda: save_history(
             folder / "crest_over_time.png", runs[0]["history"][:, 0], crest, "Displacement of the particle at the crest [m]",
@@ -122,14 +122,14 @@ def drawn(runs: list[dict], folder: Path) -> Pictures:
 
 
 def movies(runs: list[dict]) -> list[Movie]:
-    """The slides from nothing and from the latest hand-over, and the finite elements at that hand-over."""
+    """The slides from zero stress and from the latest hand-over, and the finite elements at that hand-over."""
     first, last = runs[0], runs[-1]
     return [
         *(
-            Movie(f"MPM, handed over at {run['share']:.0%} of collapse", run["scene"], run["frames"])
+            Movie(f"MPM, handed over at {run['fraction']:.0%} of collapse", run["scene"], run["frames"])
             for run in (first, last)
         ),
-        Movie(f"FEM at {last['share']:.0%} of collapse", last["scene"], [last["before"]]),
+        Movie(f"FEM at {last['fraction']:.0%} of collapse", last["scene"], [last["before"]]),
     ]
 
 
@@ -142,11 +142,11 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     fem = soil_fem(build_slope(a, comm))
     collapse = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse")).value
-    runs = [run(a, share, share * collapse) for share in SHARES]
+    runs = [run(a, fraction, fraction * collapse) for fraction in FRACTIONS]
     runouts = [float(run["history"][-1, 1]) for run in runs]
     summary = {
         "collapse_unit_weight_of_the_finite_elements": collapse,
-        "runout_m_by_share_of_collapse": {f"{run['share']:g}": runout for run, runout in zip(runs, runouts)},
+        "runout_m_by_fraction_of_collapse": {f"{run['fraction']:g}": runout for run, runout in zip(runs, runouts)},
         "largest_relative_change_of_runout": (max(runouts) - min(runouts)) / max(runouts) if max(runouts) > 0 else 0.0,
         "handovers": [row_of(run) for run in runs],
         "wall_seconds": perf_counter() - start,
@@ -159,14 +159,14 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def row_of(run: dict) -> dict:
-    """A run as the summary has it."""
+    """A row of the summary."""
     report = run["report"]
     return {
-        "share_of_collapse": run["share"],
+        "fraction_of_collapse": run["fraction"],
         "unit_weight": run["unit_weight"],
         "out_of_balance_ratio_before": report.unbalanced_ratio if report else None,
-        "out_of_balance_ratio_after": report.settled_ratio if report else None,
-        "newly_yielded_share": report.yielded_share if report else None,
+        "out_of_balance_ratio_after": report.equilibrated_ratio if report else None,
+        "newly_yielded_fraction": report.yielded_fraction if report else None,
         "runout_m": run["history"][-1, 1],
         "crest_displacement_m": run["history"][-1, 2],
     }
@@ -176,13 +176,13 @@ def print_summary(summary: dict, folder: Path) -> None:
     print(
         f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3"
     )
-    print("share  unit weight  out of balance before, after  newly yielded  run-out   crest")
+    print("load   unit weight  out of balance before, after  newly yielded  run-out   crest")
     for row in summary["handovers"]:
         balance = "          -         -                -   "
-        if row["newly_yielded_share"] is not None:
+        if row["newly_yielded_fraction"] is not None:
             balance = (f"{row['out_of_balance_ratio_before']:13.1e}{row['out_of_balance_ratio_after']:13.1e}"
-                       f"{row['newly_yielded_share']:17.2%}")  # fmt: skip
-        print(f"{row['share_of_collapse']:5.0%}{row['unit_weight'] / 1e3:8.2f} kN/m3{balance:>43}"
+                       f"{row['newly_yielded_fraction']:17.2%}")  # fmt: skip
+        print(f"{row['fraction_of_collapse']:5.0%}{row['unit_weight'] / 1e3:8.2f} kN/m3{balance:>43}"
               f"{row['runout_m']:9.4f} m{row['crest_displacement_m']:8.4f} m")  # fmt: skip
     print(f"run-out changes by {summary['largest_relative_change_of_runout']:.1%} at most; results in {folder}")
 

@@ -40,7 +40,7 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 COLUMNS = [
-    "time_s", "retrogression_m", "runout_m", "work_of_stresses_J_per_m", "kinetic_energy_J_per_m", "plastic_share", "dt_s"
+    "time_s", "retrogression_m", "runout_m", "work_of_stresses_J_per_m", "kinetic_energy_J_per_m", "plastic_fraction", "dt_s"
 ]  # fmt: skip
 MEASURES = {
     "retrogression_m": "Failed length of the crest [m]", "runout_m": "Run-out past the toe [m]",
@@ -126,7 +126,7 @@ class Slide:
         self.history.add(
             time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=max(0.0, front - self.case.toe),
             work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy,
-            plastic_share=report.plastic_share, dt_s=report.dt,
+            plastic_fraction=report.plastic_fraction, dt_s=report.dt,
         )  # fmt: skip
         frame = particle_frame(self.case.model, report.time)
         if frame is not None:

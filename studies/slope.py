@@ -56,8 +56,8 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 COLUMNS = [
-    "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unexplained_share_of_energy",
-    "unbalanced_ratio", "plastic_share", "dt_s",
+    "time_s", "crest_displacement_m", "runout_m", "kinetic_energy_J_per_m", "unexplained_fraction_of_energy",
+    "unbalanced_ratio", "plastic_fraction", "dt_s",
 ]  # fmt: skip
 MAY_CHANGE = {
     "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "frames", "frame-steps", "rebalance",
@@ -87,7 +87,7 @@ def parser() -> ArgumentParser:
     )
     add_output_options(p, PARTICLE_FIELDS)
     add_picture_options(p)
-    add_number(p, "--rebalance", 1.2, "-", "cut the mesh anew when the most particles on a rank are this many times their mean",
+    add_number(p, "--rebalance", 1.2, "-", "repartition the mesh above this load imbalance: maximum over mean particles per rank",
                above=1)  # fmt: skip
     add_checkpoint_options(p)
     add_site_option(p)
@@ -173,8 +173,8 @@ def slide(
         crest, runout = watch.crest_displacement(), watch.runout()
         history.add(
             time_s=report.time, crest_displacement_m=crest, runout_m=runout, kinetic_energy_J_per_m=report.kinetic_energy,
-            unexplained_share_of_energy=report.unexplained_share,
-            unbalanced_ratio=report.unbalanced_ratio, plastic_share=report.plastic_share,
+            unexplained_fraction_of_energy=report.unexplained_fraction,
+            unbalanced_ratio=report.unbalanced_ratio, plastic_fraction=report.plastic_fraction,
             dt_s=report.dt if report.time > 0 else 0.0,  # before the first step it is that of the equilibration
         )  # fmt: skip
         files.write()
@@ -332,7 +332,7 @@ def summarised(case: SlopeCase, start: dict, loop: dict, history: History, clock
         "runout_m": history["runout_m"][-1],
         "energy_J_per_m": energies(report),
         # There is none to balance in a quasi-static run.
-        "unexplained_share_of_energy": report.unexplained_share if a.scheme != "quasi-static" else None,
+        "unexplained_fraction_of_energy": report.unexplained_fraction if a.scheme != "quasi-static" else None,
         "particle_steps_per_second": loop["particle_steps"] / loop["seconds"] if loop["seconds"] else 0.0,
         "wall_seconds": {name: clock[name] - clock[before] for before, name in zip(names, names[1:])},
     }

@@ -40,11 +40,11 @@ class AveragedKinematics:
         size = rows * points.size
         normal = dim if radii is None else 3
         in_plane = np.tile(np.arange(points.size) < normal, rows)[:, None] / normal
-        share = _matrix(comm, (size, rows), np.repeat(cell, points.size)[:, None], in_plane)
+        part = _matrix(comm, (size, rows), np.repeat(cell, points.size)[:, None], in_plane)
         self._strain = _matrix(
             comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0), _strain_rows(gradients, radii)
         )
-        self._strain.axpy(1.0, share.matMult(spread))
+        self._strain.axpy(1.0, part.matMult(spread))
         components = points.size * cell[:, None] + np.arange(points.size)
         self._columns = np.repeat(components, points.size, axis=0)
         self._tangent = _matrix(comm, (size, size), self._columns, 1.0)

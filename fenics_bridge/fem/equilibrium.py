@@ -81,7 +81,7 @@ class EquilibriumStep:
         return not self.reason
 
     def move(self, step):
-        """Add a share of the correction to the last point of the iteration; returns the residual there."""
+        """Add a fraction of the correction to the last point of the iteration; returns the residual there."""
         body, points = self._body, self._body.points
         body.increment.x.array[:] = self._base + step * self._correction.x.array
         strain = body.kinematics.strain_increment()

@@ -22,8 +22,8 @@ class Load:
 
     unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
     pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
-    displacement: share of the displacements that the supports prescribe [-], for `prescribed` supports
-    held: share of the forces that were out of balance when the present stage began and are still held [-], see `Stage`
+    displacement: fraction of the displacements that the supports prescribe [-], for `prescribed` supports
+    held: fraction of the forces that were out of balance when the present stage began and are still held [-], see `Stage`
     """
 
     unit_weight: float | dict = 0.0
@@ -31,11 +31,11 @@ class Load:
     displacement: float = 0.0
     held: float = 0.0
 
-    def towards(self, other, share):
-        """The load a share of the way (0 to 1) from this one to another."""
+    def towards(self, other, fraction):
+        """The load at a fraction (0 to 1) of the way from this one to another."""
 
         def between(a, b):
-            return a + share * (b - a)
+            return a + fraction * (b - a)
 
         def between_tags(a, b):
             return {tag: between(a.get(tag, a.get(None, 0.0)), b.get(tag, b.get(None, 0.0))) for tag in {*a, *b}}
@@ -69,7 +69,7 @@ def _weight_by_tag(unit_weight):
 class LoadVectors:
     """Nodal forces of loads on a displacement space; each kind of load is assembled once.
 
-    constant, held: forces that always act, and those of which the load's share `held` acts; arrays like `forces`, or 0
+    constant, held: forces that always act, and those of which the load's fraction `held` acts; arrays like `forces`, or 0
     """
 
     def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None, radius=None):

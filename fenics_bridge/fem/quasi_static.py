@@ -177,7 +177,7 @@ class QuasiStatic:
     def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
         """Raise the load from the present one to the given one, in steps that adapt. Returns a list of LoadStep.
 
-        first_step: share of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
+        first_step: fraction of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
         `converged` tells whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
         """
         return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)

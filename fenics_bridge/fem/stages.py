@@ -10,6 +10,7 @@ import numpy as np
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.fem.k0 import surface_height
 from mpm_core import _core
+from mpm_core.checks import renamed
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,16 @@ class StageReport:
 
 
 class StageError(RuntimeError):
-    """A stage has no equilibrium; says which, how far it came, where it fails, under which law, and what to try.
+    """A stage has no equilibrium; the message names the stage, the fraction reached, the place and law of failure, and a remedy.
 
-    share: of the stage's change that is in equilibrium [-]; the model is left there
+    fraction: of the stage's change that is in equilibrium [-]; the model stays in that state
     """
 
-    def __init__(self, message, share):
+    def __init__(self, message, fraction):
         super().__init__(message)
-        self.share = share
+        self.fraction = fraction
+
+    share = renamed("share", "fraction")
 
 
 def hydrostatic(level, unit_weight=9.81e3):

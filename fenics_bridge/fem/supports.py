@@ -80,9 +80,9 @@ class Constraints:
         self.values = np.fromiter(value_of.values(), float, len(value_of))
         self.origin = np.zeros(len(value_of))
 
-    def at(self, share):
-        """Displacements (k,) [m] of the dofs at a share of the values."""
-        return self.origin + share * self.values
+    def at(self, fraction):
+        """Displacements (k,) [m] of the dofs at a fraction of the values."""
+        return self.origin + fraction * self.values
 
 
 def flat_normal(domain, facet_tags, tag):

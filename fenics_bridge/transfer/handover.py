@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpm_core.checks import renamed
 
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
@@ -13,7 +14,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
 
 _BALANCED, _MOST_STEPS = 5e-4, 60
-"""Out-of-balance ratio to reach, and the steps that it may take: near collapse each one leaves a share of it."""
+"""Out-of-balance ratio to reach, and the steps that it may take: near collapse each one leaves a fraction of it."""
 
 
 @dataclass(frozen=True)
@@ -21,15 +22,19 @@ class Handover:
     """What a hand-over did; sums are over all ranks.
 
     unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
-    settled_ratio: the same after the equilibration [-]; None when there was none
-    returned_share: share of the particles whose stress had to be brought back inside the strength [-]
-    yielded_share: share of the particles that yielded in the equilibration where the finite elements did not [-]
+    equilibrated_ratio: the same after the equilibration [-]; None without equilibration
+    returned_fraction: fraction of the particles whose stress had to be returned to the yield surface [-]
+    yielded_fraction: fraction of the particles that yielded in the equilibration where the finite elements did not [-]
     """
 
     unbalanced_ratio: float
-    settled_ratio: float | None
-    returned_share: float
-    yielded_share: float
+    equilibrated_ratio: float | None
+    returned_fraction: float
+    yielded_fraction: float
+
+    settled_ratio = renamed("settled_ratio", "equilibrated_ratio")
+    returned_share = renamed("returned_share", "returned_fraction")
+    yielded_share = renamed("yielded_share", "yielded_fraction")
 
 
 def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True):
@@ -75,10 +80,10 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
     _displace(model, fem.displacement, search, move, count_displacement)
     before = model.out_of_balance()
     had_yielded = int(np.sum(particles.plastic_strain > 0))
-    settled = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio if equilibrate else None
+    after = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio if equilibrate else None
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
-    return Handover(before, settled, returned / count, yielded / count)
+    return Handover(before, after, returned / count, yielded / count)
 
 
 def _take_stress_and_state(model, fem, search, smooth):

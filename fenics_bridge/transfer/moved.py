@@ -37,11 +37,11 @@ def held_volumes(domain, displacement, geometry=None):
     body, volumes = displacement.function_space.mesh, body_volumes(domain, geometry)
     own = cell_volumes(body)
     per_cell = max(1, round(_SAMPLES * _mean(body.comm, own) / _mean(domain.comm, cell_volumes(domain))))
-    shares = simplex_samples(body.geometry.dim, per_cell)
-    at = np.zeros((len(own) * len(shares), 3))
-    at[:, : body.geometry.dim] = np.einsum("qk,ckd->cqd", shares, _ordered(cell_corners(body))).reshape(len(at), -1)
-    cells = np.repeat(np.arange(len(own), dtype=np.int32), len(shares))
-    moved, sampled = at[:, : body.geometry.dim], np.repeat(own / len(shares), len(shares))
+    samples = simplex_samples(body.geometry.dim, per_cell)
+    at = np.zeros((len(own) * len(samples), 3))
+    at[:, : body.geometry.dim] = np.einsum("qk,ckd->cqd", samples, _ordered(cell_corners(body))).reshape(len(at), -1)
+    cells = np.repeat(np.arange(len(own), dtype=np.int32), len(samples))
+    moved, sampled = at[:, : body.geometry.dim], np.repeat(own / len(samples), len(samples))
     if len(at):
         moved = moved + np.asarray(displacement.eval(at, cells)).reshape(moved.shape)
         sampled = sampled * np.asarray(volume_change(displacement).eval(at, cells)).ravel()
@@ -55,7 +55,7 @@ def fitted_volumes(volume, cell, held):
     """Volumes of particles, scaled in each cell so that they add up to what the cell holds of the body.
 
     A particle that has crossed into a full cell would else make it fuller than full, and leave a gap where it was:
-    forces out of balance by a share of the stress on a cell's side, however small the displacements are.
+    forces out of balance by a fraction of the stress on a cell's side, however small the displacements are.
     volume (n,), cell (n,): of the particles; held (m,): by cell (0: the samples found nothing there, and the particles
     keep their volume)
     """
@@ -65,7 +65,7 @@ def fitted_volumes(volume, cell, held):
 
 
 def simplex_samples(dim, count):
-    """Points spread evenly over a simplex, for equal shares of its volume: barycentric coordinates (count, D + 1).
+    """Points spread evenly over a simplex, for equal fractions of its volume: barycentric coordinates (count, D + 1).
 
     A sequence of low discrepancy in the unit cube, multiples of the powers of 1/g with g^(D + 1) = g + 1 (Roberts 2018,
     The unreasonable effectiveness of quasirandom sequences); sorting coordinates maps the cube evenly to the simplex

@@ -34,11 +34,11 @@ def boundary_forces(model, tag, pressure):
         nearest = rows[distance < distance.min() + 1e-6]
         # The outward normal times the area is -D V grad N of the opposite corner.
         area = dim * mesh.cell_volumes[cell] * gradient
-        share = np.full(len(nearest), 1 / len(nearest))
+        fraction = np.full(len(nearest), 1 / len(nearest))
         if model.geometry == Geometry.AXISYMMETRIC:  # each carries its own ring
             area *= np.delete(mesh.points[mesh.cells[cell], 0], k).mean()
-            share = position[nearest, 0] / position[nearest, 0].sum()
-        force[nearest] += pressure * share[:, None] * area
+            fraction = position[nearest, 0] / position[nearest, 0].sum()
+        force[nearest] += pressure * fraction[:, None] * area
     any_facet = model.comm.allreduce(len(facets))
     agree(model.comm, None if any_facet else f"pressure: no soil lies at the boundary with the tag {tag}")
     return force

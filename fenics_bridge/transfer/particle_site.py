@@ -46,7 +46,7 @@ class ParticleSite:
         """Bring the particles to equilibrium after a stage's changes. Returns a StageReport. Collective.
 
         Raises InputError, on all ranks, for a stage that asks for what is not there; StageError where there is no
-        equilibrium: the particles are then as at the last share of the stage that had one.
+        equilibrium: the particles are then in the last equilibrium of the stage.
         """
         model = self.model
         state, fill, excavate = self.state.after(stage)

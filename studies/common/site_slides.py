@@ -31,7 +31,7 @@ from .site_file import read_site
 from .summary import write_summary
 
 comm = MPI.COMM_WORLD
-COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_share"]
+COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_fraction"]
 CAPTIONS = {
     "slide_displacement": "Displacement at the end of the slide",
     "slide_strain": "Accumulated plastic shear strain at the end of the slide",
@@ -65,7 +65,7 @@ class Slide:
         moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
         self.history.add(
             time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
-            kinetic_energy_J_per_m=report.kinetic_energy, plastic_share=report.plastic_share,
+            kinetic_energy_J_per_m=report.kinetic_energy, plastic_fraction=report.plastic_fraction,
         )  # fmt: skip
         self.files.write()
         frame = particle_frame(self.model, report.time)
@@ -153,7 +153,7 @@ def site_slide(a: Namespace) -> int:
     moved = result.history["largest_displacement_m"][-1]
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped, "factor": a.factor,
-        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_share": handover.yielded_share,
+        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_fraction": handover.yielded_fraction,
         "largest_displacement_m": moved, "particles": comm.allreduce(len(model.particles)),
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip

@@ -159,9 +159,9 @@ def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float])
     model.set_gravity((0.0, -GRAVITY))
     return {
         "initial_out_of_balance_ratio": report.unbalanced_ratio,
-        "equilibrated_out_of_balance_ratio": report.settled_ratio,
-        "newly_yielded_share": report.yielded_share,
-        "returned_to_strength_share": report.returned_share,
+        "equilibrated_out_of_balance_ratio": report.equilibrated_ratio,
+        "newly_yielded_fraction": report.yielded_fraction,
+        "returned_to_strength_fraction": report.returned_fraction,
     }
 
 

@@ -87,7 +87,7 @@ def vibrating(cells):
     model.set_gravity((0.0, -GRAVITY))
     reports = list(model.explicit(0.15, every=0.0025))
     rows = [(r.time, r.kinetic_energy, r.internal_work, r.external_work + r.support_work) for r in reports]
-    return np.array(rows), max(abs(r.unexplained_share) for r in reports)
+    return np.array(rows), max(abs(r.unexplained_fraction) for r in reports)
 
 
 def run(quick: bool, folder) -> Result:

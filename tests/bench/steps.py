@@ -176,7 +176,7 @@ def table_row(name: str, row: dict) -> str:
     phases = " ".join(f"{share:5.0%}" for share in row["phases"].values())
     return (
         f"{name:32} {row['particles']:9d} {row['particle_steps_per_second'] / 1e6:9.1f} {row['share_of_bandwidth']:9.0%} "
-        f"{row['share_of_arithmetic']:10.0%} {row['plastic_share']:8.0%} {row['bytes_held']:6.0f}  {phases}"
+        f"{row['share_of_arithmetic']:10.0%} {row['plastic_fraction']:8.0%} {row['bytes_held']:6.0f}  {phases}"
     )
 
 
@@ -219,7 +219,7 @@ def main() -> None:
             "particle_steps_per_second": speed,
             "share_of_bandwidth": speed * MOVED_BYTES[dim] / bandwidth,
             "share_of_arithmetic": speed * OPERATIONS[dim] / peak,
-            "plastic_share": report.plastic_share,
+            "plastic_fraction": report.plastic_fraction,
             "bytes_held": model._core.bytes_per_particle(),
             "phases": phases,
         }

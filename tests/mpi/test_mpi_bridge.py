@@ -192,7 +192,7 @@ def test_hand_over_between_different_partitions(degree, cell_size, options):
         model = slope_particles(18e3, cell_size=cell_size, comm=comm)
         report = bridge.initialise(model, fem, equilibrate=False, **options)
         if not options:
-            assert report.unbalanced_ratio < 1e-10 and report.returned_share == 0
+            assert report.unbalanced_ratio < 1e-10 and report.returned_fraction == 0
         fields = ("stress", "state", "volume", "position", "deviatoric_strain")
         results.append((report.unbalanced_ratio, by_id(model, *fields) if comm is COMM else in_order(model, *fields)))
     (here, fields_here), (alone, fields_alone) = results
@@ -202,7 +202,7 @@ def test_hand_over_between_different_partitions(degree, cell_size, options):
     fem = slope_model(dilation_angle=0.0, degree=degree)
     fem.solve(bridge.Load(unit_weight=18e3))
     report = bridge.initialise(slope_particles(18e3, cell_size=cell_size), fem, **options)
-    assert report.settled_ratio < 1e-3 and report.yielded_share < 0.01
+    assert report.equilibrated_ratio < 1e-3 and report.yielded_fraction < 0.01
 
 
 def in_order(model, *names):
@@ -247,4 +247,4 @@ def test_axisymmetric_hand_over_between_different_partitions(degree, options):
     for mine, whole in zip(fields_here, fields_alone):
         assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
     report = bridge.initialise(cylinder_particles(8, headroom=0.25), cylinder_fem(8, degree=degree), **options)
-    assert report.settled_ratio < 1e-3
+    assert report.equilibrated_ratio < 1e-3

@@ -130,7 +130,7 @@ def test_a_partition_that_is_none_is_refused(comm, shared_path, cell):
     path = shared_path / "state.h5"
     model = sliding_slope(comm)
     list(model.explicit(0.01))
-    model.cuts = 1  # as after the mesh was partitioned anew
+    model.repartitions = 1  # as after the mesh was partitioned anew
     model.save(path)
     if comm.rank == 0:
         with h5py.File(path, "r+") as file:

@@ -50,7 +50,7 @@ def test_points_see_what_is_there(comm, dim):
     model, lengths = column(comm, dim)
     middle = [0.37] if dim == 2 else [0.37, 0.17]
     found = PointProbe(model, [[*middle, 0.3], [*middle, 1.7]]).values()
-    assert found["filled_0_share"] == pytest.approx(1.0) and found["filled_1_share"] == 0.0
+    assert found["filled_0_fraction"] == pytest.approx(1.0) and found["filled_1_fraction"] == 0.0
     assert found["velocity_y_0_m/s"] == pytest.approx(0.2) and np.isnan(found["velocity_y_1_m/s"])
     vertical = "yy" if dim == 2 else "zz"
     assert (

@@ -72,7 +72,7 @@ def test_an_implicit_run_that_is_rebalanced_is_the_same_run(comm):
     reports = [list(model.implicit(**options, rebalance=1.2)), list(alone.implicit(**options))]
     assert [r.iterations for r in reports[0]] == [r.iterations for r in reports[1]]
     assert_same(all_by_id(model), all_by_id(alone), 1e-7)
-    assert comm.size == 1 or model.cuts > 0
+    assert comm.size == 1 or model.repartitions > 0
 
 
 def heap(comm):
@@ -91,7 +91,7 @@ def test_a_run_of_tetrahedra_that_is_rebalanced_is_the_same_run(comm):
     explicit = dict(until=0.3, every=0.05, since=0.0, dt=1e-3, pic=0.01)
     for each, threshold in ((model, 1.2), (alone, None)):
         *_, report = each.explicit(**explicit, rebalance=threshold)
-    assert report.steps == 300 and (comm.size == 1 or model.cuts > 1)
+    assert report.steps == 300 and (comm.size == 1 or model.repartitions > 1)
     moved = all_by_id(model)
     assert moved["displacement"][:, 0].max() > 0.4
     assert_same(moved, all_by_id(alone))

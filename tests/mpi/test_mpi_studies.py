@@ -51,7 +51,7 @@ def test_hand_overs_of_the_study(shared_path, monkeypatch, move):
     monkeypatch.setattr(handover, "SHARES", (0.9,))
     options = ["--cell-size", "0.1", "--time", "0.02", *(["--move"] if move else [])]
     (row,) = summary_of(handover, shared_path, *options)["handovers"]
-    assert row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_share"] < 0.01
+    assert row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_fraction"] < 0.01
     assert move or row["out_of_balance_ratio_before"] < 1e-8
     assert 0.01 < row["crest_displacement_m"] < 0.2
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, partition
 from ._core import Geometry, InputError
-from .checks import positive
+from .checks import positive, renamed
 from .collective import collectively
 from .conditions import Conditions
 from .mesh import Mesh, Tag, floats
@@ -42,7 +42,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
 
 
 class Body(Conditions):
-    """The part of a model that does not know how it is run; see `Model`."""
+    """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
         self,
@@ -77,12 +77,14 @@ class Body(Conditions):
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run
-        self.cuts = 0
-        """How often the mesh has been cut anew."""
+        self.repartitions = 0
+        """Number of repartitions of the background mesh since the model was made."""
         self._first_mesh = mesh  # kept, since it may own the communicator
-        self._left_imbalance = 1.0  # by the last cut
+        self._left_imbalance = 1.0  # by the last partition
         self.particles = Particles(self._core)
         """The particles on this rank."""
+
+    cuts = renamed("cuts", "repartitions")
 
     @property
     def cell_volumes(self) -> NDArray[np.float64]:
@@ -104,7 +106,7 @@ class Body(Conditions):
         return material
 
     def seed(self, *, density: float, per_cell: int = 10, cell_tag: Tag | None = None, material: int = 0) -> int:
-        """Place particles evenly in cells, each with the same share of its cell's area or volume.
+        """Place particles evenly in cells, each with the same fraction of its cell's area or volume.
 
         In axial symmetry a particle's volume is that area times its radius. The sum is the cell's volume; with 3, 12, 48,
         ... per cell, which are Gauss points of degree 2, the masses of its nodes are exact too.
@@ -341,7 +343,7 @@ class Body(Conditions):
         return self.comm.allreduce(len(gone))
 
     def place(self, position: ArrayLike) -> None:
-        """Put the particles elsewhere: their cells are found anew, on whatever rank, and their displacement changes with it.
+        """Put the particles elsewhere: their cells are searched again on all ranks, and their displacement changes accordingly.
 
         The particles may have another order, and other ranks, afterwards.
 
@@ -360,21 +362,21 @@ class Body(Conditions):
     # --- ranks ---------------------------------------------------------------------------------------------------
 
     def imbalance(self) -> float:
-        """Most particles on a rank over their mean on all ranks; 1 is best [-]. Collective."""
+        """Load imbalance: maximum over mean number of particles per rank [-]; 1 is best. Collective."""
         return partition.imbalance(self)
 
     def rebalance(self) -> float:
-        """Cut the background mesh anew, so that ranks have about as many particles, and move cells and particles there.
+        """Repartition the background mesh by the number of particles, and send cells and particles to their new ranks.
 
-        Afterwards ``mesh`` is another object: cells and nodes have other local numbers, and those over all ranks as before.
-        Results change by round-off only. Runs do this by themselves, with ``rebalance=``.
+        Afterwards ``mesh`` is another object: local numbers of cells and nodes change, global numbers stay.
+        Results change by round-off only. A run does this by itself, with ``rebalance=``.
 
         Returns:
-            The imbalance that is left.
+            The remaining load imbalance.
 
         Raises:
             RunError: the program was built without PT-SCOTCH.
         """
         if self.comm.size > 1:
-            partition.cut_anew(self)
+            partition.repartition(self)
         return self.imbalance()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
     text = collectively(model.comm, lambda: _text(_description(model), notes))
-    _core.save(model._core, os.fspath(path), text, model.cuts > 0)
+    _core.save(model._core, os.fspath(path), text, model.repartitions > 0)
 
 
 def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
@@ -58,7 +58,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         if not partition.is_partition(model, cells):
             raise RunError(f"cannot read /cells/owned_cells in {name}: it has not each cell of the mesh once")
         partition.take_partition(model, cells)
-        model.cuts = there["cuts"]
+        model.repartitions = there["cuts"]
     for field in there.get("added_fields", []):
         if field["name"] not in {known["name"] for known in model.particles.schedule()}:
             model.add_field(**field)
@@ -118,7 +118,7 @@ def _description(model: Model) -> dict[str, Any]:
         "prescribed": {str(tag): model._conditions.index(condition) for tag, condition in model._prescribed.items()},
         "next_id": model._next_id,
         "added_fields": _added_fields(model),
-        "cuts": model.cuts,
+        "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
         "implicit": None if model._control is None else vars(model._control),
     }

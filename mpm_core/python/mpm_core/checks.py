@@ -1,4 +1,7 @@
-"""Checks of numbers that a caller gives; errors name the argument and what was expected."""
+"""Checks of what a caller gives: numbers, whose errors name the argument and what was expected, and old names."""
+
+import warnings
+from typing import Any
 
 import numpy as np
 
@@ -19,3 +22,17 @@ def within(name: str, value: float, low: float, high: float, *, open_above: bool
     if not (low <= value < high or (value == high and not open_above)):
         raise InputError(f"{name} is {value}, expected {low} <= {name} {'<' if open_above else '<='} {high}")
     return float(value)
+
+
+def renamed(old: str, new: str) -> Any:
+    """A property under the old name of an attribute, which warns and returns the new one; kept for one version."""
+
+    def value(self: Any) -> Any:
+        warnings.warn(
+            f"{type(self).__name__}.{old} is now called {new}; the old name will be removed in the next version",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return getattr(self, new)
+
+    return property(value, doc=f"Old name of `{new}`.")

@@ -25,7 +25,7 @@ class EnergyWatch:
     """Looks at the reports of a run.
 
     Args:
-        limit: `Report.unexplained_share` at which the run ends with an error; None for none.
+        limit: `Report.unexplained_fraction` at which the run ends with an error; None for none.
         speaks: whether this rank gives the warning.
     """
 
@@ -41,11 +41,11 @@ class EnergyWatch:
         """
         if report.steps < LEAST_STEPS:
             return
-        share = abs(report.unexplained_share)
-        if self.limit is not None and share > self.limit:
+        fraction = abs(report.unexplained_fraction)
+        if self.limit is not None and fraction > self.limit:
             raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {_ADVICE}")
-        if share > self.warned:
-            self.warned = 10 * share
+        if fraction > self.warned:
+            self.warned = 10 * fraction
             if self.speaks:
                 warnings.warn(f"{_said(report)}; {_ADVICE}", EnergyWarning, stacklevel=4)
 
@@ -56,7 +56,7 @@ _ADVICE = (
 
 
 def _said(report: Report) -> str:
-    part = 100 * report.unexplained_share
+    part = 100 * report.unexplained_fraction
     verb = "was lost" if part > 0 else "came from nothing"
     return (
         f"at t = {report.time:.6g} s {abs(part):.3g} % of the energy at work {verb}: "

@@ -29,7 +29,7 @@ class GhostPenalty:
     mass: float = 0.1
     """gamma_M, relative to the density [-]; acts on the acceleration"""
     filled: float = 0.5
-    """Cells filled less than this share of their volume are stabilised; 0 for none"""
+    """Cells filled to less than this fraction of their volume are stabilised; 0 for none"""
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass", "filled"):

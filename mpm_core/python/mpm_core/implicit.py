@@ -1,4 +1,4 @@
-"""The implicit scheme over time: steps that are cut when they fail and grow again when they are easy."""
+"""The implicit scheme over time: steps are shortened when they fail and grow again when they converge easily."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def run_implicit(
         yield report()
 
 
-def settle(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
+def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
     """Quasi-static steps at the present time until the particles balance their loads.
 
     What the loads are out of balance by is applied at once, or in parts where that fails. The steps that apply it move the

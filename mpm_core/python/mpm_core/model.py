@@ -21,7 +21,7 @@ from .explicit import (
     steps_between,
 )
 from .ghost import GhostPenalty
-from .implicit import checked_accuracy, implicit_options, run_implicit, settle
+from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
 from .mesh import floats
 from .newton import Newton
 from .partition import rebalance_threshold
@@ -117,10 +117,11 @@ class Model(Body):
         return self._core.out_of_balance(g)
 
     def report(self) -> Report:
-        """Where the run stands."""
+        """State of the run at the present time."""
         values = self._core.diagnostics()
         values["momentum"] = tuple(values["momentum"][: self.mesh.dim])
         values["particle_steps"] = int(values["particle_steps"])
+        values["plastic_fraction"] = values.pop("plastic_share")
         return Report(time=self.time, steps=self._core.steps, dt=self._core.last_dt, **values)
 
     def nodal(self, name: str, velocity_field: int = 0) -> Any:
@@ -156,19 +157,19 @@ class Model(Body):
                 the start of the first run, so that it meets the same times to the last bit.
             watch: called between steps, after every 32nd and before each report, on all ranks alike; the model may be
                 saved then. When it returns true (on all ranks), the run ends with a report.
-            dt: time step [s]; by default ``courant`` times the critical one, which is found anew as the soil changes.
+            dt: time step [s]; by default ``courant`` times the critical one, which is updated as the soil changes.
             courant: alpha_c of (17), in (0, 1].
             damping: local damping alpha, in [0, 1).
-            pic: fraction of the particles' own velocities that the grid's takes the place of in a critical time step, in [0, 1]; 0 is
-                FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
+            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time step,
+                in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation), and mean stresses for the nodal forces by the
                 transpose, so that both do the same work.
             integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             allow_unstable: take ``dt`` even above the critical time step.
-            rebalance: most particles on a rank over their mean, above 1, from which on the mesh is cut anew (see the method
-                ``rebalance``); looked at every 32 steps. By default the mesh stays as it was cut.
-            energy_limit: `Report.unexplained_share`, of the energy at work, at which the run ends with an error; None for none.
+            rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
+                repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
+            energy_limit: `Report.unexplained_fraction`, of the energy at work, at which the run ends with an error; None for none.
                 Above 0.01 there is an `EnergyWarning`.
 
         Raises:
@@ -214,7 +215,7 @@ class Model(Body):
     ) -> Reports[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper) with steps far beyond the critical one.
 
-        A step that does not converge is tried again with half its length; the length grows again when it is easy.
+        A step that does not converge is repeated with half its length; the length grows again when steps converge easily.
 
         Args:
             until: time to reach [s].
@@ -228,16 +229,16 @@ class Model(Body):
             quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
             damping: local damping alpha, in [0, 1). What it does to elastic oscillations that the step does not resolve
                 acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
-            pic: fraction of the particles' own velocities that the grid's takes the place of in a critical time step, in [0, 1]; 0 is
-                FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
+            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time step,
+                in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             small_displacements: change the particles' stresses but not their places and volumes, for quasi-static runs. With
                 ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
                 symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
-            rebalance: see ``explicit``; looked at before each step.
-            energy_limit: see ``explicit``; by default none. What the scheme takes out counts as unexplained.
+            rebalance: see ``explicit``; checked before each step.
+            energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
             second_order: two stages to a step instead of backward Euler, the paper's: of second order in time, with hardly any
                 loss of energy in motion that the steps resolve (Alexander 1977). A step costs twice as much.
             accuracy: for steps of second order, the displacement [m] by which a step may be wrong, root mean square over the
@@ -292,7 +293,7 @@ class Model(Body):
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: |f_ext - f_int| / |f_ext| to reach, at nodes and particles as they are after a step.
-            max_steps: steps after which to give up.
+            max_steps: largest number of steps.
             small_displacements: change the particles' stresses but not their places and volumes; see ``implicit``.
 
         Raises:
@@ -301,4 +302,6 @@ class Model(Body):
         options = collectively(
             self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
         )
-        return settle(self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps)
+        return find_equilibrium(
+            self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps
+        )

@@ -30,8 +30,8 @@ class System(Protocol):
     def correction(self) -> bool:
         """Solve the tangent system for the residual; whether that worked, else `reason` says why not."""
 
-    def move(self, share: float) -> float:
-        """Add a share of the correction to the last point of the iteration; the residual there."""
+    def move(self, fraction: float) -> float:
+        """Add a fraction of the correction to the last point of the iteration; the residual there."""
 
     def work(self) -> float:
         """The residual times the correction."""
@@ -67,7 +67,7 @@ def newton(
     """Bring a system to equilibrium.
 
     The full correction is halved until the work of the residual has fallen to 0.8 of what it was (Matthies, Strang
-    1979, IJNME 14, 1613-1626); when no share does that, the one with the smallest residual is taken. Unlike a search
+    1979, IJNME 14, 1613-1626); when no fraction does that, the one with the smallest residual is taken. Unlike a search
     that wants the residual itself to fall, this goes on near collapse and with non-associated flow. An iteration whose
     residual reaches ten times the forces at work is given up.
     """
@@ -92,15 +92,15 @@ def newton(
 def line_search(system: System, max_halvings: int) -> float:
     """Moves a system by a fraction of its correction, chosen as `newton` says; returns the residual there."""
     work = abs(system.work())
-    best_share, best_residual = 1.0, float("inf")
+    best_fraction, best_residual = 1.0, float("inf")
     for halving in range(max_halvings + 1):
-        share = 0.5**halving
-        residual = system.move(share)
+        fraction = 0.5**halving
+        residual = system.move(fraction)
         if residual < float("inf") and abs(system.work()) <= 0.8 * work:
             return residual
         if residual < best_residual:
-            best_share, best_residual = share, residual
-    return system.move(best_share)
+            best_fraction, best_residual = fraction, residual
+    return system.move(best_fraction)
 
 
 @dataclass(frozen=True)
@@ -200,9 +200,9 @@ class _StepSystem:
         self._correction = du / self._dt
         return True
 
-    def move(self, share: float) -> float:
-        self._step.velocity = self._base + share * self._correction
-        return self._trial(tangents=share == 1.0 and not self._ends_next())
+    def move(self, fraction: float) -> float:
+        self._step.velocity = self._base + fraction * self._correction
+        return self._trial(tangents=fraction == 1.0 and not self._ends_next())
 
     def work(self) -> float:
         return self._solver.sum(float(self._step.residual @ self._correction))

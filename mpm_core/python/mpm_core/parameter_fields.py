@@ -95,7 +95,7 @@ class RandomField:
     """A random field: a function of positions that is the same on any number of ranks, and for any other points.
 
     A sum of waves with random directions and phases, whose spectrum is that of the correlation (Shinozuka & Jan 1972): over
-    all seeds mean, deviation and correlation are exact, and values are normal but for a share of 1 / waves.
+    all seeds mean, deviation and correlation are exact, and values are normal except for a fraction of 1 / waves.
 
     Args:
         mean: of the values.

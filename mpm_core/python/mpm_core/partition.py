@@ -1,4 +1,4 @@
-"""The background mesh on other ranks: cut anew, so that all have about as many particles, or as a checkpoint says."""
+"""Repartition of the background mesh: by the number of particles, or as a checkpoint prescribes."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from .body import Body
 
 PARTICLE_WEIGHT = 16
-"""of a particle in the cut, where a cell has 1: cells without particles cost little, but should not all go to one rank"""
+"""Weight of a particle in the partition, where a cell has 1: empty cells cost little, but should not all go to one rank"""
 
 GROWTH = 1.05
-"""of the imbalance that the last cut left, before another is tried: some meshes cannot be cut any better"""
+"""Growth of the load imbalance since the last repartition before the next one: some meshes have no better partition"""
 
 
 def imbalance(body: Body) -> float:
-    """Most particles on a rank over their mean; 1 is best, and what it is without particles. Collective."""
+    """Load imbalance: maximum over mean number of particles per rank; 1 is best, and the value without particles. Collective."""
     counts = np.array([len(body.particles)] * 2, dtype=np.int64)
     most, total = np.empty(1, np.int64), np.empty(1, np.int64)
     body.comm.Allreduce(counts[:1], most, MPI.MAX)
@@ -34,20 +34,22 @@ def imbalance(body: Body) -> float:
 def rebalance_threshold(given: float | None) -> float:
     """The threshold of a run; infinite when there is none."""
     if given is not None and not 1 < given < np.inf:
-        raise InputError(f"rebalance is {given}, expected a number above 1: most particles on a rank over their mean")
+        raise InputError(
+            f"rebalance is {given}, expected a number above 1: the maximum over the mean number of particles per rank"
+        )
     return np.inf if given is None else float(given)
 
 
 def keep_balance(body: Body, threshold: float) -> bool:
-    """Cut the mesh anew where the ranks' particles are too unequal; returns whether it was. Collective."""
+    """Repartition the mesh if the load imbalance exceeds the threshold; returns whether it did. Collective."""
     if threshold == np.inf or body.comm.size == 1 or imbalance(body) <= max(threshold, GROWTH * body._left_imbalance):
         return False
-    cut_anew(body)
+    repartition(body)
     return True
 
 
-def cut_anew(body: Body) -> None:
-    """Cut the mesh by the number of particles, and move cells and particles to their new ranks. Collective."""
+def repartition(body: Body) -> None:
+    """Repartition the mesh by the number of particles, and send cells and particles to their new ranks. Collective."""
     mesh, address = body.mesh, MPI._addressof(body.comm)
     particles = np.bincount(body.particles.cell, minlength=mesh.owned_cells)
     parts = mesh._core.weighted_parts(1 + PARTICLE_WEIGHT * particles.astype(np.int64), address)
@@ -72,11 +74,11 @@ def take_partition(body: Body, cells: NDArray) -> None:
 
 
 def take_mesh(body: Body, mesh: Mesh) -> None:
-    """Give the model its mesh cut otherwise, and all that hangs on it. Collective."""
+    """Give the model its mesh under another partition, and update all that depends on it. Collective."""
     body._core.set_partition(mesh._core)
     body._core.set_supports(body._conditions)
     body.mesh = mesh
-    body.cuts += 1
+    body.repartitions += 1
 
 
 def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:

@@ -135,7 +135,7 @@ class PointProbe:
             raise InputError(f"points has {self._points[outside[0]]} at row {outside[0]}, which is outside of the mesh")
         dim = model.mesh.dim
         self._columns = [
-            "filled_share",
+            "filled_fraction",
             *_vectors(dim, ("velocity", "m/s")),
             *_components("stress", "Pa", STRESSES[dim]),
         ]
@@ -244,8 +244,8 @@ class TotalsProbe:
         return {
             "time_s": report.time, "steps": report.steps, "dt_s": report.dt, "particles": report.particles,
             "mass_kg": report.mass, **momentum, **{f"{name}_J": getattr(report, name) for name in energies},
-            "unexplained_share": report.unexplained_share,
-            "unbalanced_ratio": report.unbalanced_ratio, "plastic_share": report.plastic_share,
+            "unexplained_fraction": report.unexplained_fraction,
+            "unbalanced_ratio": report.unbalanced_ratio, "plastic_fraction": report.plastic_fraction,
         }  # fmt: skip
 
 

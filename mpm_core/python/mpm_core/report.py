@@ -1,13 +1,15 @@
-"""What a run says of itself."""
+"""Reports of a run: time, energies and other sums over the model."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .checks import renamed
+
 
 @dataclass(frozen=True)
 class Report:
-    """Where a run stands; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
+    """State of a run at one time; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
 
     time: float
     """Time [s]"""
@@ -31,9 +33,9 @@ class Report:
     support_work: float
     """Work of prescribed velocities"""
     stress_work: float
-    """Work of the particles' stresses on their strains: what is stored, and what plastic flow takes"""
+    """Work of the particles' stresses on their strains: stored energy and plastic dissipation"""
     stored_energy: float
-    """Energy of the elastic strains as they are; NaN with a law that does not say what it stores (Python, UMAT)"""
+    """Energy of the present elastic strains; NaN with a law that does not define it (Python, UMAT)"""
     plastic_work: float
     """`stress_work` less what has been stored, since the particles were last changed by anything but a step"""
     pic_loss: float
@@ -42,12 +44,13 @@ class Report:
     """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
     unexplained_energy: float
     """External and support work, less damping work, PIC loss, stress work and the gain of kinetic energy: what the
-    discretisation makes (negative) or takes (positive), since the particles were last changed by anything but a step
-    with inertia"""
+    discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but
+    a step with inertia"""
     energy_scale: float
-    """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy then and now"""
-    plastic_share: float
-    """Share of the particles that yielded in the last step"""
+    """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy at the start
+    and now"""
+    plastic_fraction: float
+    """Fraction of the particles that yielded in the last step"""
     unbalanced_ratio: float
     """Out-of-balance over external force, Euclidean norms over the nodes; over reactions where there is no external force"""
     outflow_particles: int
@@ -57,9 +60,12 @@ class Report:
     """Sum over steps of the number of particles"""
 
     @property
-    def unexplained_share(self) -> float:
+    def unexplained_fraction(self) -> float:
         """`unexplained_energy` over `energy_scale`; 0 where nothing has moved."""
         return self.unexplained_energy / self.energy_scale if self.energy_scale > 0 else 0.0
+
+    plastic_share = renamed("plastic_share", "plastic_fraction")
+    unexplained_share = renamed("unexplained_share", "unexplained_fraction")
 
     def is_quasi_static(self, tolerance: float = 1e-3) -> bool:
         """Whether the soil is at rest: the out-of-balance ratio and kinetic energy over external work are not above a tolerance.
@@ -72,11 +78,11 @@ class Report:
 
 @dataclass(frozen=True)
 class ImplicitReport(Report):
-    """Where an implicit run stands; the last three are of the steps since the last report."""
+    """State of an implicit run; the last three attributes refer to the steps since the last report."""
 
     iterations: int
-    """Iterations of the solver, those of failed steps included"""
+    """Iterations of the solver, including those of failed steps"""
     cuts: int
-    """Steps that failed and were tried again, shorter"""
+    """Cutbacks: steps that did not converge and were repeated with half their length"""
     residual: float
     """|r| relative to the largest of |f_ext|, |f_int| and inertia, when the last step was solved"""

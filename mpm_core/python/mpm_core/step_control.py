@@ -1,4 +1,4 @@
-"""How long steps are that are cut when they fail and grow again when they are easy: implicit steps, load steps of finite
+"""Length of steps that are shortened when they fail and grow again when they converge easily: implicit steps, load steps of finite
 elements, and steps of their consolidation."""
 
 from __future__ import annotations

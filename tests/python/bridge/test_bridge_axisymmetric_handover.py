@@ -36,7 +36,7 @@ def test_on_the_same_cells_the_particles_are_in_equilibrium_at_once(per_cell):
     finite_elements = cylinder_fem(degree=1)
     assert 0.01 < np.mean(finite_elements.points.state[:, 0] > 0) < 0.5
     report = bridge.initialise(cylinder_particles(per_cell=per_cell), finite_elements, equilibrate=False)
-    assert report.unbalanced_ratio < 1e-8 and report.returned_share == 0  # the elements' own residual is below 1e-8
+    assert report.unbalanced_ratio < 1e-8 and report.returned_fraction == 0  # the elements' own residual is below 1e-8
 
 
 def test_what_leaves_quadratic_elements_out_of_balance_goes_with_the_cells():
@@ -57,8 +57,8 @@ def test_particles_come_into_equilibrium(degree, fem_cells, options):
     report = bridge.initialise(model, cylinder_fem(fem_cells, degree=degree), **options)
     assert (
         report.unbalanced_ratio < (0.5 if options.get("move") else 0.15)
-        and report.settled_ratio < 1e-3
-        and report.yielded_share < 0.02
+        and report.equilibrated_ratio < 1e-3
+        and report.yielded_fraction < 0.02
     )
     assert excess_of_strength(model.particles.stress, SOIL["cohesion"], SOIL["friction_angle"]).max() < 1e-8
 
@@ -91,7 +91,8 @@ def test_ground_at_rest_with_k0_stays_at_rest(degree):
     model.roller(WALL, (1, 0))
     report = bridge.initialise(model, elements)
     assert (
-        report.unbalanced_ratio < (1e-8 if degree == 1 else 5e-3) and report.yielded_share == report.returned_share == 0
+        report.unbalanced_ratio < (1e-8 if degree == 1 else 5e-3)
+        and report.yielded_fraction == report.returned_fraction == 0
     )
     stress, depth = model.particles.stress, 1.0 - model.particles.position[:, 1]
     assert np.abs(stress[:, 1] + UNIT_WEIGHT * depth).max() < UNIT_WEIGHT / 8  # one value in each cell

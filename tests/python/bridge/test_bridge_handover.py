@@ -38,7 +38,7 @@ def test_on_the_same_cells_the_particles_are_in_equilibrium_at_once(degree):
     particles = slope_particles(UNIT_WEIGHT)
     report = bridge.initialise(particles, solved(degree=degree))
     assert report.unbalanced_ratio < 1e-10
-    assert report.returned_share == 0 and report.yielded_share == 0
+    assert report.returned_fraction == 0 and report.yielded_fraction == 0
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_on_other_cells_the_particles_come_into_equilibrium(fem_size, cell_size,
     particles = slope_particles(UNIT_WEIGHT, cell_size=cell_size, kind=kind)
     report = bridge.initialise(particles, solved(cell_size=fem_size), smooth=smooth)
     assert report.unbalanced_ratio < 0.05
-    assert report.settled_ratio < 1e-3 and report.yielded_share < 0.01
+    assert report.equilibrated_ratio < 1e-3 and report.yielded_fraction < 0.01
     assert excess_of_strength(particles.particles.stress, 1e3, 25.0).max() < 1e-8
 
 
@@ -111,8 +111,8 @@ def test_particles_move_with_the_body(count):
 def test_particles_that_moved_come_into_equilibrium_and_hardly_any_yields(degree, fem_size, cell_size, kind):
     model = slope_particles(UNIT_WEIGHT, cell_size=cell_size, kind=kind)
     report = bridge.initialise(model, solved(degree=degree, cell_size=fem_size), move=True)
-    assert report.unbalanced_ratio > 1e-3 > report.settled_ratio
-    assert report.yielded_share < 0.01
+    assert report.unbalanced_ratio > 1e-3 > report.equilibrated_ratio
+    assert report.yielded_fraction < 0.01
 
 
 def test_particles_near_collapse_too():
@@ -122,7 +122,7 @@ def test_particles_near_collapse_too():
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=25.0, dilation_angle=25.0)
     for move in (False, True):
         report = bridge.initialise(slope_particles(22e3, law=law), fem_model, move=move)
-        assert report.settled_ratio < 1e-3 and report.yielded_share < 0.01
+        assert report.equilibrated_ratio < 1e-3 and report.yielded_fraction < 0.01
 
 
 def stretched(stretch, shift):
@@ -206,7 +206,7 @@ def test_accumulated_strain_goes_to_the_particles():
 def test_smooth_stress_is_brought_inside_the_strength():
     model = slope_particles(UNIT_WEIGHT, cell_size=0.05)
     report = bridge.initialise(model, solved(), smooth=True, equilibrate=False)
-    assert 0 < report.returned_share < 0.1 and report.settled_ratio is None
+    assert 0 < report.returned_fraction < 0.1 and report.equilibrated_ratio is None
     assert excess_of_strength(model.particles.stress, 1e3, 25.0).max() < 1e-8
 
 
@@ -252,7 +252,7 @@ def test_materials_are_matched_place_by_place():
     model = slope_particles(UNIT_WEIGHT, law=laws)
     model.assign(np.where(model.particles.position[:, 1] > 0.5, 0, 1))
     report = bridge.initialise(model, fem_model)
-    assert report.unbalanced_ratio < 1e-8 and report.yielded_share == 0
+    assert report.unbalanced_ratio < 1e-8 and report.yielded_fraction == 0
     model.assign(np.zeros(len(model.particles), dtype=int))
     with pytest.raises(bridge.InputError, match="cohesion=3000.*material 0.*cohesion=1000"):
         bridge.initialise(model, fem_model)

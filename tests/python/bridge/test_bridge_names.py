@@ -72,7 +72,7 @@ def test_particles_are_seeded_supported_and_handed_over_by_name(background, soil
     model.roller("sides", (1, 0))
     model.fix("base")
     model.set_gravity((0, -10))
-    assert bridge.initialise(model, fem, count_displacement=False).yielded_share == 0
+    assert bridge.initialise(model, fem, count_displacement=False).yielded_fraction == 0
     below = model.particles.position[:, 1] < 1
     assert np.array_equal(model.particles.material, np.where(below, 0, 1))
     assert model.particles.volume.sum() == pytest.approx(2 * 3)  # none in the air

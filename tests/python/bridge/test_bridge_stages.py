@@ -262,7 +262,7 @@ def failure(pit, laws, *stages, supports=ROLLERS):
     site = site_of(pit, laws, supports, degree=1)
     with pytest.raises(bridge.StageError) as error:
         carried_out(site, *stages)
-    return str(error.value), error.value.share, site
+    return str(error.value), error.value.fraction, site
 
 
 def test_a_cut_that_does_not_stand_is_named_with_place_and_law(pit):

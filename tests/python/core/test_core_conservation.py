@@ -67,13 +67,13 @@ def vibrating_block(dim, law, speed):
 def test_kinetic_and_strain_energy_of_an_elastic_block_exchange(dim):
     model = vibrating_block(dim, ELASTIC, speed=1e-3)
     energy = model.report().kinetic_energy
-    strain_share = []
+    strain_fraction = []
     # Velocities are half a step behind stresses: the sum swings by omega dt / 2, so the step is short.
     for report in model.explicit(0.4, dt=0.02 * model.critical_time_step(), every=0.01):
         strain = strain_energy(model, ELASTIC.young, ELASTIC.poisson)
-        strain_share.append(strain / energy)
+        strain_fraction.append(strain / energy)
         assert report.kinetic_energy + strain == pytest.approx(energy, rel=0.01)
-    assert min(strain_share) < 0.2 and max(strain_share) > 0.8  # it goes to and fro
+    assert min(strain_fraction) < 0.2 and max(strain_fraction) > 0.8  # it goes to and fro
     assert report.internal_work == pytest.approx(strain, abs=0.01 * energy)
 
 

@@ -37,7 +37,7 @@ def test_an_elastic_block_keeps_its_energy_and_it_is_all_accounted_for(dim, sche
     for report in model.explicit(0.2, dt=0.02 * model.critical_time_step(), every=0.02, **scheme):
         assert report.stored_energy == pytest.approx(strain_energy(model, 200e3, 0.3), rel=1e-9)
         assert abs(report.plastic_work) < 0.02 * energy  # an elastic law has none, but for half a step
-        assert abs(report.unexplained_share) < error
+        assert abs(report.unexplained_fraction) < error
         stored.append(report.stored_energy / energy)
     assert max(stored) > 0.5  # it goes to and fro
 
@@ -75,7 +75,7 @@ def test_plastic_work_of_confined_compression():
     assert report.plastic_work == pytest.approx(plastic, rel=0.03)
     assert report.stored_energy == pytest.approx(stored, rel=0.04)
     assert report.support_work == pytest.approx(plastic + stored, rel=0.04)
-    assert abs(report.unexplained_share) < 0.01
+    assert abs(report.unexplained_fraction) < 0.01
 
 
 @pytest.mark.parametrize("dim", DIMS)
@@ -107,7 +107,7 @@ def test_a_free_fall_balances_exactly():
     model.set_gravity((0.0, -1.0))
     report = run(model, 0.5)
     assert report.kinetic_energy == pytest.approx(report.mass * 0.5 * 0.5**2, rel=1e-9)
-    assert abs(report.unexplained_share) < 1e-9 and report.stored_energy < 1e-9 * report.kinetic_energy
+    assert abs(report.unexplained_fraction) < 1e-9 and report.stored_energy < 1e-9 * report.kinetic_energy
 
 
 def stirred():
@@ -124,7 +124,7 @@ def test_energy_that_does_not_add_up_is_said_and_stops_a_run():
         warnings.simplefilter("error", mpm.EnergyWarning)
         with pytest.raises(mpm.EnergyWarning, match="% of the energy at work"):
             model.explicit(0.2, every=0.01, energy_limit=None).last()
-    share = abs(model.report().unexplained_share)
+    share = abs(model.report().unexplained_fraction)
     assert share > 0.01
     limit = max(0.0101, share / 2)
     with pytest.raises(mpm.RunError, match="energy_limit"):
@@ -166,4 +166,4 @@ def test_yielding_soil_with_averaged_strains_keeps_its_energy(law):
     model.set_gravity((0.0, -9.81))
     report = run(model, 0.3, **NMD, dt=0.1 * model.critical_time_step(), energy_limit=None)
     assert report.plastic_work > 0.1 * report.external_work  # it has failed
-    assert abs(report.unexplained_share) < 0.01
+    assert abs(report.unexplained_fraction) < 0.01

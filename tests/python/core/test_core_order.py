@@ -28,7 +28,7 @@ def test_seeding_order_does_not_matter(dim):
     straight, mixed = sliding_block(dim), sliding_block(dim, order)
     dt = 0.1 * straight.critical_time_step()
     for model in (straight, mixed):
-        assert run(model, 0.25, dt=dt).plastic_share > 0
+        assert run(model, 0.25, dt=dt).plastic_fraction > 0
     for name in FIELDS:
         one, other = by_id(straight, name)[order], by_id(mixed, name)
         assert np.allclose(one, other, rtol=0, atol=1e-8 * np.abs(one).max()), name

@@ -121,7 +121,7 @@ def test_one_material_in_two_parts_behaves_as_one(dim):
         model.fix(2 * dim - 1)
         model.set_gravity([0.0] * (dim - 1) + [-10.0])
         report = run(model, 0.3)
-        assert report.plastic_share > 0
+        assert report.plastic_fraction > 0
         return by_id(model, "stress"), by_id(model, "position"), by_id(model, "plastic_strain")
 
     for one, two in zip(sag(1), sag(2), strict=True):

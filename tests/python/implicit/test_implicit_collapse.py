@@ -34,7 +34,7 @@ def test_displacements_and_collapse_load_are_those_of_the_finite_elements(nmd):
     for k in range(1, 11):
         fem.equilibrate(bridge.Load(unit_weight=k * weight / 10))
     u, report = raised(model, weight, weight / 10, nmd)
-    assert report.plastic_share > 0.1 and report.unbalanced_ratio < 1e-6
+    assert report.plastic_fraction > 0.1 and report.unbalanced_ratio < 1e-6
     points = fem.displacement.function_space.tabulate_dof_coordinates()[:, :2]
     order = [int(np.argmin(np.linalg.norm(model.mesh.points - p, axis=1))) for p in points]
     expected = fem.displacement.x.array.reshape(-1, 2)

@@ -40,7 +40,7 @@ def test_equilibrate_from_zero_in_one_call(nmd):
     model = slope(0.1, weight=20e3)
     report = model.equilibrate(nmd=nmd, tolerance=1e-6)
     assert report.unbalanced_ratio < 1e-6
-    assert report.plastic_share > 0
+    assert report.plastic_fraction > 0
     assert 0.03 < crest_displacement(model) < 0.1
 
 

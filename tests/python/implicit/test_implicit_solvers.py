@@ -30,7 +30,7 @@ def solved_step(solver, *, nmd=False, quasi_static=False):
     options.damping, options.mixed_discretisation, options.quasi_static = 0.75, nmd, quasi_static
     stepper = Stepper(model, solver, options, DT)
     assert stepper.attempt(DT) == ""
-    assert model.report().plastic_share > (0.01 if quasi_static else 0.1)
+    assert model.report().plastic_fraction > (0.01 if quasi_static else 0.1)
     return model.nodal("velocity"), stepper.last
 
 

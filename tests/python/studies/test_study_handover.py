@@ -21,10 +21,10 @@ def test_every_hand_over_is_in_equilibrium(tmp_path):
     summary = summary_of("handover", tmp_path, "--time", "0.6")
     assert 20e3 < summary["collapse_unit_weight_of_the_finite_elements"] < 27e3  # linear triangles are too stiff
     first, *rest = summary["handovers"]
-    assert first["share_of_collapse"] == 0 and first["out_of_balance_ratio_before"] is None
-    assert all(row["out_of_balance_ratio_before"] < 1e-8 and row["newly_yielded_share"] == 0 for row in rest)
+    assert first["fraction_of_collapse"] == 0 and first["out_of_balance_ratio_before"] is None
+    assert all(row["out_of_balance_ratio_before"] < 1e-8 and row["newly_yielded_fraction"] == 0 for row in rest)
     assert all(row["crest_displacement_m"] > 0.05 for row in rest)
-    assert (tmp_path / "runout_over_share.png").exists() and (tmp_path / "crest_over_time.png").exists()
+    assert (tmp_path / "runout_over_fraction.png").exists() and (tmp_path / "crest_over_time.png").exists()
 
 
 def test_particles_converge_to_the_finite_elements(tmp_path):
@@ -60,8 +60,8 @@ def test_slopes_that_do_not_stand_are_refused(tmp_path, name, options, words):
 
 def test_hand_over_of_particles_that_move(tmp_path):
     summary = summary_of("handover", tmp_path, "--time", "0.1", "--move")
-    rows = [row for row in summary["handovers"] if row["share_of_collapse"] > 0]
-    assert all(row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_share"] < 0.01 for row in rows)
+    rows = [row for row in summary["handovers"] if row["fraction_of_collapse"] > 0]
+    assert all(row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_fraction"] < 0.01 for row in rows)
 
 
 def test_soft_soil_too_within_the_effect_of_its_deformed_shape(tmp_path):

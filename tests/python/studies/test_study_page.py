@@ -69,5 +69,5 @@ def test_no_panel_is_of_one_colour_at_first(tmp_path):
 
 def test_names_of_columns_are_words_with_units():
     assert name_and_unit("kinetic_energy_J_per_m") == ("Kinetic energy of the particles", "J/m")
-    assert name_and_unit("plastic_share") == ("Fraction of particles that yield", "-")
+    assert name_and_unit("plastic_fraction") == ("Fraction of particles that yield", "-")
     assert name_and_unit("crest_displacement_m") == ("Crest displacement", "m")

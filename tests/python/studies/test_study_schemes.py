@@ -32,7 +32,7 @@ def test_quasi_static_slope_carries_what_it_can(tmp_path):
     carried, summary = study("slope", tmp_path / "a", "--scheme", "quasi-static", "--unit-weight", "15e3", "--time", "1",
                              "--dt", "0.25", "--frames", "4")  # fmt: skip
     assert carried.returncode == 0, carried.stderr
-    assert summary["time_s"] == 1.0 and summary["steps"] == 4 and summary["unexplained_share_of_energy"] is None
+    assert summary["time_s"] == 1.0 and summary["steps"] == 4 and summary["unexplained_fraction_of_energy"] is None
     bad, _ = study("slope", tmp_path / "b", "--scheme", "quasi-static", "--initial", "fem")
     assert bad.returncode == 2 and "--initial is fem" in bad.stderr and "zero" in bad.stderr
 

@@ -162,7 +162,7 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
         options = f"--site {path} --factor {factor} --time 0.4 --frames 4 --particles-per-cell 3 --no-pictures --output {folder}"
         assert slope.main(options.split()) == 0
         summary = json.loads((folder / "summary.json").read_text())
-        assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["newly_yielded_share"] == 0
+        assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["newly_yielded_fraction"] == 0
         moved[factor] = summary["largest_displacement_m"]
         assert (folder / "report.html").exists() and not list(folder.glob("*.png"))
     assert moved[1.2] < 1e-6 and 0.05 < moved[8.0] < 9.81 / 2 * 0.4**2

@@ -47,7 +47,7 @@ def test_the_papers_slope_slides_as_far_as_in_an_independent_code(tmp_path):
     assert np.all(np.diff(curve["time_s"]) > 0)
     energy = summary["energy_J_per_m"]
     spent = sum(energy[name] for name in ("kinetic_energy", "damping_work", "unexplained_energy"))
-    assert abs(summary["unexplained_share_of_energy"]) == pytest.approx(
+    assert abs(summary["unexplained_fraction_of_energy"]) == pytest.approx(
         abs(energy["unexplained_energy"]) / energy["external_work"], rel=1e-9
     )
     assert energy["external_work"] - spent > energy["plastic_work"] > 0

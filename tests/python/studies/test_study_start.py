@@ -23,7 +23,7 @@ def test_particles_are_in_equilibrium_at_once_and_none_yields_anew(tmp_path, opt
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["initial_out_of_balance_ratio"] < 1e-8
     assert summary["equilibrated_out_of_balance_ratio"] < 1e-8
-    assert summary["newly_yielded_share"] == 0 and summary["returned_to_strength_share"] == 0
+    assert summary["newly_yielded_fraction"] == 0 and summary["returned_to_strength_fraction"] == 0
 
 
 def test_initial_unit_weight_beyond_collapse_is_named_with_what_the_slope_carries(tmp_path):
