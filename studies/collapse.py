@@ -69,7 +69,7 @@ def target(spiral: bridge.LogSpiral) -> Target:
 
 
 def collapse(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
-    """Raise the unit weight to the last equilibrium on one mesh; the first step knows nothing of the answer."""
+    """Raise the unit weight to the last equilibrium on one mesh; the first step does not depend on the result."""
     model = slope_fem(a, comm, cell_size, dilation_angle)
     first_step = a.cohesion / a.height
     title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"

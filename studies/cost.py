@@ -228,7 +228,7 @@ def speed_up(rows: list[dict]) -> dict[str, float]:
     return {soil: time[soil, "explicit"] / time[soil, "Newton"] for soil in SOILS}
 
 
-def tell(rows: list[dict]) -> None:
+def print_table(rows: list[dict]) -> None:
     """The rows as text; lower bounds are marked."""
     for row in rows:
         bound = "  " if row["reached"] else "> "
@@ -252,11 +252,11 @@ def main(arguments: list[str] | None = None) -> int:
             stress = initial_stress(mesh, soil)
             for name in ("explicit", *SOLVERS):
                 rows.append(measured(mesh, soil, name, stress))
-                tell(rows[-1:])
+                print_table(rows[-1:])
         for multiple in MULTIPLES:
             for name in SOLVERS:
                 steps.append(one_step(mesh, name, multiple))
-                tell(steps[-1:])
+                print_table(steps[-1:])
     save_table(folder / "equilibrium.csv", rows)
     save_table(folder / "steps.csv", steps)
     ratios = speed_up(rows)

@@ -230,11 +230,11 @@ def main(arguments: list[str] | None = None) -> int:
     movies = [Movie(name, scene, run.frames) for name, run in names.items()] if scene else []
     write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]), drawn(runs, scene, folder))
     if comm.rank == 0:
-        tell(table, folder)
+        print_table(table, folder)
     return 1 if any(run.stopped for run in runs) else 0
 
 
-def tell(table: dict[str, dict], folder: Path) -> None:
+def print_table(table: dict[str, dict], folder: Path) -> None:
     print(f"{'':36} crest [m]  over explicit  ended at [s]           steps  iterations  CPU [s]  out of balance")
     for name, r in table.items():
         state = "at rest" if r["at_rest"] else "moving"

@@ -76,7 +76,7 @@ def _given_stress(model, stress, new):
 
 
 def _take_over(model, new, laws, before, given):
-    """Stress and state of the points under the new laws. What leaves has none; what comes in starts anew."""
+    """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state."""
     points = model.points
     points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
     if given is not None:

@@ -46,7 +46,7 @@ def collapse_load(model, load_of, first_step, start=0.0, tolerance=2e-3, progres
     model: QuasiStatic, in equilibrium under `load_of(start)`, e.g. fresh and unloaded
     load_of: function of a number, the load's value, that returns the Load
     first_step: of the value; tolerance: width of the last step as a fraction of the value [-]
-    Returns a Collapse, whose `failed` tells whether failure was shown. Raises InputError when not even the first steps
+    Returns a Collapse, whose `failed` says whether failure was shown. Raises InputError when not even the first steps
     find equilibrium. Collective.
     """
     return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
@@ -62,7 +62,7 @@ def factor_of_safety(
     first_step: of the factor; tolerance: width of the last step as a fraction of the factor [-]
     unreduced: cell tags whose laws keep their strength
     reduce: function (law, factor, unreduced) that returns the law, or laws by cell tag, with less strength
-    Returns a Collapse whose value is the factor, and whose `failed` tells whether failure was shown above it. Raises
+    Returns a Collapse whose value is the factor, and whose `failed` says whether failure was shown above it. Raises
     InputError when the load is not carried at the start. The model keeps the weakened law. Collective.
     """
     law = model.law

@@ -75,7 +75,7 @@ class EquilibriumStep:
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def correction(self):
-        """Solve the tangent system for the residual; tells whether that worked, else `reason` says why not."""
+        """Solve the tangent system for the residual. Returns whether it was solved; `reason` says why not."""
         matrix = self._body.kinematics.stiffness()
         self.reason = self._body.solver.solve(matrix, self._residual_vector, self._correction)
         return not self.reason

@@ -37,7 +37,7 @@ class PointSearch:
         self._at = np.zeros((len(self._cells), 3))
         self._at[:, :dim] = np.concatenate(asked)[self._inside]
         self.found = np.zeros(len(points), dtype=bool)
-        for rows, inside in self._answers(self._inside):
+        for rows, inside in self._returned(self._inside):
             self.found[rows] |= inside
 
     def require_all(self, argument="points"):
@@ -55,13 +55,13 @@ class PointSearch:
     def values(self, function):
         """Values (n, components) of a function at the points; NaN at points outside the mesh."""
         size = int(np.prod(function.ufl_shape)) if function.ufl_shape else 1
-        answer = np.full((len(self._inside), size), np.nan)
+        values = np.full((len(self._inside), size), np.nan)
         if len(self._cells):
-            answer[self._inside] = np.asarray(function.eval(self._at, self._cells)).reshape(-1, size)
+            values[self._inside] = np.asarray(function.eval(self._at, self._cells)).reshape(-1, size)
         result = np.full((len(self.points), size), np.nan)
-        for rows, values in self._answers(answer):
-            known = ~np.isnan(values[:, 0])
-            result[rows[known]] = values[known]
+        for rows, received in self._returned(values):
+            known = ~np.isnan(received[:, 0])
+            result[rows[known]] = received[known]
         return result
 
     def cell_sums(self, amounts):
@@ -69,17 +69,17 @@ class PointSearch:
 
         (A conservative transfer: it keeps the total.) amounts: (n,), one for each of this rank's points. Collective.
         """
-        answers, rank_of = self._answers(self._inside), np.full(len(self.points), -1)
-        for rank, (rows, inside) in zip(reversed(range(self._comm.size)), answers):
+        returned, rank_of = self._returned(self._inside), np.full(len(self.points), -1)
+        for rank, (rows, inside) in zip(reversed(range(self._comm.size)), returned):
             rank_of[rows[inside]] = rank  # on a border between ranks the lowest one counts
         sent = [np.where(rank_of[rows] == rank, amounts[rows], 0.0) for rank, rows in enumerate(self._sent)]
         received = np.concatenate(self._comm.alltoall(sent))
         return np.bincount(self._cells, received[self._inside], owned_cells(self._domain))
 
-    def _answers(self, array):
-        """What each rank answered: (rows of this rank's points, values), the lowest rank last so that it holds."""
-        answers = self._comm.alltoall(np.split(array, self._asked))
-        return reversed(list(zip(self._sent, answers)))
+    def _returned(self, array):
+        """Values returned by each rank: (rows of this rank's points, values), the lowest rank last so that it prevails."""
+        returned = self._comm.alltoall(np.split(array, self._asked))
+        return reversed(list(zip(self._sent, returned)))
 
 
 def evaluate_at(points, **functions):

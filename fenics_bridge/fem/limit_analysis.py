@@ -28,7 +28,7 @@ def log_spiral(height, angle, cohesion, friction_angle, crest=0.0):
 
     Equates the work of the weight with the dissipation along the spiral (Chen 1975, Limit Analysis and Soil Plasticity,
     ch. 9). On flat slopes with little friction the best spiral dips below the level of the toe before it rises to it: the
-    ground there is taken as the same soil. `curve` of the result tells how deep it goes.
+    ground there is taken as the same soil. `curve` of the result shows its depth.
     height, crest: [m]; angle: of the slope, friction_angle: [degrees], angle > friction_angle; cohesion: [Pa]
     Returns a LogSpiral.
     """

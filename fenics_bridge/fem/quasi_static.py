@@ -178,7 +178,7 @@ class QuasiStatic:
         """Raise the load from the present one to the given one, in steps that adapt. Returns a list of LoadStep.
 
         first_step: fraction of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
-        `converged` tells whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
+        `converged` says whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
         """
         return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
 

@@ -22,7 +22,7 @@ class Stage:
     name: for messages and reports
     fill: soils that are placed, free of stress at the moment when they are placed
     excavate: soils that are taken away
-    law: {soil: law} in force from now on; state variables of the soil begin anew, its stress stays
+    law: {soil: law} in force from now on; state variables of the soil are reset, its stress stays
     unit_weight: {soil: [N/m3]} from now on; every soil needs one when it is placed
     pressure: {boundary: [Pa]} on what is there, compression positive, from now on; 0 takes it away
     support: supports (`fixed`, `roller`, `prescribed`) that begin to hold, from where the nodes are now

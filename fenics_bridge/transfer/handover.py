@@ -45,7 +45,7 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
     equilibrium, and its geometry that of the finite elements.
 
     On the same cells, particles are in equilibrium at once (out of balance by rounding) with linear elements, and in
-    plane strain and 3D with quadratic ones, whose cell means linear test functions cannot tell from their stresses.
+    plane strain and 3D with quadratic ones, whose cell means linear test functions cannot distinguish from their stresses.
     In axisymmetric bodies two things differ: the hoop stress acts with the particles at the centre of a cell, which leaves
     some 1e-3 of quadratic elements out of balance; and the weights of nodes are exact for particles at Gauss points of
     degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size.

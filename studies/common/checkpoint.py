@@ -43,7 +43,7 @@ def check_restart(parser: argparse.ArgumentParser, options: Options, may_change:
     for name, (before, now) in changed.items():
         check(parser, name in may_change,
               lambda name=name, before=before, now=now: f"--{name} is {now}, but the run of checkpoint {options.restart} has {before}; "
-              f"leave it out to go on with that, or begin anew. From a checkpoint on may change: {', '.join(sorted(may_change))}")  # fmt: skip
+              f"leave it out to continue with that, or start a new run. A restart may change: {', '.join(sorted(may_change))}")  # fmt: skip
     options.restarts = [*options.notes["restarts"], restart_row(options.notes, changed, MPI.COMM_WORLD.size)]
 
 
@@ -72,7 +72,7 @@ def _read(text: str) -> tuple[float, str]:
 
 
 class Checkpoints:
-    """The checkpoint file of a run, written anew whenever it is due.
+    """The checkpoint file of a run, replaced whenever it is due.
 
     Args:
         model: what is saved.

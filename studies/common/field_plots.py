@@ -61,12 +61,12 @@ class Field:
         shear = gradient[:, 0, 1] + gradient[:, 1, 0]
         return np.hypot(gradient[:, 0, 0] - gradient[:, 1, 1], shear)
 
-    def exceeded_in(self, share: float, values: np.ndarray) -> float:
-        """Value in triangles that is exceeded in a share of the area; above it are single cells at singular corners."""
+    def exceeded_in(self, fraction: float, values: np.ndarray) -> float:
+        """Value in triangles that is exceeded in a fraction of the area; above it are single cells at singular corners."""
         corners = self.points[self.cells]
         area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
         order = np.argsort(values)
-        return values[order][np.searchsorted(np.cumsum(area[order]), (1 - share) * area.sum())]
+        return values[order][np.searchsorted(np.cumsum(area[order]), (1 - fraction) * area.sum())]
 
 
 def gathered(function: object, half_section: bool = False) -> Field | None:
@@ -170,12 +170,12 @@ def save_log_log(
         _save(figure, path)
 
 
-def bend(curves: Sequence[np.ndarray], share: float = 0.8) -> float:
+def bend(curves: Sequence[np.ndarray], fraction: float = 0.8) -> float:
     """End of the axis that shows how load-displacement curves bend; what follows at hardly any more load is cut off.
 
-    curves: (k, 2) load and displacement, each with the load rising; share: of a curve's last load, where it still is steep
+    curves: (k, 2) load and displacement, each with the load rising; fraction: of a curve's last load, where it still is steep
     """
-    return 3.0 * max(np.interp(share * curve[-1, 0], *curve.T) for curve in curves)
+    return 3.0 * max(np.interp(fraction * curve[-1, 0], *curve.T) for curve in curves)
 
 
 def _finish(axes: Axes, labels: tuple[str, str], limits: tuple) -> None:
@@ -289,7 +289,7 @@ def save_side_by_side(
 def _panels(
     lower: np.ndarray, upper: np.ndarray, count: int, half_section: bool = False
 ) -> tuple[Figure, list[tuple[Axes, Axes]]]:
-    """Equal axes side by side, each with room for a horizontal colour bar below: (axes, bar axes) of each."""
+    """Equal axes side by side, each with space for a horizontal colour bar below: (axes, bar axes) of each."""
     margin = 0.03 * (upper - lower).max()
     each = (WIDTH - 0.25) / count - 0.35
     height = float(np.clip(each * (upper[1] - lower[1] + 2 * margin) / (upper[0] - lower[0] + 2 * margin), 0.8, 6.0))

@@ -34,7 +34,9 @@ class Parameter:
 
 def described(actions: Sequence[argparse.Action], values: argparse.Namespace) -> list[Parameter]:
     """The options that say what is computed, with their values."""
-    return [Parameter(name, getattr(values, action.dest), *_told(action)) for name, action in _named(actions).items()]
+    return [
+        Parameter(name, getattr(values, action.dest), *_described(action)) for name, action in _named(actions).items()
+    ]
 
 
 def read_parameters(path: Path, actions: Sequence[argparse.Action]) -> dict[str, object]:
@@ -111,7 +113,7 @@ def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:
     return {action.option_strings[0].removeprefix("--"): action for action in shown}
 
 
-def _told(action: argparse.Action) -> tuple[str, str]:
+def _described(action: argparse.Action) -> tuple[str, str]:
     """Unit and meaning of an option, from its help: ``meaning [unit] (default: ...)``, or with the default before the unit."""
     text = re.sub(r" \(default: [^)]*\)", "", (action.help or "").replace("%%", "%"))
     if text.endswith("]") and " [" in text:

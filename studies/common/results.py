@@ -94,7 +94,7 @@ def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
     return path
 
 
-def give_room(folder: Path) -> None:
+def release_reserved_space(folder: Path) -> None:
     """Give back what was reserved for the summary, just before it is written. Call it on the first rank."""
     lock = _locks.get(folder)
     if lock is not None:
@@ -243,12 +243,12 @@ def _known(lock: TextIO) -> dict[str, Any]:
     return known if isinstance(known, dict) and "there_before" in known else {}
 
 
-def _store(lock: TextIO, known: dict[str, Any], room: int = 0) -> None:
-    """Write a mark, with so many bytes of room behind it."""
+def _store(lock: TextIO, known: dict[str, Any], reserve: int = 0) -> None:
+    """Write a mark, with so many bytes reserved behind it."""
     # In place: the lock is on the file, not on its name.
     lock.seek(0)
     lock.truncate()
     json.dump(known, lock, indent=1)
     lock.flush()
-    if room:
-        os.posix_fallocate(lock.fileno(), 0, room)
+    if reserve:
+        os.posix_fallocate(lock.fileno(), 0, reserve)

@@ -83,7 +83,7 @@ def weight(unit_weight: float) -> bridge.Load:
 
 
 def step_line(title: str) -> Callable[[bridge.LoadStep], None]:
-    """A `progress` for load steps that tells, on the first rank, what is running."""
+    """A `progress` for load steps, which prints each step on the first rank."""
 
     def show(step: bridge.LoadStep) -> None:
         if MPI.COMM_WORLD.rank == 0:

@@ -17,7 +17,7 @@ from .figures import Pictures, draw_pictures
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
-from .results import IN_SOURCES, ROOT, give_room, note_what_was_written
+from .results import IN_SOURCES, ROOT, release_reserved_space, note_what_was_written
 
 
 def versions() -> dict[str, str]:
@@ -108,7 +108,7 @@ def _write(
     }
     if isinstance(options, Options) and options.restarts:
         summary["restarts"] = options.restarts
-    give_room(folder)
+    release_reserved_space(folder)
     write_text(folder / "summary.json", json.dumps(summary, indent=2, default=_plain) + "\n")
     draw_pictures(pictures)
     if isinstance(options, Options):

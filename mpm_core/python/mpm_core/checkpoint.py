@@ -1,4 +1,4 @@
-"""Saving a model to a file, and going on from there. The layout of the file is described in docs/checkpoints.md."""
+"""Saving and restoring a model. The layout of the file is described in docs/checkpoints.md."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
 
 
 def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
-    """What a checkpoint says of itself, without a model: ``time`` [s], ``steps``, ``ranks``, ``materials``, ``notes`` and the
+    """Description in a checkpoint, read without a model: ``time`` [s], ``steps``, ``ranks``, ``materials``, ``notes`` and the
     other entries that docs/checkpoints.md lists.
 
     Raises:
@@ -86,7 +86,7 @@ def _compare(path: str, there: dict[str, Any], here: dict[str, Any]) -> None:
 
 
 def _default(key: str, here: dict[str, Any]) -> Any:
-    """What a checkpoint that does not say it was of: there was nothing else when it was written."""
+    """Entries that older checkpoints lack, with the only value that existed then."""
     if key == "geometry":
         return "PLANE_STRAIN" if here["dimension"] == 2 else "SOLID"
     return [0] * len(here["materials"]) if key == "velocity_fields" else None
@@ -97,7 +97,7 @@ def _shown(value: Any) -> str:
 
 
 def _description(model: Model) -> dict[str, Any]:
-    """All that a model is beside particles, totals and time."""
+    """State of a model besides particles, totals and time."""
     core = model._core
     return {
         "program": f"talus {_core.version}",
@@ -132,7 +132,7 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
 
 
 def _material(law: Any) -> str:
-    """A law with all its parameters as text that tells any two apart; laws within laws too."""
+    """Text with the name and all parameters of a law and the laws within it, which differs between any two laws."""
     names = sorted(name for name, value in vars(type(law)).items() if isinstance(value, property))
     values = [getattr(law, name) for name in names]
     texts = [_value(law, value) for value in values]
@@ -148,7 +148,7 @@ def _value(law: Any, value: Any) -> str:
 
 
 def _take(model: Model, there: dict[str, Any]) -> None:
-    """Give the model what a description says."""
+    """Restore the model's state from a description."""
     core = model._core
     core.gravity, core.gravity_ramp = there["gravity"], there["gravity_ramp"]
     core.outflow_tags = there["outflow_tags"]

@@ -1,4 +1,4 @@
-"""Errors that every rank raises alike."""
+"""Errors that are raised on all ranks alike."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 
 def collectively(comm: MPI.Comm, work: Callable[[], T]) -> T:
-    """Do ``work`` on each rank; when it fails on any, raise that error on all, so that no rank waits for another.
+    """Run ``work`` on each rank. An error of one rank is raised on all of them, so that no rank waits for another.
 
     Raises:
-        InputError: the one of the lowest rank that had one; on several ranks its message names the rank.
+        InputError: that of the lowest rank with an error; on several ranks the message names the rank.
     """
     error: str | None = None
     result = None

@@ -19,7 +19,7 @@ Condition: TypeAlias = tuple[int, bool, list[float]]
 
 
 class Conditions:
-    """The part of a body that knows how its boundary is held and which gravity acts; see `Model`."""
+    """Boundary conditions and gravity of a body; see `Model`."""
 
     mesh: Mesh
     comm: MPI.Comm
@@ -46,25 +46,25 @@ class Conditions:
         return new
 
     def fix(self, facet_tag: Tag) -> None:
-        """Hold the nodes on facets with this tag, given by number or name as in all that follow."""
+        """Fix the nodes on facets with this tag, which is a number or a name here and in the methods below."""
         self._support(facet_tag, True, [0.0] * self.mesh.dim, "velocity")
 
     def roller(self, facet_tag: Tag, normal: ArrayLike) -> None:
-        """Let the nodes on facets with this tag move only at right angles to ``normal``, a direction of any length."""
+        """Put the nodes on facets with this tag on rollers: they move at right angles to ``normal``, a vector of any length."""
         self._support(facet_tag, False, normal, "normal")
 
     def prescribe(self, facet_tag: Tag, velocity: ArrayLike) -> None:
-        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,); again, to change it."""
+        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,). A further call changes it."""
         tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
         before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
         conditions = self._support(tags, True, velocity, "velocity", replaced=before)
         self._prescribed.update({condition[0]: condition for condition in conditions})
 
     def release(self, facet_tag: Tag) -> None:
-        """Take away whatever holds the nodes on facets with this tag.
+        """Remove all boundary conditions of the nodes on facets with this tag.
 
         Raises:
-            InputError: nothing holds them.
+            InputError: there is no boundary condition on them.
         """
 
         def remaining() -> list[Condition]:
@@ -85,7 +85,7 @@ class Conditions:
 
     @property
     def gravity(self) -> NDArray[np.float64]:
-        """Gravity [m/s2], shape (D,), as it is after any ramp. Not collective."""
+        """Gravity [m/s2], shape (D,), after the end of any ramp. Not collective."""
         return np.array(self._core.gravity)
 
     def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:

@@ -1,4 +1,4 @@
-"""The description in a checkpoint, checked entry by entry: a file may come from anywhere."""
+"""The description in a checkpoint, whose entries are all checked before they are used."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
     """The entries of a description.
 
     Raises:
-        RunError: it is no UTF-8 or no JSON, or an entry is missing or of another kind; names the file and the entry.
+        RunError: the text is not UTF-8 or not JSON, or an entry is missing or of another type; the message names file and entry.
     """
     try:
         there = json.loads(text.decode("utf-8"))

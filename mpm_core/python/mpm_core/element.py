@@ -1,4 +1,4 @@
-"""Laboratory tests on a single point of a law: some components of strain are driven, the stress of the others is kept."""
+"""Laboratory tests on a single point of a law: some components of strain are prescribed, and the stress in the others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ElementTest:
         law: any law.
         stress: at the start [Pa], tension positive, shape (4,) in plane strain or (6,).
         state: state variables at the start, shape (n_state,); zero by default.
-        cell_size: size of the cell that the point stands for [m]; without one the law takes its own.
+        cell_size: size of the cell that the point represents [m]; by default that of the law.
 
     Example:
         >>> test = mpm.ElementTest(soil, stress=[-100e3] * 3 + [0.0] * 3)
@@ -53,10 +53,10 @@ class ElementTest:
         Args:
             strain_increment: shape (S,), None where the stress is prescribed instead.
             stress: stress [Pa] to reach in those components, shape (S,); the present one by default.
-            dt: duration of the increment [s]; by default loading is slow without limit.
+            dt: duration of the increment [s]; by default loading is infinitely slow.
 
         Raises:
-            RunError: the law failed, or no strain gives the stresses; with the increment. The point is as it was.
+            RunError: the law failed, or no strain gives the stresses; the message has the increment. The point is unchanged.
         """
         if not dt >= 0:
             raise InputError(f"dt is {dt} s, expected at least 0")

@@ -1,4 +1,4 @@
-"""Looking at the energy balance of a run: a warning where it does not add up, and an error where it is far off."""
+"""Check of the energy balance of a run: a warning where it is not closed, and an error where the gap is large."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from ._core import InputError, RunError
 from .report import Report
 
 WARN_ABOVE = 0.01
-"""Part of the energy at work that may be unaccounted for without a warning"""
+"""Unexplained fraction of the energy above which there is a warning"""
 
 
 LEAST_STEPS = 32
-"""Steps of a model before its energy is looked at: in the first ones half a step more or less is a large part of it"""
+"""Steps of a model before its energy is checked: in the first steps half a time step is a large part of it"""
 
 
 class EnergyWarning(RuntimeWarning):
-    """The energy of a run does not add up; see docs/energy.md."""
+    """The energy balance of a run is not closed; see docs/energy.md."""
 
 
 @dataclass
 class EnergyWatch:
-    """Looks at the reports of a run.
+    """Checks the energy in the reports of a run.
 
     Args:
         limit: `Report.unexplained_fraction` at which the run ends with an error; None for none.
-        speaks: whether this rank gives the warning.
+        speaks: whether this rank issues the warning.
     """
 
     limit: float | None
@@ -65,7 +65,7 @@ def _said(report: Report) -> str:
 
 
 def energy_limit(limit: float | None) -> float | None:
-    """A limit that a caller gives.
+    """Check the energy limit that a caller gives.
 
     Raises:
         InputError: it is neither None nor a number above 0.01.

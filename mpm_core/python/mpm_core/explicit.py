@@ -44,13 +44,13 @@ def run_options(dt: float | None, courant: float, pic: float, allow_unstable: bo
 
 
 def require_particles(model: Model) -> None:
-    """Raises InputError where no rank has any. Collective."""
+    """Raise InputError if no rank has particles. Collective."""
     if model.comm.allreduce(len(model.particles)) == 0:
         raise InputError("the model has no particles, seed some first")
 
 
 def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:
-    """Times still to come at which a run reports [s]; see `Model.explicit`."""
+    """Remaining times at which a run reports [s]; see `Model.explicit`."""
     if not (np.isfinite(until) and until >= model.time):
         raise InputError(f"until is {until} s, expected a time not before the present, {model.time} s")
     start = model.time if since is None else float(since)
@@ -70,12 +70,12 @@ def steps_to_report(model: Model, every: int | None) -> int:
 
 
 def is_report_due(model: Model, every: int | None) -> bool:
-    """Whether as many steps have been done."""
+    """Whether a report is due after this number of steps."""
     return every is not None and model.steps % every == 0
 
 
 def steps_between(every_steps: int | None) -> int | None:
-    """A number of steps that a caller gives."""
+    """Check the number of steps that a caller gives."""
     if every_steps is not None and (int(every_steps) != every_steps or every_steps < 1):
         raise InputError(f"every_steps is {every_steps}, expected a whole number from 1")
     return None if every_steps is None else int(every_steps)
@@ -91,8 +91,8 @@ def run_explicit(
     every_steps: int | None,
     energy_limit: float | None,
 ) -> Iterator[Report]:
-    """Step to each of the times, with a report there, and after every so many steps."""
-    # Python must get its turn now and then, for Ctrl-C. The pauses do not change the steps, which are chosen anew
+    """Step to each of the times; yields a report there, and after every ``every_steps`` steps."""
+    # Python must run from time to time, for Ctrl-C. The pauses do not change the steps, which are chosen again
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)

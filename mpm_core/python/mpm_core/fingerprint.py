@@ -1,4 +1,4 @@
-"""A text that tells any two objects apart that are written in Python: by their code as it is loaded, and by their values.
+"""A text that differs between any two objects written in Python: their loaded code and their values.
 
 Loaded code rather than source: the file may have changed since, and a class typed at a prompt has none. Code of libraries
 counts by its name.

@@ -1,4 +1,4 @@
-"""The remedy of the implicit scheme for nodes that carry hardly any mass."""
+"""Ghost penalty: stabilisation of the implicit scheme at nodes with hardly any mass."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ._core import InputError
 
 @dataclass(frozen=True)
 class GhostPenalty:
-    """Penalty on the jump of gradients between badly filled cells and their neighbours.
+    """Penalty on the jump of gradients between partly filled cells and their neighbours.
 
     Where the body's boundary cuts a cell, its outer nodes hang on a few particles, which makes the tangent nearly
     singular. The penalty ties the gradient in such a cell to that of its neighbour (Burman 2010; in implicit MPM Coombs
-    2023). Affine motion feels nothing of it, and a body whose cells are all filled does not either.
+    2023). The penalty vanishes for affine motion, and where all cells of the body are filled.
 
     Raises:
         InputError: a number below zero, or ``filled`` above one.
     """
 
     stiffness: float = 0.1
-    """gamma_K, relative to the shear modulus [-]; acts on the step's displacement,
-    with inertia on what changes of velocity add to it"""
+    """gamma_K, relative to the shear modulus [-]; acts on the displacement of the step,
+    with inertia on the part that comes from changes of velocity"""
     mass: float = 0.1
     """gamma_M, relative to the density [-]; acts on the acceleration"""
     filled: float = 0.5
@@ -39,7 +39,7 @@ class GhostPenalty:
                 raise InputError(f"{name} is {value}, expected a number from 0 to {most}")
 
     def options(self) -> Any:
-        """As the core takes it."""
+        """Options of the core."""
         options = _core.GhostOptions()
         options.stiffness, options.mass, options.filled = self.stiffness, self.mass, self.filled
         return options

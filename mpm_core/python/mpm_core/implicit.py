@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 FADING = 0.1
-"""of the ghost penalty between steps that only redistribute stresses"""
+"""Factor on the ghost penalty between steps that only redistribute stresses"""
 
 
 def implicit_options(
@@ -66,14 +66,14 @@ def checked_accuracy(accuracy: float | None, second_order: bool) -> float | None
 
 
 class Stepper:
-    """Implicit steps of a model, with what they took since the last report.
+    """Implicit steps of a model, with counts of iterations and cutbacks since the last report.
 
     Args:
         model: the model.
         solver: how to solve a step, such as ``Newton()``.
         options: the core's options of the scheme.
         dt: longest step [s].
-        accuracy: displacement [m] by which a step of second order may be wrong; None for any.
+        accuracy: largest error in displacement [m] of a step of second order; None for no limit.
     """
 
     def __init__(self, model: Model, solver: Any, options: Any, dt: float, accuracy: float | None = None) -> None:
@@ -83,20 +83,20 @@ class Stepper:
         self.begin_anew()
         self.control = StepControl(dt, dt)
         self.last = Solution()
-        """How the last step tried was solved"""
+        """Solution of the last step that was tried"""
 
     def begin_anew(self) -> None:
-        """Forget what belongs to the nodes of this rank, after they have changed."""
+        """Discard the data of the nodes of this rank, after these have changed."""
         dim = self._model.mesh.dim
         self._step = getattr(_core, type(self._core).__name__.replace("Model", "ImplicitStep"))(self._core)
         self._solver = self._method.solver(self._model.comm, dim)
         self._changed = True
 
     def advance(self, until: float) -> None:
-        """One step towards a time, cut as often as it must be.
+        """Make one step towards a time, shortened until it converges.
 
         Raises:
-            RunError: the shortest step failed too; with the reason. The particles are as they were.
+            RunError: the shortest step failed too; the message has the reason. The particles are unchanged.
         """
         while True:
             left = until - self._core.time
@@ -114,7 +114,7 @@ class Stepper:
             self.control.grow(self._growth)
 
     def attempt(self, dt: float) -> str:
-        """Try one step; the particles change only when it succeeds. Returns why it did not, or nothing."""
+        """Try one step; the particles change only if it succeeds. Returns the reason of a failure, or an empty text."""
         self._changed |= self._step.start(self._options, dt)
         self._solve()
         if self._options.second_order and self.last.converged:
@@ -128,13 +128,13 @@ class Stepper:
         return self._step.finish() if self.last.converged else self.last.reason
 
     def _solve(self) -> None:
-        """One stage."""
+        """Solve one stage."""
         self.last = self._solver.solve(self._step, self._step.dt, self._changed)
         self._changed = False
         self.control.iterations += self.last.iterations
 
     def _too_coarse(self) -> str:
-        """Why the step is to be shorter, or nothing; and what the next one may grow by."""
+        """Reason to shorten the step, or an empty text; sets the growth of the next one."""
         if self._accuracy is None:
             return ""
         error = self._step.displacement_error()
@@ -142,7 +142,7 @@ class Stepper:
         return f"an error of {error:.3g} m in displacement" if error > 2 * self._accuracy else ""
 
     def report(self) -> ImplicitReport:
-        """Where the run stands; counts begin anew."""
+        """State of the run; resets the counts of iterations and cutbacks."""
         report = ImplicitReport(
             **vars(self._model.report()),
             iterations=self.control.iterations,
@@ -166,7 +166,7 @@ def run_implicit(
     energy_limit: float | None,
     accuracy: float | None,
 ) -> Iterator[ImplicitReport]:
-    """Step until each of the times; reports then, and after every so many steps."""
+    """Step to each of the times; yields a report there, and after every ``every_steps`` steps."""
     stepper = Stepper(model, solver, options, dt, accuracy)
     resumed, model._resumed = model._resumed, None
     if resumed is not None:
@@ -198,10 +198,10 @@ def run_implicit(
 def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
     """Quasi-static steps at the present time until the particles balance their loads.
 
-    What the loads are out of balance by is applied at once, or in parts where that fails. The steps that apply it move the
-    particles; those that follow do not. One that moves them again may send a particle into the next cell and back for ever,
-    each time with a jump of the nodal forces that sends it there. The penalty's forces, which are part of a step's equilibrium
-    but not of the particles', fade from step to step.
+    The out-of-balance force is applied at once, or in parts where that fails. The steps that apply it move the particles; the
+    steps that follow do not, because a particle could cross between two cells for ever, driven by the jump of the nodal forces
+    at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but not of the particles', decrease
+    from step to step.
     """
     options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)

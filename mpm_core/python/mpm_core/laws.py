@@ -1,4 +1,4 @@
-"""Laws that are special cases of others, under the names that the field knows them by."""
+"""Laws that are special cases of others, under their usual names."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +14,9 @@ def _positive(name: str, value: float) -> float:
 
 
 def tresca(*, young: float, poisson: float, shear_strength: float) -> MohrCoulomb:
-    """The criterion of Tresca: half the difference of the extreme principal stresses is limited.
+    """The criterion of Tresca: half the difference of the extreme principal stresses does not exceed the shear strength.
 
-    With the undrained shear strength of a clay and a Poisson's ratio near 0.5 it is the analysis in total stresses.
+    With the undrained shear strength of a clay and a Poisson's ratio near 0.5 this is a total stress analysis.
 
     Args:
         young: Young's modulus [Pa].
@@ -28,7 +28,7 @@ def tresca(*, young: float, poisson: float, shear_strength: float) -> MohrCoulom
 
 
 def von_mises(*, young: float, poisson: float, yield_stress: float) -> DruckerPrager:
-    """The criterion of von Mises: sqrt(3 J2) is limited.
+    """The criterion of von Mises: sqrt(3 J2) does not exceed the yield stress.
 
     Args:
         young: Young's modulus [Pa].

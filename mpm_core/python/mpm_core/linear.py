@@ -23,7 +23,7 @@ from .petsc import (
 )
 
 RTOL = 1e-6
-"""of the linear systems, to which multigrid solves them"""
+"""Relative residual to which multigrid solves the linear systems"""
 
 
 class Tangent:
@@ -64,10 +64,10 @@ class Tangent:
         self.iterations = 0
         """Krylov iterations of the last solution."""
         self.failure = ""
-        """Why the last solution failed; empty if it did not"""
+        """Reason why the last solution failed; empty if it did not"""
 
     def update(self, step: Any) -> None:
-        """Take the values of the step's present iterate."""
+        """Assemble the tangent of the step's present iterate."""
         set_values(self._stiffness, step.stiffness_values())
         self.matrix = self._stiffness
         if self._averaged:
@@ -91,7 +91,7 @@ class Tangent:
             self._ksp.setUp()
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """J^-1 times this rank's part of a vector; None when the solver failed, for the reason in `failure`."""
+        """J^-1 times this rank's part of a vector; None if the solver failed, with the reason in `failure`."""
         x, b = self.matrix.createVecs()
         b.array[:] = right
         self.failure = solved(self._ksp, b, x)

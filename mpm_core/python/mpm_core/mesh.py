@@ -134,9 +134,9 @@ class Mesh:
         self.global_nodes: NDArray[np.int64] = _numbers(global_nodes, len(self.points))
         """Number of each node over all ranks, shape (nodes,)."""
         self.global_cells: NDArray[np.int64] = _numbers(global_cells, len(self.cells))
-        """Number of each cell over all ranks, shape (cells,); it is the same however the mesh is cut."""
+        """Number of each cell over all ranks, shape (cells,); it does not depend on the partition."""
         self.cell_numbers: int = 1 + comm.allreduce(int(self.global_cells.max(initial=-1)), MPI.MAX)
-        """One more than the highest number that a cell has over all ranks."""
+        """Highest number of a cell over all ranks, plus one."""
         self._carriers: WeakKeyDictionary[Mesh, _core.RowCarrier] = WeakKeyDictionary()
         self._tags = {
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
@@ -160,11 +160,14 @@ class Mesh:
         return self._core.volumes()
 
     def cells_of(self, points: ArrayLike) -> NDArray[np.int32]:
-        """Number of the cell on this rank that holds each point, -1 where none does; shape (n,)."""
+        """Number of the cell on this rank that contains each point, -1 outside of its cells; shape (n,)."""
         return self._core.cells_of(floats("points", points, (None, self.dim)))
 
     def nodal_of(self, other: "Mesh", values: ArrayLike) -> NDArray[np.float64]:
-        """Nodal values of the same mesh cut otherwise, at the nodes of this one; shape (nodes,) or (nodes, k). Collective.
+        """Nodal values of the same mesh under another partition, at the nodes of this one. Collective.
+
+        Returns:
+            Shape (nodes,) or (nodes, k).
 
         Example:
             >>> start = model.mesh
@@ -180,24 +183,26 @@ class Mesh:
         return self._carrier_from(other).carry(rows).reshape(len(self.points), *array.shape[1:])
 
     def _carrier_from(self, other: "Mesh") -> _core.RowCarrier:
-        """What carries nodal values from the same mesh cut otherwise to the nodes of this one. Collective."""
+        """Transfer of nodal values from the same mesh under another partition to the nodes of this one. Collective."""
         if other not in self._carriers:
             known = np.unique(other.cells[: other.owned_cells])
             ranks, rows = found(self.comm, other.global_nodes[known], known, self.global_nodes)
 
             def require_all() -> None:
                 if absent := self.global_nodes[ranks < 0].tolist():
-                    raise InputError(f"other is a mesh without node {absent[0]}, expected this mesh cut otherwise")
+                    raise InputError(
+                        f"other is a mesh without node {absent[0]}, expected this mesh under another partition"
+                    )
 
             collectively(self.comm, require_all)
             self._carriers[other] = _core.RowCarrier(MPI._addressof(self.comm), ranks, rows)
         return self._carriers[other]
 
     def tags_of(self, kind: str, given: Tag) -> tuple[int, ...]:
-        """The tags of cells or facets (``kind``) that a number, a name or a sequence of them stands for.
+        """The tags of cells or facets (``kind``) that are meant by a number, a name or a sequence of them.
 
         Raises:
-            InputError: no cell or facet has one of them; the message lists names and tags that there are.
+            InputError: no cell or facet has one of them; the message lists the known names and tags.
         """
         names, known, tags = self.names[kind], self._tags[kind], []
         for one in [given] if isinstance(given, (str, int, np.integer)) else given:
@@ -213,9 +218,9 @@ class Mesh:
 def cell_sizes(volumes: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
     """Size h of simplices [m]: side of the square or cube that D! of their volume fill, (D! V)^(1/D).
 
-    It is the width of the band over which softening spreads, and what laws are given as the size of a point's cell.
+    Softening is spread over a band of this width, and laws get it as the size of a point's cell.
 
     Args:
-        volumes: of the cells [m2 or m3].
+        volumes: volumes of the cells [m2 or m3].
     """
     return _core.cell_sizes(volumes, dim)

@@ -12,15 +12,18 @@ from .linear import Tangent
 from .solution import Solution, relative
 
 EASY_ITERATIONS = 8
-"""of a step after which one twice as long is tried, up to dt"""
+"""Iterations of a step up to which the next one may be twice as long, at most dt"""
 
 
 RUN_AWAY = 10.0
-"""Residual by the forces at work at which an iteration is given up"""
+"""Relative residual at which an iteration is abandoned"""
 
 
 class System(Protocol):
-    """What `newton` brings to a root. Residuals are relative, and infinite where they cannot be had, for a `reason`."""
+    """A system of equations that `newton` solves.
+
+    Residuals are relative; one that cannot be computed is infinite, with a `reason`.
+    """
 
     reason: str
 
@@ -28,10 +31,10 @@ class System(Protocol):
         """The first residual."""
 
     def correction(self) -> bool:
-        """Solve the tangent system for the residual; whether that worked, else `reason` says why not."""
+        """Solve the tangent system for the residual. Returns whether it was solved; `reason` says why not."""
 
     def move(self, fraction: float) -> float:
-        """Add a fraction of the correction to the last point of the iteration; the residual there."""
+        """Add a fraction of the correction to the last point of the iteration; returns the residual there."""
 
     def work(self) -> float:
         """The residual times the correction."""
@@ -41,7 +44,7 @@ class System(Protocol):
 
 
 class NewtonReport(NamedTuple):
-    """How an iteration went.
+    """Course of an iteration.
 
     residuals: relative to the forces at work, one before each iteration and one at the end
     reason: why it did not converge; empty when it did
@@ -64,12 +67,12 @@ def newton(
     max_halvings: int = 5,
     min_iterations: int = 1,
 ) -> NewtonReport:
-    """Bring a system to equilibrium.
+    """Solve a system by Newton's method with a line search.
 
     The full correction is halved until the work of the residual has fallen to 0.8 of what it was (Matthies, Strang
     1979, IJNME 14, 1613-1626); when no fraction does that, the one with the smallest residual is taken. Unlike a search
-    that wants the residual itself to fall, this goes on near collapse and with non-associated flow. An iteration whose
-    residual reaches ten times the forces at work is given up.
+    for a decrease of the residual itself, this one continues near collapse and with non-associated flow. An iteration whose
+    residual reaches ten times the forces at work is abandoned.
     """
     residuals = [system.start()]
     if residuals[0] == float("inf"):
@@ -90,7 +93,7 @@ def newton(
 
 
 def line_search(system: System, max_halvings: int) -> float:
-    """Moves a system by a fraction of its correction, chosen as `newton` says; returns the residual there."""
+    """Add a fraction of the correction to a system, chosen as in `newton`; returns the residual there."""
     work = abs(system.work())
     best_fraction, best_residual = 1.0, float("inf")
     for halving in range(max_halvings + 1):
@@ -115,12 +118,12 @@ class Newton:
     """|r| at which a step is solved, relative to the largest of |f_ext|, |f_int| and inertia"""
     max_iterations: int = 25
     max_halvings: int = 5
-    """of a correction that does not lower the work of the residual"""
+    """Halvings of a correction that does not lower the work of the residual"""
     prefix: str = "implicit_"
-    """of the PETSc options"""
+    """Prefix of the PETSc options"""
 
     def solver(self, comm: MPI.Comm, dim: int) -> NewtonSolver:
-        """What solves the steps of a run."""
+        """Solver of the steps of a run."""
         return NewtonSolver(self, comm, dim)
 
 
@@ -132,7 +135,7 @@ class NewtonSolver:
         self._tangent: Tangent | None = None
 
     def solve(self, step: Any, dt: float, changed: bool) -> Solution:
-        """Bring a started step to r = 0.
+        """Solve r = 0 for a started step.
 
         Args:
             step: the core's implicit step, started.
@@ -171,7 +174,7 @@ class NewtonSolver:
 
 
 class _StepSystem:
-    """An implicit step as `newton` wants it."""
+    """An implicit step as a system for `newton`."""
 
     def __init__(self, solver: NewtonSolver, step: Any, dt: float) -> None:
         self._solver, self._step, self._dt = solver, step, dt

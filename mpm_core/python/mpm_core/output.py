@@ -185,7 +185,8 @@ class ModelOutput:
         ...         output.write()
 
     Args:
-        model: whose particles and nodes are written. Its mesh may be cut anew later; the nodes are written as they are now.
+        model: the model whose particles and nodes are written. Its mesh may be repartitioned later; nodes keep their present
+            order in the files.
         particles: path of the files of particles, as for `ParticleOutput`; None if none are to be written.
         mesh: path of the files of the mesh, as for `MeshOutput`, with the tags of cells as the field ``tag``; None if none are
             to be written.

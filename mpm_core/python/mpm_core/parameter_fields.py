@@ -12,11 +12,11 @@ from ._core import Hencky, Heterogeneous, InputError, Undrained
 from .mesh import Tag, floats
 
 Field = Union[float, ArrayLike, Callable[[NDArray[np.float64]], ArrayLike], Mapping[Tag, float]]
-"""How values of a parameter are given, see `Model.set_parameter`"""
+"""Values of a parameter as they may be given, see `Model.set_parameter`"""
 
 
 def heterogeneous_part(law: Any) -> Heterogeneous | None:
-    """The `Heterogeneous` law that a law is, or is made of; None where there is none."""
+    """The `Heterogeneous` law that a law is or contains; None if there is none."""
     while isinstance(law, (Hencky, Undrained)):
         law = law.law if isinstance(law, Hencky) else law.skeleton
     return law if isinstance(law, Heterogeneous) else None
@@ -29,7 +29,7 @@ def has_varying(law: Any, name: str) -> bool:
 
 
 def nominal_value(law: Any, name: str) -> float:
-    """The law's own number of a parameter that varies."""
+    """The nominal value of a parameter that varies."""
     part = heterogeneous_part(law)
     assert part is not None
     return getattr(part.law, name)

@@ -1,4 +1,4 @@
-"""Particles seen from Python."""
+"""The particles of a model, as NumPy arrays."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .mesh import floats
 class Particles:
     """The particles of a model on this rank. Every attribute is a copy, one row per particle, and read-only: `set` writes.
 
-    The order of rows changes when particles are sorted or move to another rank; ``id`` tells who is who. Of a few particles
-    attributes are had sooner than by copying those of all:
+    The order of rows changes when particles are sorted or move to another rank; ``id`` identifies a particle. Attributes of a
+    few particles are copied faster by indexing:
 
     Example:
         >>> low = model.particles.position[:, 1] < 1.0
@@ -32,13 +32,13 @@ class Particles:
         return self._core.size if self._rows is None else len(self._rows)
 
     def __getitem__(self, rows: ArrayLike) -> Particles:
-        """The particles in some rows, as they are whenever one of its attributes is read.
+        """The particles in some rows; attributes have the values of the time at which they are read.
 
         Args:
             rows: numbers of rows, from 0, in any order, shape (m,); or whether each row is chosen, shape (n,).
 
         Raises:
-            InputError: rows of another shape or dtype, or a row that is not there, also when that is so only later.
+            InputError: rows of another shape or dtype, or a row that does not exist, also when the attribute is read later.
         """
         self._require_all("choosing rows")
         return Particles(self._core, self._core.row_numbers(np.asarray(rows)))
@@ -68,7 +68,7 @@ class Particles:
         return self.state[:, 0]
 
     def schedule(self) -> list[dict[str, Any]]:
-        """What fields there are, those that `Model.add_field` declared included: ``name``, ``unit``, ``meaning``, number of
+        """All fields, including those that `Model.add_field` declared: ``name``, ``unit``, ``meaning``, number of
         ``components``, ``initial`` value, whether it is ``optional`` and whether it is ``settable``."""
         return self._core.particle_schedule()
 
@@ -85,7 +85,7 @@ class Particles:
         return sorted({*super().__dir__(), *(field["name"] for field in self.schedule())})
 
     def single(self, *names: str) -> dict[str, NDArray[Any]]:
-        """Copies of fields of all particles in single precision, such as frames that are kept in memory; sooner than one by one.
+        """Copies of fields of all particles in single precision, such as frames that are kept in memory; faster than one by one.
 
         Args:
             names: as the attributes; `id`, `material` and `cell` stay whole numbers. The position is always there.

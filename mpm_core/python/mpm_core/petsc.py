@@ -1,4 +1,4 @@
-"""PETSc as implicit steps and the finite elements use it: solvers by the size of the system, and what failed in words."""
+"""PETSc solvers of implicit steps and finite elements, chosen by the size of the system, and messages about their failures."""
 
 from __future__ import annotations
 
@@ -78,7 +78,10 @@ def multigrid_options(dim: int, rtol: float) -> dict[str, Any]:
 
 
 def rigid_body_motions(points: NDArray[np.float64], comm: MPI.Comm) -> PETSc.NullSpace:
-    """What multigrid must keep on its coarse levels. points: (n, D) of this rank's own nodes [m]. Collective."""
+    """Rigid-body modes, which multigrid must keep on its coarse levels. Collective.
+
+    points: (n, D) of this rank's own nodes [m]
+    """
     coordinates = np.ascontiguousarray(points)
     vector = PETSc.Vec().createWithArray(coordinates.ravel(), bsize=coordinates.shape[1], comm=comm)
     return PETSc.NullSpace().createRigidBody(vector)
@@ -86,7 +89,7 @@ def rigid_body_motions(points: NDArray[np.float64], comm: MPI.Comm) -> PETSc.Nul
 
 @contextmanager
 def defaults(prefix: str, values: dict[str, Any]) -> Iterator[None]:
-    """PETSc options that hold in between unless the user has set them; multigrid reads them whenever it is set up."""
+    """PETSc options that hold within the context unless the user has set them; multigrid reads them at each set-up."""
     options = PETSc.Options(prefix)
     added = [name for name in values if not options.hasName(name)]
     for name in added:
@@ -108,7 +111,7 @@ def new_solver(comm: MPI.Comm, prefix: str) -> PETSc.KSP:
 
 
 def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
-    """Solve; why that failed, empty if it did not, on all ranks alike: one that factorises for all may be alone in knowing.
+    """Solve; returns the reason of a failure, or an empty text, the same on all ranks, also where one rank factorises alone.
 
     After a failure the solver must not be used again, see `new_solver`. Collective.
     """
@@ -132,7 +135,7 @@ def _remaining(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> float:
     """Residual relative to the right side.
 
     A pivot of round-off in place of zero does not stop a factorisation, and the residual that a Krylov method carries along
-    loses touch with the real one where the solution grows without bound.
+    deviates from the true one where the solution grows without bound.
     """
     residual, size = right.duplicate(), right.norm()
     ksp.getOperators()[0].mult(solution, residual)
@@ -141,7 +144,7 @@ def _remaining(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> float:
 
 
 def _allowed(ksp: PETSc.KSP) -> float:
-    """Relative residual of a solution that is believed; a Krylov method may measure its own in another norm."""
+    """Largest relative residual of an accepted solution; a Krylov method may measure its own in another norm."""
     return SINGULAR if ksp.getType() == "preonly" else min(0.9, max(SINGULAR, 100 * ksp.getTolerances()[0]))
 
 

@@ -1,7 +1,7 @@
 """Probes: histories of some particles, of points in space, of section forces and of totals, as CSV files.
 
-A probe looks at a model; a `ProbeFile` adds a row for each look to a file that pandas, spreadsheets and gnuplot read. Names of
-columns end in their unit. All is collective, and the same on any number of ranks.
+A probe reads values from a model; a `ProbeFile` adds a row for each reading to a file that pandas, spreadsheets and gnuplot read.
+Names of columns end in their unit. All methods are collective, and results do not depend on the number of ranks.
 
 Example:
     >>> crest = ParticleProbe(model, [(1.1, 1.0)])
@@ -37,7 +37,7 @@ class Probe(Protocol):
 
     @property
     def model(self) -> Model:
-        """What it looks at."""
+        """The model that it reads."""
 
     def values(self) -> dict[str, float]:
         """Numbers by name of column, the same on all ranks; the first is ``time_s``. Collective."""
@@ -62,7 +62,7 @@ def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
 
 
 def nearest_particle(model: Model, place: ArrayLike) -> int:
-    """Number of the particle that started nearest to a point, of several as near as each other the highest number. Collective.
+    """Number of the particle that started nearest to a point; the highest number of several at the same distance. Collective.
 
     Args:
         place: [m], shape (D,).
@@ -101,7 +101,7 @@ class ParticleProbe:
         self._columns += _components("stress", "Pa", STRESSES[dim])
 
     def values(self) -> dict[str, float]:
-        """Numbers by name; NaN for a particle that flowed out."""
+        """Numbers by name; NaN for a particle that left through an outflow boundary."""
         p = self.model.particles
         found = p.find(self.ids)
         here = np.flatnonzero(found >= 0)
@@ -117,7 +117,7 @@ class ParticleProbe:
 
 
 class PointProbe:
-    """Stays at points of space: how full the cell there is, and mean velocity and stress of the particles in it.
+    """Fixed points of space: filled fraction of the cell, and mean velocity and stress of the particles in it.
 
     Args:
         model: the model.
@@ -193,7 +193,7 @@ class SectionProbe:
         self._mesh: Mesh | None = None  # whose cells are known to be cut or not
 
     def _cut(self, mesh: Mesh) -> None:
-        """Finds the cells of this rank that the plane cuts, and the gradient of w in them; the mesh may be cut anew in a run."""
+        """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition."""
         corners = mesh.points[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
         cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))
@@ -250,7 +250,7 @@ class TotalsProbe:
 
 
 class ProbeFile:
-    """A CSV file with a row for each look of a probe, on disk as soon as it was taken; a context manager.
+    """A CSV file with a row for each reading of a probe, on disk as soon as it was taken; a context manager.
 
     Args:
         path: of the file; the first rank writes.
@@ -268,7 +268,7 @@ class ProbeFile:
         self._file = RowFile(path, list(probe.values()), probe.model.comm, keep_before=before)
 
     def record(self) -> None:
-        """Look, and add a row. Collective.
+        """Read the probe, and add a row. Collective.
 
         Raises:
             RunError: on all ranks, with path and reason, when the file cannot be written.

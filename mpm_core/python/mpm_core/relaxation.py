@@ -12,7 +12,7 @@ from ._core import RelaxationKind
 from .solution import Solution, relative
 
 _AT_ONCE = 500
-"""Iterations between two looks at signals such as Ctrl-C."""
+"""Iterations between checks for signals such as Ctrl-C."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Relaxation:
     max_iterations: int = 200_000
 
     def solver(self, comm: MPI.Comm, dim: int) -> RelaxationSolver:
-        """What solves the steps of a run."""
+        """Solver of the steps of a run."""
         return RelaxationSolver(self)
 
 
@@ -40,7 +40,7 @@ class RelaxationSolver:
         self._options = options
 
     def solve(self, step: Any, dt: float, changed: bool) -> Solution:
-        """Bring a started step to r = 0; see ``NewtonSolver.solve``."""
+        """Solve r = 0 for a started step; see ``NewtonSolver.solve``."""
         options = self._options
         report = step.start_relaxation(options.kind)
         if report["failed"]:  # v0 carried on over the whole step is too much; begin at rest

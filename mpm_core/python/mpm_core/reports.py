@@ -1,4 +1,4 @@
-"""The reports of a run, one by one as the run goes on."""
+"""Iteration over the reports of a run."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ R = TypeVar("R")
 
 
 class Reports(Generic[R]):
-    """Iterator over the reports of a run; the run goes on as they are asked for.
+    """Iterator over the reports of a run; each request continues the run up to the next one.
 
     Example:
         >>> for report in model.explicit(until=2.0, every=0.5):
         ...     print(report.time)
         >>> report = model.explicit(until=4.0).last()
 
-    A run whose reports nobody asks for makes no step, and says so by a RuntimeWarning.
+    A run whose reports are not requested makes no step; a RuntimeWarning says so.
     """
 
     def __init__(self, steps: Iterator[R], scheme: str) -> None:

@@ -1,4 +1,4 @@
-"""A CSV file of numbers that grows while a run goes on, and that the same run goes on with after a restart."""
+"""A CSV file of numbers that grows during a run, and that a restart of the run continues."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ ROUNDING = 1e-8
 class RowFile:
     """Rows under one heading, each on disk as soon as it was added; the first rank writes.
 
-    The file begins aside, as ``path.part``, and gets its name when what it begins with is on the disk: a run that is killed
-    meanwhile leaves the file as it was.
+    The file is begun as ``path.part`` and renamed when its first rows are on the disk: a run that is killed before that leaves
+    an older file unchanged.
 
     Args:
         path: of the file.
         columns: names; the first is the time [s].
-        keep_before: keep the rows before this time [s] of a file that is there, as after a restart; None begins anew. Rows
+        keep_before: keep the rows before this time [s] of a file that is there, as after a restart; None replaces the file. Rows
             that are not whole, or not later than the one before, are left out, with a note on standard error.
 
     Raises:
@@ -80,7 +80,7 @@ class RowFile:
             raise RunError(problem)
 
     def close(self) -> None:
-        """Close the file; nothing can be added after that. A row that there was no room for stays out."""
+        """Close the file; nothing can be added after that. A row that the disk could not hold is left out."""
         if self._file is not None:
             try:
                 self._file.close()

@@ -29,34 +29,34 @@ def exchanged(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, N
     return came, np.repeat(np.arange(comm.size), received)
 
 
-def answered(comm: MPI.Comm, ranks: NDArray, questions: NDArray, answer: Callable[[NDArray], NDArray]) -> NDArray:
-    """Ask ranks questions, a row each; returns their answers, a row each, in the order of the questions.
+def requested(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable[[NDArray], NDArray]) -> NDArray:
+    """Send each rank its requests, a row each; returns its replies, a row each, in the order of the requests.
 
     Args:
-        ranks: whom to ask, shape (n,).
-        questions: shape (n, k).
-        answer: gives a row of answers to each row of questions.
+        ranks: ranks that the requests go to, shape (n,).
+        requests: shape (n, k).
+        reply: function that returns a row for each row of requests.
 
     Note:
         Collective.
     """
-    came, askers = exchanged(comm, ranks, questions)
-    replies, _ = exchanged(comm, askers, answer(came))
+    came, senders = exchanged(comm, ranks, requests)
+    replies, _ = exchanged(comm, senders, reply(came))
     back = np.empty_like(replies)
     back[np.argsort(ranks, kind="stable")] = replies
     return back
 
 
 def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> tuple[NDArray, NDArray]:
-    """Where things are, by their number over all ranks; rank (number mod size) keeps the directory.
+    """Find items by their global numbers; rank (number mod size) keeps the directory.
 
     Args:
-        numbers: of what this rank has, shape (n,). What several ranks have is found on the lowest of them.
-        rows: of these things on this rank, shape (n,).
-        wanted: numbers of the things to find, shape (m,).
+        numbers: global numbers of this rank's items, shape (n,). An item of several ranks is found on the lowest of them.
+        rows: local rows of these items, shape (n,).
+        wanted: global numbers of the items to find, shape (m,).
 
     Returns:
-        Ranks and rows of the wanted things, shape (m,) each; -1 for what no rank has.
+        Ranks and rows of these items, shape (m,) each; -1 for items that no rank has.
 
     Note:
         Collective.
@@ -69,10 +69,10 @@ def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> t
         at = np.searchsorted(known, asked[:, 0])
         there = np.flatnonzero(at < len(known))
         there = there[known[at[there]] == asked[there, 0]]
-        answer = np.full((len(asked), 2), -1)
-        answer[there] = came[first[at[there]], 1:]
-        return answer
+        reply = np.full((len(asked), 2), -1)
+        reply[there] = came[first[at[there]], 1:]
+        return reply
 
-    questions = wanted.astype(np.int64)[:, None]
-    ranks, rows = answered(comm, questions[:, 0] % comm.size, questions, places).T
+    requests = wanted.astype(np.int64)[:, None]
+    ranks, rows = requested(comm, requests[:, 0] % comm.size, requests, places).T
     return ranks, rows

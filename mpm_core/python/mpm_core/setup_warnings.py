@@ -1,4 +1,4 @@
-"""What a model says before its first step when something has most likely been forgotten, or is of the wrong size."""
+"""Warnings before the first step of a model, where input is probably missing or of the wrong magnitude."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from .model import Model
 
 UNIT_WEIGHTS = (1e3, 200e3)
-"""[N/m3] between which the unit weight of a soil is thought to lie; peat is at 10 kN/m3, published slopes go up to 80"""
+"""Bounds of the unit weight of a soil [N/m3]; peat has 10 kN/m3, published slopes have up to 80"""
 
 NEARLY_INCOMPRESSIBLE = 0.45
-"""Poisson's ratio from which on linear cells lock"""
+"""Poisson's ratio above which linear cells lock"""
 
 
 def warn_of_setup(model: Model, nmd: bool) -> None:
-    """Warn of what is likely to be an oversight. Collective."""
+    """Warn of probable mistakes in the input. Collective."""
     found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), _locks(model, nmd)) if text]
     if model.comm.rank == 0:
         for text in found:
@@ -72,7 +72,7 @@ def _locks(model: Model, nmd: bool) -> str:
 
 
 def _reasons_to_lock(law: Any) -> Iterator[str]:
-    """Why a law keeps the volume of the soil, itself or the one that it wraps."""
+    """Reasons for which a law, or the law within it, keeps the volume of the soil."""
     for inner in ("skeleton", "law", "peak"):
         if isinstance(getattr(law, inner, None), tuple(_core.law_types)):
             yield from _reasons_to_lock(getattr(law, inner))

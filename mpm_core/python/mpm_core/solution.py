@@ -1,4 +1,4 @@
-"""How the solution of an implicit step went."""
+"""Result of the solution of an implicit step."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ class Solution:
     """The course of the iteration over one step; the same on all ranks."""
 
     residuals: list[float] = field(default_factory=list)
-    """|r| relative to the largest of |f_ext|, |f_int| and inertia: at the start and as the iteration goes on"""
+    """|r| relative to the largest of |f_ext|, |f_int| and inertia: at the start and after each iteration"""
     iterations: int = 0
     converged: bool = False
     easy: bool = False
     """Whether a step twice as long may be tried"""
     reason: str = ""
-    """Why it did not converge"""
+    """Reason why it did not converge"""
     linear_iterations: list[int] = field(default_factory=list)
     """Krylov iterations of each Newton iteration"""
 

@@ -1,4 +1,4 @@
-"""The space that the soil takes, and whether it hangs together: what a run loses without anything else showing it."""
+"""The space that the soil fills, and the parts that the body consists of: losses that no other result shows."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ LEAST_FILLED = 0.85
 """Filled volume over that of the particles below which a run warns"""
 
 LEAST_PART = 0.01
-"""Fraction of the mass from which on a piece of the body counts as a part"""
+"""Fraction of the mass above which a piece of the body counts as a part"""
 
 
 STEPS_BETWEEN = 256
-"""Steps after which a run looks at its space and parts again"""
+"""Steps after which a run checks its space and parts again"""
 
 
 class Space(NamedTuple):
     """Volumes, in plane strain areas times one metre, in axial symmetry of one radian [m3].
 
     particles: sum of the particles' volumes
-    filled: what they fill: in each cell the less of their volume and its own
+    filled: volume that they fill: in each cell the smaller of their volume and its own
     """
 
     particles: float
@@ -34,7 +34,7 @@ class Space(NamedTuple):
 
 
 def space(model: Model) -> Space:
-    """Volume of the particles, and what of the mesh it fills. Where particles crowd, the soil takes less space than it has.
+    """Volume of the particles, and the volume of the mesh that they fill. Where particles crowd, the latter is smaller.
 
     Note:
         Collective.
@@ -84,9 +84,9 @@ def _piece_masses(cells: NDArray, masses: NDArray) -> NDArray[np.float64]:
 
 
 class SpaceWatch:
-    """Compares a body with itself at the start of a model's first run, at the ends of runs.
+    """Compares space and parts of a body with those at the start of the model's first run.
 
-    It looks again only after so many steps that its cost, that of some ten steps, does not matter.
+    A check costs as much as some ten steps, so it is made after every `STEPS_BETWEEN` steps only.
     """
 
     def __init__(self, model: Model) -> None:
@@ -99,7 +99,7 @@ class SpaceWatch:
         return int(np.sum(masses >= LEAST_PART * masses.sum()))
 
     def look(self) -> None:
-        """Warn where the body has fallen apart, or has lost space. Collective."""
+        """Warn if the body has come apart, or has lost space. Collective."""
         if self._model.steps - self._steps < STEPS_BETWEEN:
             return
         self._steps = self._model.steps

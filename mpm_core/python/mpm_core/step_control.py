@@ -11,30 +11,30 @@ MAX_CUTS = 10
 
 @dataclass
 class StepControl:
-    """What a run carries from one step to the next; checkpoints of implicit runs hold it.
+    """State of the step control from one step to the next; checkpoints of implicit runs contain it.
 
-    Lengths are in s for steps in time, and in units of what is raised for load steps.
+    Lengths are in s for steps in time, and in units of the load for load steps.
     """
 
     longest: float
-    """that a step may be long"""
+    """Largest length of a step"""
     length: float
-    """of the next step, unless a report comes before"""
+    """Length of the next step, unless a report comes before"""
     iterations: int = 0
-    """since the last report"""
+    """Iterations since the last report"""
     cuts: int = 0
-    """since the last report"""
+    """Cutbacks since the last report"""
 
     def cut(self, tried: float) -> None:
-        """After a step of the length ``tried`` failed: half of it is tried next."""
+        """Halve the next step after one of the length ``tried`` failed."""
         self.cuts += 1
         self.length = tried / 2
 
     def grow(self, factor: float = 2.0) -> None:
-        """After an easy step."""
+        """Lengthen the next step after one that converged easily."""
         self.length = min(self.longest, factor * self.length)
 
     @property
     def is_too_short(self) -> bool:
-        """Whether a run is to give up."""
+        """Whether the run must end."""
         return self.length < self.longest / 2**MAX_CUTS

@@ -215,13 +215,13 @@ class Player {
     }
     tip.hidden = i < 0;
     if (i < 0) return;
-    tip.textContent = this.told(view, i);
+    tip.textContent = this.describe(view, i);
     const right = event.clientX + 16 + tip.offsetWidth > window.innerWidth;
     tip.style.left = `${event.clientX + (right ? -16 - tip.offsetWidth : 16)}px`;
     tip.style.top = `${Math.min(event.clientY + 12, window.innerHeight - tip.offsetHeight - 8)}px`;
   }
 
-  told(view, i) {
+  describe(view, i) {
     const { k, fraction } = view.now, { fields, count, ids } = view.movie;
     const at = (name) => valueAt(fields[name], count, i, k, fraction);
     const lines = [`particle ${ids ? ids[i] : i}`, `at (${shown(at("x"))}, ${shown(at("y"))}) m`];
