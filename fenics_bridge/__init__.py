@@ -1,6 +1,6 @@
-"""Everything of the toolkit that touches DOLFINx: meshes, finite elements, and the way to the particles.
+"""All parts of the toolkit that use DOLFINx: meshes, finite elements, water, and the transfer to particles.
 
-What crosses to the core is NumPy arrays and an MPI communicator, nothing else.
+Only NumPy arrays and an MPI communicator are passed to the core.
 """
 
 from fenics_bridge.errors import InputError

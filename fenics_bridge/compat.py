@@ -1,8 +1,8 @@
-"""What differs between the versions of DOLFINx that the bridge works with: 0.5, 0.9 and 0.10.
+"""Differences between the supported versions of DOLFINx: 0.5, 0.9 and 0.10.
 
-Every choice is made by looking at what the installed DOLFINx offers, never by its version string. The rest of
-the bridge calls these functions and otherwise keeps to the part of the interface that all of them share.
-Tested with 0.5.2 and 0.9.0; what differs in 0.10 follows its documentation.
+Every choice depends on the functions of the installed DOLFINx, never on its version string. The rest of the
+bridge calls these functions, and otherwise uses only the interface that all versions have in common.
+Tested with 0.5.2 and 0.9.0; the functions for 0.10 follow its documentation.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ SHAPE = {2: "triangle", 3: "tetrahedron"}
 
 
 def create_mesh(comm, points, cells, dim):
-    """Mesh of linear simplices, partitioned afresh, each rank keeping the neighbours of its cells as ghosts.
+    """Mesh of linear simplices, with a new partition, each rank keeping the neighbours of its cells as ghosts.
 
-    points: (n, dim) this rank's share of the nodes [m]; nodes are numbered through in order of rank
-    cells: (m, dim + 1) int64, this rank's share of the cells, by those numbers
+    points: (n, dim) this rank's part of the nodes [m]; nodes are numbered through in order of rank
+    cells: (m, dim + 1) int64, this rank's part of the cells, by those numbers
     Collective.
     """
     # PT-SCOTCH 7 takes all cores of the machine for each rank, and its threads cut a mesh differently each time.
@@ -150,7 +150,7 @@ def quadrature_points(domain, degree):
 
 
 def interpolation_points(space):
-    """Points of the reference cell where a space wants the values that it interpolates: (q, D)."""
+    """Points of the reference cell at which a space interpolates: (q, D)."""
     points = space.element.interpolation_points
     return points() if callable(points) else points
 
@@ -173,7 +173,7 @@ def expression_values(expression, domain, cells):
 
 
 def candidate_cells(domain, cells, points, padding):
-    """Cells whose bounding boxes hold the points: (offsets (n + 1,), cells) as in a compressed row format.
+    """Cells whose bounding boxes contain the points: (offsets (n + 1,), cells) as in a compressed row format.
 
     points: (n, 3) [m]; padding: by how much the boxes are widened [m]
     """

@@ -1,4 +1,4 @@
-"""Errors at the border of the bridge, raised on every rank alike."""
+"""Errors of the bridge that are raised on all ranks alike."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ __all__ = ["InputError", "agree", "on_root"]
 
 
 def agree(comm, message):
-    """Raise `InputError` on every rank when any rank brings a message (None: all is well).
+    """Raise `InputError` on all ranks if any rank gives a message; None means no error.
 
-    The message of the lowest rank that has one is raised. Collective: call it before communication that would
+    The message of the lowest rank that gives one is raised. Collective: call it before communication that would
     hang or crash if one rank had left.
     """
     first = next((text for text in comm.allgather(message) if text is not None), None)

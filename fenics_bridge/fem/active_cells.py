@@ -1,9 +1,9 @@
-"""Cells that are switched off and on, so that soil is taken away and placed in a body of finite elements.
+"""Cells that are deactivated and activated, so that soil is removed from and placed in a body of finite elements.
 
-A cell that is off carries no stress, stiffness or weight; nodes that only such cells have are held. When a configuration
-changes, the forces of the stress that is there balance loads and supports no longer. What is out of balance is kept as a
-force that holds the body, and let go in steps: `Load.held` from 1 to 0. So excavation, fill, other supports, other laws and
-other pore pressures are one and the same to Newton's method.
+An inactive cell carries no stress, stiffness or weight; nodes of inactive cells only are fixed. When a configuration changes,
+the forces of the present stress no longer balance loads and supports. The out-of-balance force is kept as a force that holds the
+body, and released in steps: `Load.held` from 1 to 0. Excavation, fill and changes of supports, laws and pore pressures are thus
+the same to Newton's method.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
 
 def switch_off(model):
-    """Switch all cells off, before the first soil is placed."""
+    """Deactivate all cells, before the first soil is placed."""
     model.points.assign(np.full(owned_cells(model.domain), -1, dtype=np.int32), len(model.laws))
 
 
 def reconfigure(model, off, supports, pore_pressure, stress, law):
-    """Do what `QuasiStatic.reconfigure` says."""
+    """Apply the changes of `QuasiStatic.reconfigure`."""
     domain, points, before = model.domain, model.points, model.laws
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
     there = _cells_there(model, off)
@@ -57,7 +57,7 @@ def reconfigure(model, off, supports, pore_pressure, stress, law):
 
 
 def _cells_there(model, off):
-    """Function that is 1 in the cells that are there, ghosts too; its dofs are numbered as the cells."""
+    """Function that is 1 in active cells, including ghost cells; its dofs are numbered as the cells."""
     there = fem.Function(compat.function_space(model.domain, "DG", 0), name="active")
     values = tag_values(model.domain, model.cell_tags, model.domain.topology.dim)
     there.x.array[compat.cell_dofs(there.function_space)[:, 0]] = ~np.isin(values, off)
@@ -65,7 +65,7 @@ def _cells_there(model, off):
 
 
 def _given_stress(model, stress, new):
-    """Stress with which the new points come: (k, S) [Pa]; None for none."""
+    """Initial stress of the new points: (k, S) [Pa]; None for none."""
     if stress is None:
         return None
     given = np.asarray(stress(model.points.coordinates()[new]), dtype=float)
@@ -92,7 +92,7 @@ def _take_over(model, new, laws, before, given):
 
 
 def _support(model, supports, there):
-    """Hold the nodes of the supports, and those that no cell that is there has, where they are now."""
+    """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement."""
     space = model.displacement.function_space
     constraints = Constraints(space, model.facet_tags, supports, _lonely_nodes(space, there))
     constraints.origin[:] = model.displacement.x.array[constraints.dofs]
@@ -101,7 +101,7 @@ def _support(model, supports, there):
 
 
 def _lonely_nodes(space, there):
-    """Blocked dofs, ghosts too, that belong to no cell that is there: (k,) int32. Collective."""
+    """Blocked dofs, including ghosts, that belong to no active cell: (k,) int32. Collective."""
     count = la.vector(space.dofmap.index_map, 1)
     count.array[:] = 0.0
     n = owned_cells(space.mesh)
@@ -137,7 +137,7 @@ def _seepage_forces(space, p, there, radius):
 
 
 def free_motions(model):
-    """Motions of the whole as a rigid body that its supports leave free, in words; empty when they hold it. Collective."""
+    """Rigid-body motions that the supports leave free, in words; empty if there are none. Collective."""
     domain, dim = model.domain, model.domain.geometry.dim
     space, dofs = model.displacement.function_space, model._body.constraints.dofs
     owned = dofs[dofs < dim * space.dofmap.index_map.size_local]

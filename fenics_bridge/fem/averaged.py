@@ -72,7 +72,7 @@ class AveragedKinematics:
         return self._forces
 
     def stiffness(self):
-        """Matrix of the cells' present tangent, with the supports' rows and columns taken out. Collective."""
+        """Matrix of the cells' present tangent, without the rows and columns of the supports. Collective."""
         weighted = self._volumes[:, None, None] * self._points.tangent
         self._tangent.setValuesCSR(*_rows(self._columns, weighted.reshape(-1, self._points.size)))
         self._tangent.assemble()
@@ -112,7 +112,7 @@ class AveragedKinematics:
         return _matrix(comm, size, nodes, 1 / nodes.shape[1]).matMult(to_nodes)
 
     def _held_dofs(self):
-        """Global numbers of this rank's dofs under support."""
+        """Global numbers of this rank's supported dofs."""
         mine = self._constraints.dofs[self._constraints.dofs < self._n_dofs]
         return (self._space.dofmap.index_map.local_range[0] * self._space.dofmap.index_map_bs + mine).astype(np.int32)
 

@@ -15,11 +15,11 @@ from fenics_bridge.fem.strength import reduced_strength
 
 @dataclass(frozen=True)
 class Collapse:
-    """The last equilibrium that was found on the way to collapse, and what is above it.
+    """The last equilibrium below collapse, and the evidence of failure above it.
 
     value: of the load or of the factor of safety there
     failed: whether the body was shown to fail at `failed_at`: it flows in a mechanism under a load that its stresses do not
-        carry. If not, the solver gave up there, and `value` is a lower bound only; reason: in words
+        carry. If not, the solver did not converge there, and `value` is a lower bound only; reason: in words
     failed_at: smallest value above `value` at which it was shown to fail, or that was tried if it was shown at none
     carried: fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if not shown
     residual: largest out-of-balance force that was accepted on the way, over the forces at work [-]
@@ -41,7 +41,7 @@ class Collapse:
 
 
 def collapse_load(model, load_of, first_step, start=0.0, tolerance=2e-3, progress=None):
-    """Raise a load to the last equilibrium: steps double while they are easy; below a value that fails they bisect.
+    """Raise a load to the last equilibrium: steps double while they converge easily; below a value that fails they bisect.
 
     model: QuasiStatic, in equilibrium under `load_of(start)`, e.g. fresh and unloaded
     load_of: function of a number, the load's value, that returns the Load
@@ -63,7 +63,7 @@ def factor_of_safety(
     unreduced: cell tags whose laws keep their strength
     reduce: function (law, factor, unreduced) that returns the law, or laws by cell tag, with less strength
     Returns a Collapse whose value is the factor, and whose `failed` says whether failure was shown above it. Raises
-    InputError when the load is not carried at the start. The model keeps the weakened law. Collective.
+    InputError when the load is not carried at the start. The model keeps the reduced law. Collective.
     """
     law = model.law
     model.law = reduce(law, start, unreduced)
@@ -77,7 +77,7 @@ def factor_of_safety(
 
 
 def _not_carried(start, steps):
-    """Why the load is not carried at the start, and what to try."""
+    """Message: why the load is not carried at the start, and possible remedies."""
     last = next((step for step in reversed(steps) if not step.converged), steps[-1])
     carried = max((step.value for step in steps if step.converged), default=0.0)
     return (
@@ -87,7 +87,7 @@ def _not_carried(start, steps):
 
 
 def _follow(model, equilibrate, start, first_step, tolerance, progress):
-    """Go up from `start` until no step succeeds, recording the way."""
+    """Increase the value from `start` until no step succeeds; records all steps."""
     comm, dim = model.domain.comm, model.domain.geometry.dim
     curve = [(start, _largest(model.displacement, comm, dim))]
     mechanism = fem.Function(model.displacement.function_space, name="mechanism")

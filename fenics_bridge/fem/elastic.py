@@ -39,7 +39,7 @@ class ElasticSolution:
         self._radius = radius_of(domain, self.geometry)
 
     def stress_function(self, smooth=False):
-        """The cells' own stress or, `smooth`, its average at the nodes as a continuous function. Collective."""
+        """The stress of the cells or, if `smooth`, its average at the nodes as a continuous function. Collective."""
         return nodal_average(self.stress, self._radius) if smooth else self.stress
 
     def deviatoric_strain_function(self):
@@ -75,7 +75,7 @@ def solve_elastic(
 ):
     """Small-strain equilibrium of a linear elastic body (plane strain, axisymmetric or 3D) under its weight and its supports.
 
-    supports: from `fixed`, `roller`, `prescribed`; at least enough of them to hold the body
+    supports: from `fixed`, `roller`, `prescribed`; enough of them to prevent rigid-body motion
     young: [Pa], poisson: [-], unit_weight: [N/m3], acting against the last axis; degree: 1 or 2 of the displacement
     traction: force per area (D,) [Pa] by facet tag, or None
     body_force: function of positions (D, n) [m] that returns forces per volume (D, n) [N/m3], or None
@@ -108,7 +108,7 @@ def solve_elastic(
 def solve_nearly_incompressible(
     domain, facet_tags, supports, young, poisson, unit_weight, traction=None, options_prefix="mixed_", geometry=None
 ):
-    """The same by Taylor-Hood elements, which do not lock as the Poisson ratio nears 0.5.
+    """The same as `solve_elastic` by Taylor-Hood elements, which do not lock as Poisson's ratio approaches 0.5.
 
     Displacement is quadratic, pressure linear; poisson: above 0. Other arguments, result and errors as for
     `solve_elastic`. The system is indefinite: by default MUMPS solves it. Collective.
@@ -141,12 +141,12 @@ def solve_nearly_incompressible(
 
 
 def _mixed_stress(e, p, shear):
-    """Stress components from strain and pressure (here lambda times the volume lost, compression positive)."""
+    """Stress components from strain and pressure (here lambda times the volumetric strain, compression positive)."""
     return ufl.as_vector([2 * shear * e[i] - p for i in range(3)] + [shear * e[i] for i in range(3, e.ufl_shape[0])])
 
 
 def _solved(space, constraints, tangent, load, internal, options_prefix):
-    """Solution of a linear problem: from the supports' displacements, one correction by the tangent.
+    """Solution of a linear problem: one correction by the tangent, starting from the displacements of the supports.
 
     load: UFL; internal: function of the solution that returns UFL. They are assembled one by one: in a form with integrals of
     degree 1 and 2, FFCx 0.5 takes the radius of the first degree for both.

@@ -1,4 +1,4 @@
-"""The way to one equilibrium: Newton's method, and where that gives up, relaxation."""
+"""Solution of one equilibrium: Newton's method and, where it does not converge, relaxation."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fenics_bridge.fem.relaxation import Relaxation, relax
 
 @dataclass(frozen=True)
 class Solver:
-    """How equilibrium is looked for, and when it counts as found. Out-of-balance forces are over the forces at work [-].
+    """Solver of an equilibrium and its tolerances. Out-of-balance forces are over the forces at work [-].
 
     tolerance: at which Newton's method ends; max_iterations: its corrections in a step
-    relaxation: whether `relaxation.relax` takes over where Newton's method gives up
+    relaxation: whether `relaxation.relax` takes over where Newton's method does not converge
     relaxed_tolerance: out-of-balance at which a relaxation ends; max_steps: of it
     Raises InputError for values out of range. `PRACTICE` is the level that is customary in practice, 1 % out of balance.
     """
@@ -39,12 +39,12 @@ class Solver:
 
 
 PRACTICE = Solver(tolerance=1e-2, relaxed_tolerance=1e-2)
-"""Accepts 1 % out of balance, as is customary in practice. Factors of safety come out some per cent higher."""
+"""Accepts an out-of-balance ratio of 1 %, as is customary in practice. Factors of safety become some per cent higher."""
 
 
 @dataclass(frozen=True)
 class EquilibriumReport:
-    """How one step to equilibrium went.
+    """Result of one step to equilibrium.
 
     outcome: "equilibrium"; "failure": the body flows in a mechanism; "undecided": neither could be shown
     residuals: out-of-balance over the forces at work [-], before each iteration of Newton's method (or step of
@@ -80,7 +80,7 @@ def find_equilibrium(body, laws, external, before, displacement, solver):
 
     laws: in the order of the body's points; external, before: nodal forces of the load and of the load before it
     displacement: fraction of the displacements that the supports prescribe; solver: Solver
-    Without equilibrium the body is left as it was. `body.increment` is the displacement of the whole step. Collective.
+    Without equilibrium the body does not change. `body.increment` is the displacement of the whole step. Collective.
     """
     step = EquilibriumStep(body, laws, external, before, displacement)
     report = newton(step, solver.tolerance, solver.max_iterations)
@@ -94,7 +94,7 @@ def find_equilibrium(body, laws, external, before, displacement, solver):
 
 
 def _relaxed(body, laws, external, before, displacement, solver, newton_report):
-    """The report of a relaxation after Newton's method gave up."""
+    """The report of a relaxation after Newton's method did not converge."""
     start = body.snapshot()
     comm = body.solution.function_space.mesh.comm
     reference = comm.allreduce(float(np.abs(start[0]).max(initial=0.0)), MPI.MAX)
@@ -115,7 +115,7 @@ def _relaxed(body, laws, external, before, displacement, solver, newton_report):
 
 
 def _refine(body, laws, external, displacement, solver, result):
-    """Newton's method from where a relaxation ended: this near to equilibrium it often converges."""
+    """Newton's method from the end of a relaxation, where it often converges."""
     report = newton(EquilibriumStep(body, laws, external, external, displacement), solver.tolerance, EASY_ITERATIONS)
     result.iterations += report.iterations
     if report.converged:

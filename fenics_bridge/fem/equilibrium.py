@@ -1,4 +1,4 @@
-"""One step to equilibrium, for any elements, as Newton's method wants it."""
+"""One step to equilibrium, for any elements, as a system for Newton's method."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dolfinx import fem
 
 @dataclass
 class Body:
-    """What a step changes, and by what.
+    """A body of finite elements: the state that a step changes, and the operators for it.
 
     solution, increment: functions of the unknowns, total and of the step; points: QuadraturePoints
     kinematics: gives the points' strain, internal forces and stiffness, as `Kinematics`
@@ -26,7 +26,7 @@ class Body:
     solver: Any
 
     def accept(self):
-        """Makes the step's end the state that the next step starts from."""
+        """Accept the end of the step as the state that the next step starts from."""
         self.points.accept()
         self.solution.x.array[:] += self.increment.x.array
 
@@ -35,13 +35,13 @@ class Body:
         return self.solution.x.array.copy(), self.points.snapshot()
 
     def restore(self, snapshot):
-        """Goes back to a state copied before."""
+        """Restore a state that was copied before."""
         self.solution.x.array[:] = snapshot[0]
         self.points.restore(snapshot[1])
 
 
 class EquilibriumStep:
-    """One step of a Body to equilibrium, as `newton` wants it."""
+    """One step of a Body to equilibrium, as a system for `newton`."""
 
     def __init__(self, body, laws, external, before, displacement, viscosity=0.0, scale=None):
         """

@@ -1,4 +1,4 @@
-"""Values of DOLFINx functions at points, on whatever rank the points and their cells are."""
+"""Values of DOLFINx functions at points, whichever ranks have the points and their cells."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TOLERANCE = 1e-9
 class PointSearch:
     """Points of each rank, found in the cells of a mesh wherever those are owned.
 
-    Building it is the search; `values` then evaluates any number of functions. Collective, both.
+    The constructor searches the cells; `values` then evaluates any number of functions. Both are collective.
     found: (n,) bool, whether each of this rank's points lies in the mesh
     """
 
@@ -94,7 +94,7 @@ def evaluate_at(points, **functions):
 
 
 def local_cells(domain, points):
-    """Owned cell that holds each point, -1 where there is none on this rank: (n,) int32.
+    """Owned cell that contains each point, -1 if there is none on this rank: (n,) int32.
 
     A point on the border of several cells goes to the one in which it lies deepest.
     """

@@ -1,4 +1,4 @@
-"""What to say about a step without equilibrium: under which load, where, in which soil, and what to try."""
+"""Messages about a step without equilibrium: its load, place and soil, and possible remedies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def explained(fem, reason, load):
 
 
 def advice(reason, free, law, tension):
-    """What to try. free: motions that the supports do not hold; law: where the body moves most; tension: whether it is there."""
+    """Possible remedies. free: unsupported motions; law, tension: law, and whether there is tension, where the body moves most."""
     if free:
         return f"Nothing holds the soil that is there against moving {' and '.join(free)}: give it supports"
     if "linear solver" in reason:
@@ -45,7 +45,7 @@ def advice(reason, free, law, tension):
 
 
 def most_moved(fem):
-    """Where the last increment, that of a step that failed too, is largest. Collective.
+    """Place of the largest displacement in the last increment, also of a step that failed. Collective.
 
     Returns the place (D,) [m], and of the soil nearest to it: its tag, its law, and whether it was under tension.
     """
@@ -70,7 +70,7 @@ def most_moved(fem):
 
 
 def _in_words(fem, load):
-    """A load as it is given, without what it leaves out."""
+    """A load as text, without the components that are not given."""
     weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
     parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
     parts += [f"pressure {p:.5g} Pa{_of(fem.facet_tags, tag)}" for tag, p in load.pressure.items() if p]

@@ -13,9 +13,9 @@ from fenics_bridge.mesh.names import known_tags, label, tag_numbers
 
 
 class FemSite:
-    """A body of finite elements that is built and taken away in stages, see `Stage` and `carry_out`.
+    """A body of finite elements that is built and excavated in stages, see `Stage` and `carry_out`.
 
-    fem: the QuasiStatic, new and unloaded, of all soils that will ever be there, with a law for each; at first none is there.
+    fem: the QuasiStatic, new and unloaded, of the soils of all stages, with a law for each; at first none is placed.
     state: SiteState, which soils are there, their weights, loads and supports; number: of the last stage
     """
 
@@ -40,7 +40,7 @@ class FemSite:
     def carry_out(self, stage):
         """Bring the body to equilibrium after a stage's changes. Returns a StageReport. Collective.
 
-        Raises InputError, on all ranks, for a stage that asks for what is not there, before anything is changed;
+        Raises InputError, on all ranks, for a stage with an unknown soil or boundary, before anything is changed;
         StageError where there is no equilibrium.
         """
         fem = self.fem
@@ -61,14 +61,14 @@ class FemSite:
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
 
     def largest_displacement(self):
-        """Largest displacement of a node of the soil that is there, since displacements count [m]. Collective."""
+        """Largest displacement of a node of the present soil, since displacements count [m]. Collective."""
         size = np.linalg.norm(self.fem.displacement.x.array.reshape(-1, self.fem.domain.geometry.dim), axis=1)
         points, space = self.fem.points, self.fem.displacement.function_space
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()
         return max(self.fem.domain.comm.allgather(float(size[there].max(initial=0.0))))
 
     def _laws(self, state):
-        """The laws in force, by tag; where a stage does not say otherwise those that the body has had."""
+        """The present laws, by tag: those of the stage, otherwise those that the body had before."""
         present = self.fem.law_by_tag()
         return {tag: state.law.get(tag, law) for tag, law in present.items()}
 

@@ -18,7 +18,7 @@ from mpm_core import Geometry
 
 
 def geometry_of(domain, given=None):
-    """The geometry of a mesh: the one that is given, or what its dimension says. Collective.
+    """The geometry of a mesh: the one that is given, or that of its dimension. Collective.
 
     Raises InputError, on all ranks, for one that does not go with the dimension, or radii below zero.
     """
@@ -40,7 +40,7 @@ def radius_of(domain, geometry):
 
 
 def weighted(integrand, radius):
-    """An integrand over a mesh as it has to be integrated: times the radius where there is one."""
+    """An integrand over a mesh, multiplied by the radius in axisymmetric bodies."""
     return integrand if radius is None else radius * integrand
 
 
@@ -58,7 +58,7 @@ def require_same_geometry(model, fem):
 
 
 def require_axis_held(space, geometry, constraints):
-    """Raise InputError, on all ranks, unless nodes on the axis are held along the radius. Collective.
+    """Raise InputError, on all ranks, unless nodes on the axis are fixed along the radius. Collective.
 
     space: of the displacement, or that part of a mixed space
     """

@@ -8,7 +8,7 @@ from fenics_bridge.errors import InputError
 
 
 def k0_elastic(poisson):
-    """K0 of an elastic body that cannot widen, nu / (1 - nu)."""
+    """K0 of an elastic body without lateral strain, nu / (1 - nu)."""
     if not 0 <= poisson < 0.5:
         raise InputError(f"poisson: got {poisson!r}, expected at least 0 and below 0.5")
     return poisson / (1 - poisson)
@@ -26,7 +26,7 @@ def k0_stress(points, surface, unit_weight, k0):
 
     In an axisymmetric body these are the radius and the hoop.
 
-    Exact for level ground; under a sloping surface it is a start that a solver then brings into equilibrium.
+    Exact for level ground; under a sloping surface it is a first estimate that a solver then brings to equilibrium.
     points: (n, D) [m]; the last axis points up
     surface: height of the ground, as a number [m], as a polyline (k, 2) of points (x, y) with x rising [m]
         (beyond its ends the ground goes on level), or as a function of the horizontal coordinates (n, D - 1)
@@ -37,7 +37,7 @@ def k0_stress(points, surface, unit_weight, k0):
 
 
 def k0_layered_stress(points, surface, layers):
-    """The same for ground in level layers.
+    """The same as `k0_stress` for ground in level layers.
 
     layers: (bottom [m], unit_weight [N/m3], k0) of each, from the top down; the last one should reach below all points
     """

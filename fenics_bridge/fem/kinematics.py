@@ -1,4 +1,4 @@
-"""How strain follows from displacement, and so forces from stress and stiffness from the tangent."""
+"""Strain from displacement; nodal forces from stress, and stiffness from the tangent, by the same operator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fenics_bridge.fem.stiffness import Stiffness
 
 
 class Kinematics:
-    """The strain of the finite elements as it is, at quadrature points; assembled by DOLFINx.
+    """Strain of the finite elements at quadrature points, without averaging; assembled by DOLFINx.
 
     (`averaged.AveragedKinematics` has the same methods for strains that are averaged over nodes.)
     """
@@ -52,7 +52,7 @@ class Kinematics:
         return assembled(self._internal, self._space, self._forces)
 
     def stiffness(self):
-        """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
+        """Matrix of the points' present tangent, without the rows and columns of the supports. Collective."""
         return self.stiffness_of(self._points.tangent)
 
     def stiffness_of(self, tangent):

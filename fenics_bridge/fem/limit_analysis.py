@@ -12,7 +12,7 @@ from fenics_bridge.errors import InputError
 
 @dataclass(frozen=True)
 class LogSpiral:
-    """Rotational mechanism through the toe of a slope: the soil above a logarithmic spiral turns about its pole.
+    """Rotational mechanism through the toe of a slope: the soil above a logarithmic spiral rotates about its pole.
 
     unit_weight: at collapse [N/m3]; pole: (2,) [m]; curve: (k, 2) [m], the slip surface from the crest to the toe;
     coordinates as in `slope_mesh`, with the shoulder of the slope at (crest, height)

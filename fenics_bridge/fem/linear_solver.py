@@ -1,4 +1,4 @@
-"""Linear systems, solved by PETSc."""
+"""Solution of linear systems by PETSc."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOOSEST, TIGHTEST = 1e-2, 1e-6
 """Bounds of the relative tolerance in an iteration of Newton's method."""
 
 PARTS = (0.01, 0.1)
-"""of the first matrix, in most cases the elastic one, that are added to a tangent that cannot be solved with"""
+"""Fractions of the first matrix, in most cases the elastic one, that are added to a tangent that cannot be solved"""
 
 MOST_ITERATIONS = 100
 """Krylov iterations in an iteration of Newton's method; a tangent that needs more is close to singular"""
@@ -60,7 +60,7 @@ class LinearSolver:
         self.iterations = []
 
     def solve(self, matrix, residual, increment):
-        """Write matrix^-1 residual to `increment`. Returns why that failed, in words; nothing when it did not.
+        """Write matrix^-1 residual to `increment`. Returns the reason of a failure in words, or an empty text.
 
         residual: vector (`dolfinx.la`); increment: function on the same space. The matrix may be changed. Collective.
         """
@@ -105,7 +105,7 @@ class LinearSolver:
         return failure
 
     def _tolerance(self, size):
-        """Relative tolerance for a residual of Newton's method, from how fast the last ones fell.
+        """Relative tolerance for a residual of Newton's method, from the reduction of the last ones.
 
         Choice 2 of Eisenstat and Walker (1996, SIAM J. Sci. Comput. 17, 16-32), 0.9 of the square of the reduction, keeps
         convergence quadratic. A residual that has grown begins a new step.

@@ -1,4 +1,4 @@
-"""Following an equilibrium as a load, or a strength, changes: steps that shrink on failure and grow on success."""
+"""Load steps: equilibrium under a changing load or strength, with steps that shrink on failure and grow on success."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MOST_STEPS = 1000
 
 
 class LoadStep(NamedTuple):
-    """One attempted step. value: what was changed, at the end of the step; report: of the way to equilibrium."""
+    """One attempted step. value: what was changed, at the end of the step; report: its EquilibriumReport."""
 
     number: int
     value: float
@@ -29,7 +29,7 @@ class LoadStep(NamedTuple):
 
 
 def advance(equilibrate, start, end, first_step, tolerance, progress=None):
-    """Move a value up from `start` towards `end`, keeping equilibrium, until it is there or no further step succeeds.
+    """Increase a value from `start` towards `end` in equilibrium, until the end is reached or no further step succeeds.
 
     equilibrate: function of the value that returns an EquilibriumReport
     first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without

@@ -18,7 +18,7 @@ from fenics_bridge.mesh.names import by_number, tag_numbers
 
 @dataclass(frozen=True)
 class Load:
-    """What acts on the body at the end of a stage.
+    """Loads on the body at the end of a stage.
 
     unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
     pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
@@ -51,7 +51,7 @@ class Load:
 
 
 def require_finite(comm, load):
-    """Raises InputError on all ranks where a load has a value that is not finite on any. Collective."""
+    """Raise InputError on all ranks if a load has a value that is not finite on any. Collective."""
     problem = None
     for name in ("unit_weight", "pressure", "displacement", "held"):
         value = getattr(load, name)
@@ -62,7 +62,7 @@ def require_finite(comm, load):
 
 
 def _weight_by_tag(unit_weight):
-    """Unit weights by cell tag; None stands for all cells whose tag is not there."""
+    """Unit weights by cell tag; None stands for the cells of all other tags."""
     return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
 
 

@@ -1,4 +1,4 @@
-"""Which law holds in which cell of a body."""
+"""Laws of a body by cell."""
 
 from __future__ import annotations
 

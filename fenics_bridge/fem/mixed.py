@@ -1,4 +1,4 @@
-"""Quasi-static Taylor-Hood elements for soil that keeps, or nearly keeps, its volume: they do not lock."""
+"""Quasi-static Taylor-Hood elements for incompressible or nearly incompressible soil, where they do not lock."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class MixedQuasiStatic:
     The law gives the deviatoric stress of the deviatoric strain; the pressure p = -K div u is an unknown of its own. That
     is exact for laws whose deviatoric stress does not depend on the mean stress: elastic, or of friction angle zero.
     load: the Load in equilibrium; points: QuadraturePoints, whose stress is the deviatoric one
-    converged: whether the last call reached its goal
+    converged: whether the last call reached its load
     Has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
     """
 
@@ -63,7 +63,7 @@ class MixedQuasiStatic:
 
     @property
     def displacement(self):
-        """Total displacement as a function of its own [m]."""
+        """Total displacement as a function [m]."""
         return part_of(self._body.solution, self._displacements, "displacement")
 
     @property
@@ -72,7 +72,7 @@ class MixedQuasiStatic:
         return part_of(self._body.increment, self._displacements, "increment")
 
     def equilibrate(self, load, law=None, **options):
-        """Go to the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
+        """Find the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
         forces = self._loads.forces(load), self._loads.forces(self.load)
@@ -110,7 +110,7 @@ class MixedQuasiStatic:
 class _MixedKinematics(Kinematics):
     """Deviatoric strain, forces and stiffness of displacement and pressure.
 
-    The unknown pressure is in units of the shear modulus, which keeps the two sorts of equations alike in size.
+    The unknown pressure is in units of the shear modulus, so that both kinds of equations have entries of similar magnitude.
     """
 
     def __init__(self, solution, increment, points, constraints, law, geometry):
@@ -143,7 +143,7 @@ class _MixedKinematics(Kinematics):
         return super().internal_forces(stress @ self._deviator)
 
     def stiffness(self):
-        """Matrix of the points' present tangent, with the supports' rows and columns taken out. Collective."""
+        """Matrix of the points' present tangent, without the rows and columns of the supports. Collective."""
         return self.stiffness_of(self._deviator @ self._points.tangent @ self._deviator)
 
 

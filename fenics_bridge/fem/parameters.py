@@ -11,7 +11,7 @@ from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
 
 def set_parameter(model, name, values):
-    """Do what `QuasiStatic.set_parameter` says."""
+    """Apply `QuasiStatic.set_parameter`."""
     domain, points, laws = model.domain, model.points, model.laws
     tags, of_point = {}, None
     if isinstance(values, dict):

@@ -16,7 +16,7 @@ class QuadraturePoints:
     """The quadrature points of the cells that this rank owns, cell after cell, the cells of each material together.
 
     n: their number; per_cell: number in a cell; cells: (m,) int32, the cells; material: (m,) int32, of each of them
-    off: rows of the points in cells that are switched off, whose stress is zero
+    off: rows of the points in inactive cells, whose stress is zero
     cell_size: (n,) [m] of the points' cells; time, duration: of the step under trial [s], for laws that depend on rate
     parameters: {name: (n,)}, values of laws' parameters that vary, NaN where the law's number holds
     stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium; n_state: that of the law with most variables
@@ -51,7 +51,7 @@ class QuadraturePoints:
         self.reset_state(laws)
 
     def assign(self, material, n_laws):
-        """Give each cell the number of its law; -1 for a cell that is switched off, whose points no law updates.
+        """Give each cell the number of its law; -1 for an inactive cell, whose points no law updates.
 
         material: (owned cells,) int32, in the order of the mesh
         """
@@ -61,7 +61,7 @@ class QuadraturePoints:
         self.off = np.flatnonzero(of_point < 0)
 
     def reset_state(self, laws, points=slice(None)):
-        """State variables as the laws want them at the start: zero, but for parameters that vary.
+        """Initial state variables of the laws: zero, except for parameters that vary.
 
         points: rows of the points that are reset; all by default
         """
@@ -118,7 +118,7 @@ class QuadraturePoints:
         return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
 
     def add_viscosity(self, laws, factor, strain_increment):
-        """Adds a factor times the elastic stiffness to the tangent; returns that times the strain increment: (n, S) [Pa].
+        """Add a factor times the elastic stiffness to the tangent; returns that times the strain increment: (n, S) [Pa].
 
         The stiffness is the isotropic one of each law's wave moduli, an estimate for laws whose stiffness changes.
         """
@@ -136,18 +136,18 @@ class QuadraturePoints:
         return self.stress.copy(), self.state.copy(), self.deviatoric_strain.copy()
 
     def restore(self, snapshot):
-        """Goes back to values copied before."""
+        """Restore values that were copied before."""
         for values, copied in zip((self.stress, self.state, self.deviatoric_strain), snapshot):
             values[:] = copied
 
     def accept(self):
-        """The trial becomes the last equilibrium."""
+        """Accept the trial as the last equilibrium."""
         np.copyto(self.stress, self.trial_stress)
         np.copyto(self.state, self.trial_state)
         self.deviatoric_strain += deviatoric_size(self._trial_strain)
 
     def coordinates(self):
-        """Where the points are: (n, D) [m]."""
+        """Positions of the points: (n, D) [m]."""
         corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
         return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, -1)
 
@@ -173,7 +173,7 @@ class QuadraturePoints:
 
 
 def _piece(rows):
-    """Rows in order as a slice where they are in one piece."""
+    """Rows in order, as a slice if they are contiguous."""
     if len(rows) == 0:
         return slice(0, 0)
     return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] + 1 == len(rows) else rows

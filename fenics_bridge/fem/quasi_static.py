@@ -32,8 +32,8 @@ class QuasiStatic:
     """Small-strain equilibrium of a body of one or several materials, plane strain or 3D, loaded in stages.
 
     displacement: function [m], total; load: the Load in equilibrium; law: the law, or laws, in force
-    points: QuadraturePoints with stress and state; converged: whether the last call reached its goal
-    Every stage starts from the equilibrium before it; a step that fails leaves that equilibrium untouched.
+    points: QuadraturePoints with stress and state; converged: whether the last call reached its load
+    Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class QuasiStatic:
         self._assemble(constraints)
 
     def _assemble(self, constraints):
-        """Put together what a step works on, with the present points and the given constraints. Collective."""
+        """The Body that a step changes, with the present points and the given constraints. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
         kinematics: type = AveragedKinematics if self._nmd else Kinematics
         self._kinematics = kinematics(self.increment, self.points, constraints, self.geometry)
@@ -87,16 +87,16 @@ class QuasiStatic:
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
     def reconfigure(self, off=(), supports=None, pore_pressure=None, stress=None, law=None):
-        """Change what is there; the forces that this brings out of balance are held until `solve` releases them.
+        """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces.
 
-        For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; those that were off and
-        no longer are begin without stress and state, or with the given one. Afterwards `load.held` is 1, and the body is
-        in equilibrium; `solve` to a load with `held` 0, as every new Load has, lets the forces go in steps.
+        For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
+        active start without stress and state, or with the given stress. Afterwards `load.held` is 1, and the body is
+        in equilibrium; `solve` to a load with `held` 0, as every new Load has, releases the forces in steps.
 
         off: cell tags or names; supports: as for the constructor, None for the present ones, where they are now
         pore_pressure: function of positions (n, D) that returns pore pressures (n,) [Pa], or None for none
-        stress: function of positions that returns stresses (n, S) [Pa] of the cells that come in
-        law: law, or laws by cell tag, in force from now on; where one is another than before its state is reset
+        stress: function of positions that returns stresses (n, S) [Pa] of the cells that become active
+        law: law, or laws by cell tag, from now on; where the law changes, its state is reset
         Collective.
         """
         reconfigure(self, off, supports, pore_pressure, stress, law)
@@ -127,7 +127,7 @@ class QuasiStatic:
     def set_initial_stress(self, stress, load):
         """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
 
-        Follow it by `equilibrate(load)`, which moves the body as far as the stress is out of balance.
+        Call `equilibrate(load)` afterwards, which moves the body by the out-of-balance part of the stress.
         """
         shape = self.points.stress.shape
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
@@ -142,24 +142,25 @@ class QuasiStatic:
 
         name: such as "cohesion"; values: a number, (n,) at `points.coordinates()`, a function of positions (n, D) that
         returns (n,), e.g. `mpm_core.RandomField`, or {cell tag or name: number}
-        Where a law with another number comes into force, points keep their values. They go to the particles at the
+        Where the law of a point changes, the point keeps its values. They go to the particles at the
         hand-over. Raises InputError, on all ranks, for a parameter that varies in no law or values out of its range.
         Collective.
         """
         set_parameter(self, name, values)
 
     def reset_displacement(self):
-        """Count displacements from here on (the stress stays)."""
+        """Reset displacements to zero; the stress stays."""
         self.displacement.x.array[:] = 0.0
         self._body.constraints.origin[:] = 0.0
         self.load = replace(self.load, displacement=0.0)
 
     def equilibrate(self, load, law=None, duration=np.inf, **options):
-        """Go to the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns EquilibriumReport.
+        """Find the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns EquilibriumReport.
 
-        Newton's method first; where it gives up, the body relaxes with a viscosity until it rests or flows (`relaxation`).
-        duration: of the step [s], for laws that depend on rate; by default it is slow without limit
-        Without equilibrium everything is left as it was. options: of `Solver`, in place of those of `solver`. Collective.
+        Newton's method is tried first. If it does not converge, the body relaxes with a viscosity until it rests or
+        flows (`relaxation`).
+        duration: of the step [s], for laws that depend on rate; by default infinitely slow
+        Without equilibrium nothing changes. options: of `Solver`, in place of those of `solver`. Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)

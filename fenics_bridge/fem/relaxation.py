@@ -1,4 +1,4 @@
-"""Viscous relaxation: equilibrium where Newton's method finds none, or the evidence that there is none.
+"""Viscous relaxation: equilibrium where Newton's method finds none, or evidence of failure.
 
 The body is given a viscosity in proportion to its elastic stiffness (Kelvin-Voigt) and follows the load in pseudo-time,
 its stresses updated step by step: f_ext = f_int(sigma) + tau K_el du/dt. With a time increment of tau / theta each step
@@ -28,7 +28,7 @@ from mpm_core.newton import line_search
 from fenics_bridge.fem.equilibrium import EquilibriumStep
 
 FIRST, LARGEST = 0.3, 100.0
-"""theta at the start, and the one at which the relaxation is given up [-]"""
+"""theta at the start, and the one at which the relaxation ends without a result [-]"""
 
 ELASTIC = 4.0
 """Elastic displacements under a change of load that the growth must exceed before it counts as failure"""
@@ -37,10 +37,10 @@ RUN_AWAY = 5.0
 """Growth over the reference, at which the motion counts as failure even if its rate still changes"""
 
 CORRECTIONS = 8
-"""of Newton's method in a step, at most"""
+"""Largest number of iterations of Newton's method in a step"""
 
 REDUCTION = 0.15, 0.3
-"""of the residual that a step of relaxation aims at, and with which it is still accepted"""
+"""Fractions of the residual: target of a step of relaxation, and limit at which it is still accepted"""
 
 STEADY = 0.8
 """Fraction of the residual of half the time before, above which the motion counts as steady"""
@@ -48,7 +48,7 @@ STEADY = 0.8
 
 @dataclass
 class Relaxation:
-    """How a relaxation went; lists have one entry for each step that was accepted.
+    """Result of a relaxation; lists have one entry for each step that was accepted.
 
     outcome: "equilibrium", "failure" (the displacement grows at a steady rate) or "undecided"; reason: in words
     time: pseudo-time in units of the viscous time tau [-]; residual: out-of-balance force over the forces at work [-],
@@ -70,13 +70,13 @@ class Relaxation:
 
 
 def relax(body, laws, external, before, displacement, tolerance, max_steps, reference):
-    """Let a body relax under a load, from its present state on.
+    """Relax a body under a load, from its present state.
 
     external, before: nodal forces of the load and of the load before it; displacement: fraction of the prescribed displacements
     tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-]
     max_steps: of pseudo-time; reference: displacement at the start [m]; the growth must exceed it, and some times the
         elastic displacement of the change of load besides, before it counts as failure
-    Returns a Relaxation. The body is left where the relaxation ended, whatever the outcome. Collective.
+    Returns a Relaxation. The body stays in the state in which the relaxation ended, whatever the outcome. Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
     start = body.solution.x.array.copy()
@@ -126,7 +126,7 @@ def _solve_step(step, tolerance):
 
 
 def _record(result, body, step, theta, start):
-    """Accepts a step and adds it to the result."""
+    """Accept a step and add it to the result."""
     result.residual.append(step.out_of_balance())
     result.carried.append(step.carried_fraction())
     result.motion = body.increment.x.array.copy()

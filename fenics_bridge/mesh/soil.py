@@ -1,4 +1,4 @@
-"""The soil body as a mesh of its own."""
+"""Mesh of the soil body."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells,
 
 
 def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
-    """Mesh of the cells of one tag or several, with a partition of its own, so that all ranks share the work.
+    """Mesh of the cells of one tag or several, with a partition of its own, so that the work is distributed over all ranks.
 
     Soils of several tags are one body: they share the nodes of their borders. (DOLFINx's `create_submesh` keeps the
-    partition and is not to be trusted on several ranks before 0.8.)
+    partition and is not reliable on several ranks before 0.8.)
     tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"]
     Returns (domain, cell_tags, facet_tags): the cells keep their tag, the facets of the body theirs, both their names.
     Raises InputError, on all ranks, when no cell has a tag. Collective.
@@ -34,7 +34,7 @@ def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
 
 
 def _numbered_nodes(domain, nodes):
-    """Numbers without gaps, over all ranks, of the nodes in use, and this rank's share of their coordinates.
+    """Numbers without gaps, over all ranks, of the nodes in use, and this rank's part of their coordinates.
 
     nodes: local nodes in use. Returns the number of each local node (-1: not in use) and points (n, D).
     """

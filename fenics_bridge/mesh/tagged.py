@@ -1,4 +1,4 @@
-"""A mesh with its tags, from arrays: the one way by which all meshes of the bridge come into being."""
+"""Meshes with tags from arrays; all meshes of the bridge are made here."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fenics_bridge.mesh.names import name_tags
 
 
 class MeshArrays(NamedTuple):
-    """A rank's share of a mesh of linear simplices of dimension D.
+    """A rank's part of a mesh of linear simplices of dimension D.
 
     points: (n, D) float64 [m]; nodes are numbered through in order of rank
     cells: (m, D + 1) int64 by those numbers; cell_values: (m,) int32 tags, 0 for none
@@ -30,7 +30,7 @@ class MeshArrays(NamedTuple):
 
 
 def empty_arrays(dim):
-    """The share of a rank that has nothing."""
+    """The part of a rank without nodes and cells."""
     return MeshArrays(
         np.empty((0, dim)),
         np.empty((0, dim + 1), np.int64),
@@ -41,7 +41,7 @@ def empty_arrays(dim):
 
 
 def distributed_mesh(comm, arrays, dim):
-    """(domain, cell_tags, facet_tags) from the ranks' shares, partitioned by DOLFINx.
+    """(domain, cell_tags, facet_tags) from the ranks' parts, partitioned by DOLFINx.
 
     Cells of tag 0 and facets that are not listed stay untagged. Tags carry their names (see `name_tags`). Collective.
     """

@@ -1,1 +1,1 @@
-"""Between finite elements and particles: hand-over, comparison, stages of particles."""
+"""Transfer between finite elements and particles: hand-over, comparison, stages of particles."""

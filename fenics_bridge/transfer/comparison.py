@@ -1,4 +1,4 @@
-"""Finite elements and particles side by side, in numbers."""
+"""Comparison of finite elements and particles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fenics_bridge.fem.geometry import require_same_geometry
 
 @dataclass(frozen=True)
 class Difference:
-    """How far the particles are from the finite elements in one quantity; relative to the finite elements.
+    """Difference between particles and finite elements in one quantity, relative to the finite elements.
 
     l2: root of the volume-weighted sum of squares, over that of the finite elements [-]
     maximum: largest difference over the largest value of the finite elements [-]

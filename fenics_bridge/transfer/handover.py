@@ -14,12 +14,12 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
 
 _BALANCED, _MOST_STEPS = 5e-4, 60
-"""Out-of-balance ratio to reach, and the steps that it may take: near collapse each one leaves a fraction of it."""
+"""Out-of-balance ratio to reach, and largest number of steps: near collapse each one leaves a fraction of it."""
 
 
 @dataclass(frozen=True)
 class Handover:
-    """What a hand-over did; sums are over all ranks.
+    """Result of a hand-over; sums are over all ranks.
 
     unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
     equilibrated_ratio: the same after the equilibration [-]; None without equilibration
@@ -87,7 +87,7 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
 
 
 def _take_stress_and_state(model, fem, search, smooth):
-    """Give the particles what the finite elements have where they are; returns how many stresses had to be returned."""
+    """Give the particles stress and state of the finite elements at their positions; returns the number of returned stresses."""
     particles = model.particles
     stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
     if isinstance(fem, QuasiStatic):
@@ -120,7 +120,7 @@ def _displace(model, displacement, search, move, count):
 
 
 def _returned(laws, material, stress, state):
-    """Bring stresses inside the strength, in place; the number of those that were outside."""
+    """Return stresses to the yield surface, in place; returns the number of those that were outside."""
     outside = 0
     for number, law in enumerate(laws):
         rows = np.flatnonzero(material == number)
@@ -149,7 +149,7 @@ def _require_same_laws(model, fem, number):
 
 
 def _law_mistake(material, law, there):
-    """What differs between the law of a material and that of the finite elements; None for nothing."""
+    """Difference between the law of a material and that of the finite elements, in words; None for none."""
     if type(law) is not type(there):
         return f"fem: its law is {type(there).__name__}, that of material {material} is {type(law).__name__}"
     for name in _parameters(law):

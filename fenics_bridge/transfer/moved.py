@@ -1,4 +1,4 @@
-"""Volumes of particles that have moved with a body: what each cell of their mesh then holds of it."""
+"""Volumes of particles that have moved with a body, fitted to its volume in each cell of their mesh."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fenics_bridge.fem.geometry import Geometry, body_volumes
 from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
 
 _SAMPLES = 400
-"""Of the body in one cell of the particles' mesh, about."""
+"""Approximate number of samples of the body in one cell of the particles' mesh"""
 _FULL = 0.95
-"""Share of its volume from which a cell counts as full: the samples are right to about a hundredth."""
+"""Filled fraction above which a cell counts as full: the samples are accurate to about a hundredth."""
 
 
 def volume_change(displacement):
@@ -30,8 +30,8 @@ def volume_change(displacement):
 def held_volumes(domain, displacement, geometry=None):
     """Volume [m^D] of the moved body in each cell of another mesh that this rank owns: (m,).
 
-    Sampled in the cells of the finite elements, each sample moved by the displacement. What of the body would be
-    outside of the other mesh is left out. domain: the other mesh; displacement: function [m]
+    Sampled in the cells of the finite elements, each sample moved by the displacement. Parts of the body outside of
+    the other mesh are left out. domain: the other mesh; displacement: function [m]
     geometry: a Geometry; volumes of an axisymmetric body are those of one radian. Collective.
     """
     body, volumes = displacement.function_space.mesh, body_volumes(domain, geometry)

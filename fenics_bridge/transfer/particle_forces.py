@@ -1,4 +1,4 @@
-"""Forces of pressures on boundaries and of pore water on particles, as the finite elements have them."""
+"""Forces of boundary pressures and pore water on particles, as on the finite elements."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Factor of safety by particles: a second opinion on that of the finite elements.
+"""Factor of safety by particles, as a check of that of the finite elements.
 
 For each factor the soil, with its strength divided by it, is loaded by its weight at once and followed by the explicit scheme
 with local damping until it rests or flows, as Griffiths and Lane (1999, Geotechnique 49, 387-403) do with their viscoplastic
-iteration. No system of equations is solved, so nothing can fail to converge: what is out of balance moves.
+iteration. No system of equations is solved, so that there is nothing that may not converge: soil that is out of balance moves.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GROWTH = 3.0
 
 @dataclass(frozen=True)
 class ParticleSafety:
-    """The last factor at which the particles came to rest, and what is above it.
+    """The last factor at which the particles came to rest, and the evidence of failure above it.
 
     value: factor of safety; failed_at: smallest factor above it at which they did not rest
     failed: whether they were shown to flow there, in motion that does not slow down; if not, `value` is a lower bound only
@@ -97,7 +97,7 @@ def particle_safety(
 
 
 def _check(**values):
-    """Raises InputError for a value that is not positive, or not below 1 where that is meant."""
+    """Raise InputError for a value that is not positive, or not below 1 where that is required."""
     for name, value in values.items():
         below = {"tolerance": 1.0, "damping": 1.0, "rest": 1.0}.get(name, math.inf)
         if not 0 < value < below:
@@ -106,7 +106,7 @@ def _check(**values):
 
 
 def _follow(model, damping, rest, nmd):
-    """Runs a model until it rests or flows; returns EquilibriumReport and the largest displacement of a particle [m]."""
+    """Run a model until it rests or flows; returns EquilibriumReport and the largest displacement of a particle [m]."""
     period, settlement = _scales(model)
     residuals, moved = [1.0], [0.0]
     steps_before = model.steps
@@ -152,6 +152,6 @@ def _scales(model):
 
 
 def _largest_displacement(model):
-    """Of a particle [m]. Collective."""
+    """Largest displacement of a particle [m]. Collective."""
     lengths = np.linalg.norm(model.particles.displacement, axis=1)
     return model.comm.allreduce(float(lengths.max(initial=0.0)), MPI.MAX)

@@ -11,10 +11,10 @@ from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forc
 
 
 class ParticleSite:
-    """Particles that are placed and taken away in stages, see `Stage` and `carry_out`; equilibrium is quasi-static.
+    """Particles that are placed and removed in stages, see `Stage` and `carry_out`; equilibrium is quasi-static.
 
     model: `mpm_core.Model` without particles, with all laws that the stages will need; gravity acts on the last axis
-    Soils and boundaries are the tags of its mesh. A stage places particles in the cells of a soil and takes away those
+    Soils and boundaries are the tags of its mesh. A stage places particles in the cells of a soil, or removes those
     that lie in them. state: SiteState; number: of the last stage
     """
 
@@ -45,7 +45,7 @@ class ParticleSite:
     def carry_out(self, stage):
         """Bring the particles to equilibrium after a stage's changes. Returns a StageReport. Collective.
 
-        Raises InputError, on all ranks, for a stage that asks for what is not there; StageError where there is no
+        Raises InputError, on all ranks, for a stage with an unknown soil or boundary; StageError where there is no
         equilibrium: the particles are then in the last equilibrium of the stage.
         """
         model = self.model
@@ -111,7 +111,7 @@ class ParticleSite:
             model._seeded(0, 0)  # gives laws that ask for it the size of the cells
 
     def _weigh(self, state):
-        """Mass from the unit weights in force; a particle's volume before it was deformed is not kept, so by the ratio."""
+        """Scale masses by the ratio of the new unit weights to the old ones; undeformed volumes are not stored."""
         mass = self.model.particles.mass.copy()
         for tag in self.state.there:
             if tag in state.there and state.unit_weight[tag] != self.state.unit_weight[tag]:
@@ -137,7 +137,7 @@ class ParticleSite:
 
 
 def apply_supports(model, supports):
-    """Hold the particles' nodes as supports of the finite elements do, in place of what held them before.
+    """Give particles the supports of finite elements, in place of their earlier boundary conditions.
 
     supports: as for `QuasiStatic`. Raises InputError for a prescribed displacement and for unknown boundaries. Collective.
     """
