@@ -2,6 +2,7 @@
 
 #include "explicit/momentum.h"
 #include "model/cell_change.h"
+#include "model/contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
@@ -57,6 +58,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     particles_to_nodes(mesh, exchange, model.particles, model.order.runs, field);
     sum_shared(exchange, field.nodes);
     find_start_velocity(field);
+    add_contact_forces(model, {model.time, dt}, field);
     // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
@@ -87,6 +89,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     sum_shared(model.exchange, field.nodes);
     find_start_velocity(field);
+    add_contact_forces(model, {model.time, dt}, field);
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
@@ -120,6 +123,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   double work_at_end = 0;
   for (VelocityField<G>& field : model.fields)
   {
+    add_contact_forces(model, {model.time, dt}, field);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
@@ -139,6 +143,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
     field.integration.averaged = options.mixed_discretisation;
   }
   model.last.dt = dt;
+  begin_contacts(model, {model.time, dt});
   switch (options.stress_update)
   {
   case StressUpdate::modified_last:

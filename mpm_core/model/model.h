@@ -3,6 +3,7 @@
 /// All that a run consists of, as plain data: mesh, particles, laws, loads, and the velocity fields that move them.
 
 #include "base/phases.h"
+#include "contact/contact.h"
 #include "materials/laws/law.h"
 #include "model/energy.h"
 #include "model/velocity_field.h"
@@ -93,7 +94,8 @@ struct Model
   Particles<D> particles;
   std::vector<Law> laws;
   std::vector<VelocityField<G>> fields = std::vector<VelocityField<G>>(1);
-  std::vector<Index> field_of_law; ///< number of the velocity field of the particles that follow each law
+  std::vector<Index> field_of_law;  ///< number of the velocity field of the particles that follow each law
+  std::vector<Contact<D>> contacts; ///< with rigid surfaces
   std::vector<Index> outflow_tags;
   Vector<D> gravity{};     ///< [m/s2]
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]

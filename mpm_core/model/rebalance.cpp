@@ -17,6 +17,8 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh)
   redistribute<D>(mesh, model.exchange, cells, model.particles);
   for (VelocityField<G>& field : model.fields)
     field = {};
+  for (Contact<D>& contact : model.contacts)
+    contact.clearance.clear(); // of cells that have other numbers now
   model.order = {};
   model.migration = {};
   model.ready = false;

@@ -53,6 +53,19 @@ void for_each_number(M& model, F&& f)
   f("energy_start_external_work", Kind::sum, model.energy.external_start);
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
+  for (std::size_t k = 0; k < model.contacts.size(); ++k)
+  {
+    auto& contact = model.contacts[k];
+    const std::string name = "contact_" + std::to_string(k);
+    f(name + "_stiff_step", Kind::common, contact.stiff_step);
+    for (std::size_t a = 0; a < contact.force.size(); ++a)
+    {
+      f(name + "_force_" + std::to_string(a), Kind::sum, contact.force[a]);
+      f(name + "_impulse_" + std::to_string(a), Kind::sum, contact.impulse[a]);
+    }
+    for (std::size_t a = 0; a < contact.moment.size(); ++a)
+      f(name + "_moment_" + std::to_string(a), Kind::sum, contact.moment[a]);
+  }
   f("sorts", Kind::own, model.totals.sorts);
   f("order_changes", Kind::own, model.order.out_of_order);
   f("order_cost", Kind::own, model.order.cost);

@@ -52,7 +52,8 @@ struct VelocityField
   Array<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
   Array<NodeSums<D>> nodes;
   CellIntegration<D> integration;
-  double least_mass = 0; ///< nodes below this mass are not moved [kg]
+  std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
+  double least_mass = 0;                ///< nodes below this mass are not moved [kg]
 
   // How its nodes move
   std::vector<Support<D>> supports;          ///< its boundary conditions

@@ -13,6 +13,7 @@ void bind_laws(pybind11::module_& m);
 /// Laws written in Python
 void bind_python_law(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
+void bind_contacts(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
 void bind_io(pybind11::module_& m);
 void bind_checkpoints(pybind11::module_& m);

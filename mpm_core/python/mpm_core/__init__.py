@@ -30,6 +30,7 @@ from ._core import (
 from ._core import compiler as compiler
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
+from .contact import Box, Disc, Plane, Polyline, RigidContact, Sphere
 from .element import ElementTest
 from .energy import EnergyWarning
 from .ghost import GhostPenalty
@@ -49,8 +50,10 @@ for _law in law_types:
     _law.__signature__ = signature_of(_law)
 
 __all__ = [
+    "Box",
     "CamClay",
     "ConeMatch",
+    "Disc",
     "DruckerPrager",
     "ElementTest",
     "EnergyWarning",
@@ -68,16 +71,20 @@ __all__ = [
     "MohrCoulomb",
     "Newton",
     "Particles",
+    "Plane",
+    "Polyline",
     "PythonLaw",
     "RandomField",
     "Relaxation",
     "RelaxationKind",
     "Report",
     "Reports",
+    "RigidContact",
     "RunError",
     "Softening",
     "SofteningMohrCoulomb",
     "Space",
+    "Sphere",
     "StressUpdate",
     "Umat",
     "Undrained",

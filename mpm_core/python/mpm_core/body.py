@@ -74,6 +74,7 @@ class Body(Conditions):
         self._core = getattr(_core, f"Model{suffix}")(mesh._core, self.laws, fields, MPI._addressof(self.comm))
         self._velocity_fields = fields or [0] * len(self.laws)
         self._space_watch: SpaceWatch | None = None
+        self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from . import _core, partition
 from ._core import InputError, RunError
 from .collective import collectively
+from .contact import set_contacts
 from .description import parsed
 from .fingerprint import fingerprint
 from .step_control import StepControl
@@ -62,8 +63,21 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     for field in there.get("added_fields", []):
         if field["name"] not in {known["name"] for known in model.particles.schedule()}:
             model.add_field(**field)
-    _core.restore(model._core, name)
+    before = _replace_contacts(model, there.get("contacts", []))
+    try:
+        _core.restore(model._core, name)
+    except RunError:
+        _replace_contacts(model, before)
+        raise
     _take(model, there)
+
+
+def _replace_contacts(model: Model, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give the model other contacts; returns those that it had."""
+    before, model._contacts = model._contacts, []
+    _core.clear_contacts(model._core)
+    collectively(model.comm, lambda: set_contacts(model, entries))
+    return before
 
 
 _COMPARED = {
@@ -120,6 +134,7 @@ def _description(model: Model) -> dict[str, Any]:
         "added_fields": _added_fields(model),
         "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
+        "contacts": model._contacts,
         "implicit": None if model._control is None else vars(model._control),
     }
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ._core import Geometry, RunError
+from .contact import KINDS
 
 
 def parsed(path: str, text: bytes) -> dict[str, Any]:
@@ -76,6 +77,18 @@ def _is_field(value: Any) -> bool:
     )
 
 
+def _is_contact(value: Any) -> bool:
+    return (
+        isinstance(value, dict)
+        and set(value) == {"surface", "friction", "penalty", "times", "velocities", "start"}
+        and isinstance(value["surface"], dict)
+        and value["surface"].get("kind") in KINDS
+        and all(_is_number(value[key]) for key in ("friction", "penalty", "start"))
+        and _are(_is_number, value["times"])
+        and _are(lambda row: _are(_is_number, row), value["velocities"])
+    )
+
+
 def _is_control(value: Any) -> bool:
     if value is None:
         return True
@@ -86,7 +99,7 @@ def _is_control(value: Any) -> bool:
     )
 
 
-_OPTIONAL = ("added_fields", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
+_OPTIONAL = ("added_fields", "contacts", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
 _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),
@@ -101,6 +114,7 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "prescribed": (lambda v: isinstance(v, dict), "a table"),
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
+    "contacts": (lambda v: _are(_is_contact, v), "a list of contacts with rigid surfaces"),
     "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),
     "velocity_fields": (lambda v: _are(_is_count, v), "a list of whole numbers from 0 on"),
     "cuts": (_is_count, "a whole number from 0 on"),

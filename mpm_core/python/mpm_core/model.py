@@ -11,6 +11,7 @@ from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .collective import collectively
+from .contact import RigidContact, Surface, Velocity, add_contact, refuse_contacts, smallest_gap
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
@@ -90,6 +91,47 @@ class Model(Body):
     def resumed_dt(self) -> float | None:
         """Longest step [s] of the implicit run that a restored checkpoint was taken from; None when it was of no such run."""
         return None if self._resumed is None else self._resumed.longest
+
+    # --- rigid surfaces ------------------------------------------------------------------------------------------
+
+    def add_contact(
+        self, surface: Surface, *, friction: float = 0.0, velocity: Velocity = None, penalty: float = 0.2
+    ) -> RigidContact:
+        """Let the particles touch a rigid surface, which does not depend on the mesh; explicit scheme only.
+
+        The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without adhesion, and resists
+        sliding with Coulomb friction (docs/contact.md).
+
+        Args:
+            surface: a `Plane`, `Box`, `Disc`, `Sphere` or `Polyline`, where it is now; outside of all particles.
+            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
+            velocity: of the surface [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
+                before and after; at rest by default.
+            penalty: stiffness beta in (0, 1], over what a mass that oscillates as fast as the time step allows would need; a
+                larger one lets particles penetrate less.
+
+        Returns:
+            The surface's force, moment, impulse and displacement from here on.
+
+        Raises:
+            InputError: an argument out of its range, a surface of another dimension, or one that overlaps the soil, with the
+                depth; a model without particles.
+
+        Example:
+            >>> ground = model.add_contact(mpm.Plane((0, 0), normal=(0, 1)), friction=0.3)
+            >>> *_, report = model.explicit(until=1.0)
+            >>> ground.force
+        """
+        return add_contact(self, surface, friction, velocity, penalty)
+
+    def gap(self, surface: Surface) -> float:
+        """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap."""
+        return smallest_gap(self, surface)
+
+    @property
+    def contacts(self) -> list[RigidContact]:
+        """The rigid surfaces in the order in which they were added. Not collective."""
+        return [RigidContact(self, number) for number in range(len(self._contacts))]
 
     # --- runs ----------------------------------------------------------------------------------------------------
 
@@ -249,6 +291,7 @@ class Model(Body):
             RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
                 particles are as after the last step that converged.
         """
+        refuse_contacts(self, "the implicit scheme")
         options, longest, times, steps, threshold, limit, wanted = collectively(
             self.comm,
             lambda: (
@@ -299,6 +342,7 @@ class Model(Body):
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
+        refuse_contacts(self, "equilibrate()")
         options = collectively(
             self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
         )

@@ -25,7 +25,7 @@ class Report:
     kinetic_energy: float
     """Of the particles"""
     external_work: float
-    """Work of gravity and tractions since the model was made"""
+    """Work of gravity, tractions and contact forces since the model was made"""
     internal_work: float
     """Work of the nodal forces of the stresses"""
     damping_work: float

@@ -19,11 +19,12 @@ MAY_SEE = {
     "particles": {"base", "mesh"},
     "parallel": {"base", "mesh", "particles"},
     "transfer": {"base", "mesh", "materials", "particles", "parallel"},
-    "model": BELOW_STEPS,
-    "explicit": BELOW_STEPS | {"model"},
-    "implicit": BELOW_STEPS | {"model", "explicit"},
+    "contact": {"base", "mesh", "particles", "transfer"},
+    "model": BELOW_STEPS | {"contact"},
+    "explicit": BELOW_STEPS | {"contact", "model"},
+    "implicit": BELOW_STEPS | {"contact", "model", "explicit"},
     "io": BELOW_STEPS,
-    "python": BELOW_STEPS | {"model", "explicit", "implicit", "io"},
+    "python": BELOW_STEPS | {"contact", "model", "explicit", "implicit", "io"},
 }
 
 

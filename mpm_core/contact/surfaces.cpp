@@ -1,0 +1,142 @@
+#include "contact/surfaces.h"
+
+#include "base/tensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace mpm
+{
+namespace
+{
+template <int D>
+Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
+{
+  Vector<D> c;
+  for (int i = 0; i < D; ++i)
+    c[i] = a[i] - b[i];
+  return c;
+}
+
+template <int D>
+Vector<D> scaled(Vector<D> v, double factor)
+{
+  for (double& component : v)
+    component *= factor;
+  return v;
+}
+
+/// To the left of a segment, of length 1.
+Vector<2> left_normal(const Vector<2>& from, const Vector<2>& to)
+{
+  const Vector<2> e = difference<2>(to, from);
+  return scaled<2>({-e[1], e[0]}, 1 / norm<2>(e));
+}
+
+/// The nearest point on a segment: its number, and where along it, from 0 to 1 but beyond the ends of an open line.
+struct Nearest
+{
+  std::size_t segment = 0;
+  double along = 0;
+  double squared = std::numeric_limits<double>::infinity();
+  Vector<2> offset{}; ///< from there to the point
+};
+
+std::size_t segments_of(const Polyline& line) { return line.points.size() - (line.closed ? 0 : 1); }
+
+Nearest nearest_on(const Polyline& line, const Vector<2>& x)
+{
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  const std::size_t n = segments_of(line);
+  Nearest best;
+  for (std::size_t k = 0; k < n; ++k)
+  {
+    const Vector<2>& from = line.points[k];
+    const Vector<2> e = difference<2>(line.points[(k + 1) % line.points.size()], from), r = difference<2>(x, from);
+    const double low = !line.closed && k == 0 ? -endless : 0, high = !line.closed && k + 1 == n ? endless : 1;
+    const double along = std::clamp(dot<2>(r, e) / dot<2>(e, e), low, high);
+    const Vector<2> offset = difference<2>(r, scaled<2>(e, along));
+    if (const double squared = dot<2>(offset, offset); squared < best.squared)
+      best = {k, along, squared, offset};
+  }
+  return best;
+}
+
+/// The outward direction where a point is nearest: at a corner the sum of the normals of both segments, whose sign is
+/// right on either side however sharp the corner (Baerentzen & Aanaes 2005).
+Vector<2> side(const Polyline& line, const Nearest& at)
+{
+  const std::size_t n = segments_of(line), size = line.points.size();
+  const auto normal_of = [&](std::size_t k) { return left_normal(line.points[k], line.points[(k + 1) % size]); };
+  Vector<2> normal = normal_of(at.segment);
+  const bool first = at.along == 0 && (line.closed || at.segment > 0);
+  const bool last = at.along == 1 && (line.closed || at.segment + 1 < n);
+  if (!first && !last)
+    return normal;
+  const Vector<2> other = normal_of((at.segment + (first ? n - 1 : 1)) % n);
+  return {normal[0] + other[0], normal[1] + other[1]};
+}
+
+template <int D>
+Distance<D> distance_from(const Plane<D>& plane, const Vector<D>& x)
+{
+  return {dot<D>(difference<D>(x, plane.point), plane.normal), plane.normal};
+}
+
+template <int D>
+Distance<D> distance_from(const Ball<D>& ball, const Vector<D>& x)
+{
+  const Vector<D> r = difference<D>(x, ball.centre);
+  const double length = norm<D>(r);
+  return {length - ball.radius, length > 0 ? scaled<D>(r, 1 / length) : Vector<D>{1}};
+}
+
+template <int D>
+Distance<D> distance_from(const Box<D>& box, const Vector<D>& x)
+{
+  Vector<D> beyond, outside{};
+  int axis = 0; // of the nearest face
+  for (int i = 0; i < D; ++i)
+  {
+    beyond[i] = std::max(box.lower[i] - x[i], x[i] - box.upper[i]);
+    outside[i] = x[i] - std::clamp(x[i], box.lower[i], box.upper[i]);
+    if (beyond[i] > beyond[axis])
+      axis = i;
+  }
+  if (const double length = norm<D>(outside); length > 0)
+    return {length, scaled<D>(outside, 1 / length)};
+  Vector<D> normal{};
+  normal[axis] = 2 * x[axis] > box.lower[axis] + box.upper[axis] ? 1 : -1;
+  return {beyond[axis], normal};
+}
+
+Distance<2> distance_from(const Polyline& line, const Vector<2>& x)
+{
+  const Nearest nearest = nearest_on(line, x);
+  const Vector<2> out = side(line, nearest);
+  const double length = std::sqrt(nearest.squared);
+  if (length == 0)
+    return {0, scaled<2>(out, 1 / norm<2>(out))};
+  const double sign = dot<2>(out, nearest.offset) < 0 ? -1 : 1;
+  return {sign * length, scaled<2>(nearest.offset, sign / length)};
+}
+
+} // namespace
+
+template <int D>
+Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
+{
+  const auto from = [&x](const auto& shape)
+  {
+    if constexpr (std::is_same_v<decltype(shape), const Polyline&>)
+      return distance_from(shape, x);
+    else
+      return distance_from<D>(shape, x);
+  };
+  return std::visit(from, surface);
+}
+
+template Distance<2> distance<2>(const Surface<2>&, const Vector<2>&);
+template Distance<3> distance<3>(const Surface<3>&, const Vector<3>&);
+} // namespace mpm

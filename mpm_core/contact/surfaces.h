@@ -1,0 +1,55 @@
+#pragma once
+/// @file
+/// Rigid surfaces as plain values, with their signed distance and their normal.
+
+#include "base/types.h"
+
+#include <variant>
+
+namespace mpm
+{
+/// A half space; the normal, of length 1, points out of it towards the soil.
+template <int D>
+struct Plane
+{
+  Vector<D> point, normal;
+};
+
+/// A solid disc (the section of a cylinder) in two dimensions, a solid sphere in three.
+template <int D>
+struct Ball
+{
+  Vector<D> centre;
+  double radius;
+};
+
+/// A solid box along the axes.
+template <int D>
+struct Box
+{
+  Vector<D> lower, upper;
+};
+
+/// Segments from point to point with the soil on their left. An open line goes on straight beyond its ends; a closed
+/// one returns from its last point to its first.
+struct Polyline
+{
+  std::vector<Vector<2>> points;
+  bool closed;
+};
+
+template <int D>
+using Surface = std::conditional_t<D == 2, std::variant<Plane<2>, Ball<2>, Box<2>, Polyline>,
+                                   std::variant<Plane<3>, Ball<3>, Box<3>>>;
+
+/// From a rigid body to a point: positive outside of the body; the normal has length 1 and points out of it.
+template <int D>
+struct Distance
+{
+  double value; ///< [m]
+  Vector<D> normal;
+};
+
+template <int D>
+Distance<D> distance(const Surface<D>& surface, const Vector<D>& x);
+} // namespace mpm

@@ -1,0 +1,18 @@
+#pragma once
+/// @file
+/// The rigid surfaces of a model in an explicit step.
+
+#include "model/model.h"
+
+namespace mpm
+{
+/// Begins a step of all contacts. @note Not collective
+template <class G>
+void begin_contacts(Model<G>& model, const TimeStep& step);
+
+/// Adds the forces of all contacts to the tractions at the nodes of a field, over all ranks.
+/// @pre sums and start velocities of the field's nodes are there
+/// @note Collective where there are contacts
+template <class G>
+void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>& field);
+} // namespace mpm

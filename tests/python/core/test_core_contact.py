@@ -1,0 +1,180 @@
+"""Contact with rigid surfaces: when it begins, the friction of a block, momentum, energy, restart, and wrong input."""
+
+import numpy as np
+import pytest
+from core_cases import box
+
+import mpm_core as mpm
+
+G = 9.81
+pytestmark = pytest.mark.filterwarnings("ignore:nothing holds the particles")
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def block(*, angle=0.0, shake=0.0, young=2e7, length=1.0, drop=0.0):
+    """A block of 16 by 8 particles whose lower edge is at ``drop`` above a plane through (0.5, 0.8) at this angle to the mesh.
+
+    Returns:
+        Model, the plane, and the rotation that turns the axes into those along and normal to it.
+    """
+    mesh = box((28, 12), (7.0, 3.0), shake=shake, diagonals="alternating")
+    model = mpm.Model(mesh, mpm.LinearElastic(young=young, poisson=0.3))
+    side = length / 16
+    grid = np.indices((16, 8)).reshape(2, -1).T + 0.5
+    turn, corner = rotation(angle), np.array([0.5, 0.8])
+    model.seed_points(corner + (side * grid + (0, drop)) @ turn.T, np.full(len(grid), side**2), density=1000.0)
+    normal = turn @ (0, 1)
+    # Seeded at the edge to the last digit, up to round-off of the rotation.
+    return model, mpm.Plane(corner - 1e-12 * normal, normal), turn
+
+
+def along(model, direction):
+    particles = model.particles
+    return float(np.average(particles.displacement @ direction, weights=particles.mass))
+
+
+@pytest.mark.parametrize(
+    "shake, turned", [(0.0, 0.0), (0.0, 0.3), (0.25, 0.0)], ids=["aligned", "inclined", "irregular"]
+)
+@pytest.mark.parametrize("slope, friction", [(30, 0.0), (30, 0.2), (30, 0.3), (30, 0.5), (45, 0.3), (45, 0.5)])
+def test_a_block_slides_as_coulomb_says(slope, friction, shake, turned):
+    # Gravity rises over the time T, so that the block does not bounce; with a = g (sin - mu cos) the distance is
+    # a (T^2 / 6 + T u / 2 + u^2 / 2) at the time T + u, and the leap-frog adds half a step of the velocity at the end.
+    model, plane, turn = block(angle=turned, shake=shake)
+    theta, rise, end = np.radians(slope), 0.1, 1.0
+    model.set_gravity(turn @ (G * np.sin(theta), -G * np.cos(theta)), ramp=rise)
+    ground = model.add_contact(plane, friction=friction)
+    *_, report = model.explicit(end)
+    a, u = G * (np.sin(theta) - friction * np.cos(theta)), end - rise
+    distance = a * (rise**2 / 6 + rise * u / 2 + u**2 / 2) + a * (end - rise / 2) * report.dt / 2
+    assert along(model, turn[:, 0]) == pytest.approx(distance, rel=5e-3)
+    mean = turn.T @ ground.impulse / (end - rise / 2)
+    weight = report.mass * G * np.cos(theta)
+    assert mean == pytest.approx([friction * weight, -weight], abs=5e-3 * weight)
+
+
+@pytest.mark.parametrize("slope, friction", [(30, 0.62), (45, 1.1)])
+def test_a_block_sticks_below_the_angle_of_friction(slope, friction):
+    # Its elastic shear gamma = rho g sin(theta) H / (2 G), and no creep: the block stays where it is when it is at rest.
+    model, plane, _ = block()
+    theta = np.radians(slope)
+    model.set_gravity((G * np.sin(theta), -G * np.cos(theta)), ramp=0.4)
+    model.add_contact(plane, friction=friction)
+    list(model.explicit(0.8))
+    first = along(model, (1, 0))
+    list(model.explicit(1.6))
+    assert 0 < first < 5e-4
+    assert abs(along(model, (1, 0)) - first) < 5e-5  # sliding freely it would be 0.8^2 g / 4 = 1.6 m
+
+
+def test_a_block_on_level_ground_stops_after_v2_over_2_mu_g():
+    model, plane, _ = block()
+    model.set_gravity((0, -G), ramp=0.1)
+    ground = model.add_contact(plane, friction=0.3)
+    list(model.explicit(0.3, damping=0.5))  # at rest under its weight
+    start, speed = along(model, (1, 0)), 2.0
+    model.particles.set("velocity", model.particles.velocity + (speed, 0.0))
+    list(model.explicit(0.3 + 1.0))
+    assert along(model, (1, 0)) - start == pytest.approx(speed**2 / (2 * 0.3 * G), rel=5e-3)
+    assert ground.displacement == pytest.approx([0, 0])
+
+
+def test_nothing_is_felt_before_the_gap_closes():
+    drop = 0.2
+    model, plane, _ = block(drop=drop)
+    model.set_gravity((0, -G))
+    ground = model.add_contact(plane)
+    assert model.gap(plane) == pytest.approx(drop, abs=1e-9)
+    fallen = 0.0
+    for _ in model.explicit(0.3, every_steps=1):
+        if np.any(ground.force):
+            break
+        fallen = -along(model, (0, 1))
+    cell = 0.25
+    assert drop - 0.05 * cell < fallen < drop + 1e-9
+    assert ground.force[1] < 0 and ground.force[0] == 0
+
+
+@pytest.mark.parametrize("stress_update", [mpm.StressUpdate.MODIFIED_LAST, mpm.StressUpdate.FIRST])
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_momentum_is_that_of_gravity_and_contact_and_no_energy_is_made(stress_update, friction):
+    # A block flies against a plane: kinetic and stored energy never grow, and its momentum is lost to the plane.
+    model, plane, turn = block(angle=0.2, shake=0.2, drop=0.02)
+    model.particles.set("velocity", np.tile(turn @ (1.0, -1.5), (len(model.particles), 1)))
+    ground = model.add_contact(plane, friction=friction)
+    before = model.report()
+    start = np.array(before.momentum)
+    for report in model.explicit(0.3, every_steps=20, stress_update=stress_update):
+        assert np.array(report.momentum) + ground.impulse == pytest.approx(start, abs=1e-10 * np.abs(start).max())
+        assert report.external_work <= 1e-9 * before.kinetic_energy  # of the contact, the only force from outside
+    assert turn[:, 1] @ ground.impulse < 0  # the plane has been hit
+    assert abs(report.unexplained_share) < 0.02
+    assert report.kinetic_energy + report.stored_energy < before.kinetic_energy
+
+
+def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
+    def prepared():
+        model, plane, _ = block(angle=0.2, drop=0.001)
+        model.set_gravity((3.0, -9.0))
+        return model, plane
+
+    whole, plane = prepared()
+    wall = mpm.Box((2.6, 0.0), (6.0, 2.5))
+    for surface, velocity in ((plane, None), (wall, ([0.0, 0.1], [[0.0, 0.0], [-4.0, 0.0]]))):
+        whole.add_contact(surface, friction=0.3, velocity=velocity)
+    list(whole.explicit(0.15, dt=2e-4))
+    whole.save(tmp_path / "there.h5")
+    resumed, _ = prepared()
+    resumed.restore(tmp_path / "there.h5")
+    for model in (whole, resumed):
+        list(model.explicit(0.4, dt=2e-4))
+    assert len(resumed.contacts) == 2 and whole.contacts[1].impulse[0] > 0
+    for name in ("position", "velocity", "stress", "contact_slip_0", "contact_slip_1"):
+        assert np.array_equal(getattr(whole.particles, name), getattr(resumed.particles, name)), name
+    for one, other in zip(whole.contacts, resumed.contacts, strict=True):
+        for name in ("force", "impulse", "moment", "displacement"):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+
+
+@pytest.mark.parametrize(
+    "surface, options, message",
+    [
+        (lambda: mpm.Plane((0, 0), (0, 0)), {}, "normal is"),
+        (lambda: mpm.Plane((0, np.nan), (0, 1)), {}, "point is nan"),
+        (lambda: mpm.Plane((0, 0, 0), (0, 1)), {}, "point has shape"),
+        (lambda: mpm.Plane((0, 0), (0, 1)), {"friction": -0.1}, "friction is -0.1"),
+        (lambda: mpm.Plane((0, 0), (0, 1)), {"friction": np.inf}, "friction is inf"),
+        (lambda: mpm.Plane((0, 0), (0, 1)), {"penalty": 1.5}, "penalty is 1.5"),
+        (lambda: mpm.Plane((0, 0), (0, 1)), {"velocity": ([1.0, 0.0], np.zeros((2, 2)))}, "expected rising"),
+        (lambda: mpm.Disc((3, 1), -1.0), {}, "radius is -1.0"),
+        (lambda: mpm.Sphere((3, 1, 1), 1.0), {}, "surface is a Sphere"),
+        (lambda: mpm.Box((1, 1), (0, 2)), {}, "expected lower < upper"),
+        (lambda: mpm.Polyline([(0, 0)]), {}, "expected 2 or more"),
+        (lambda: mpm.Polyline([(0, 0), (0, 0), (1, 0)]), {}, "twice in a row"),
+        (lambda: mpm.Polyline([(0, 0), (2, 0), (2, 1), (1, -1)]), {}, "cross"),
+        (lambda: mpm.Polyline([(7, 0), (0, 0)]), {}, "overlaps the soil by"),  # the soil is on its right
+        (lambda: "ground", {}, "surface is 'ground'"),
+    ],
+)
+def test_wrong_input_is_named(surface, options, message):
+    model, _, _ = block()
+    with pytest.raises(mpm.InputError, match=message):
+        model.add_contact(surface(), **options)
+    assert not model.contacts
+
+
+def test_an_overlap_is_refused_with_its_depth():
+    model, _, _ = block()
+    with pytest.raises(mpm.InputError, match=r"overlaps the soil by 0\.05 m"):
+        model.add_contact(mpm.Plane((0, 0.85), (0, 1)))
+
+
+def test_the_implicit_scheme_refuses_contacts():
+    model, plane, _ = block()
+    model.add_contact(plane)
+    for run in (lambda: model.implicit(1.0, dt=0.1), model.equilibrate):
+        with pytest.raises(mpm.InputError, match=r"rigid surfaces \(Plane\)"):
+            run()
