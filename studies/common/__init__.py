@@ -1,1 +1,1 @@
-"""What the studies share: options, results folder, history, progress, interruption, pictures and animations."""
+"""Common modules of the studies: options, results folder, history, progress, interruption, pictures and animations."""

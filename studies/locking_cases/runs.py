@@ -1,4 +1,4 @@
-"""What the cases share: particles brought to rest by either scheme, and what is read from them."""
+"""Common parts of the cases: particles brought to rest by either scheme, and values read from them."""
 
 from __future__ import annotations
 

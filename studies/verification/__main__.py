@@ -1,4 +1,4 @@
-"""Verification and validation: every case computed anew, one report of what came out against what should.
+"""Verification and validation: every case is repeated, and one report compares the results with the expected values.
 
 Writes report.html, verification.json and pictures. Exits with 1 when a check fails; known limits of the method are
 shown and count as none.

@@ -1,4 +1,4 @@
-"""What the cases share: checks, what a case hands back, and how a case runs alone."""
+"""Common parts of the cases: checks, what a case hands back, and how a case runs alone."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Check:
         expected: the number it should be, in ``unit``.
         source: where that comes from: a formula, a paper and equation, an identity.
         computed: the number that came out.
-        tolerance: largest error that passes, as a share of ``scale``.
+        tolerance: largest error that passes, as a fraction of ``scale``.
         unit: as shown; "-" for none.
         kind: AT_LEAST and AT_MOST count only what is missing to the expected number as error.
         scale: what errors are divided by, in ``unit``; by default the expected number's size.
@@ -58,7 +58,7 @@ class Check:
 
     @property
     def error(self) -> float:
-        """Difference to the expected number as a share of the scale [-]; not a number when nothing was computed."""
+        """Difference to the expected number as a fraction of the scale [-]; not a number when nothing was computed."""
         difference = self.computed - self.expected
         if self.kind is not Kind.EQUAL and self.computed == self.computed:
             difference = max(0.0, -difference if self.kind is Kind.AT_LEAST else difference)

@@ -100,9 +100,9 @@ class Table:
         )
 
 
-def percent(share: float) -> str:
-    """A share as a percentage with two digits that count."""
-    return f"{100 * share:.2g} %" if share < 10 else "> 1000 %"
+def percent(fraction: float) -> str:
+    """A fraction as a percentage with two digits that count."""
+    return f"{100 * fraction:.2g} %" if fraction < 10 else "> 1000 %"
 
 
 def case_row(name: str, group: str, docstring: str, result: Result, error: str, seconds: float) -> CaseRow:
@@ -212,9 +212,9 @@ def docs_page(table: Table) -> str:
     """The page of the documentation, from the table alone."""
     parts = [
         "# Verification and validation",
-        "`studies/run verification` computes all of this anew and writes it as one page; `--cases` chooses cases, "
+        "`studies/run verification` repeats all of this and writes it as one page; `--cases` chooses cases, "
         f"`--quick` takes small sizes. This page was made by `studies/run verification --docs`.\n\n{_made(table)}\n\n"
-        f"**{table.summary()}.** The error is a share of the expected value, or of the scale that the source names. "
+        f"**{table.summary()}.** The error is a fraction of the expected value, or of the scale that the source names. "
         "A known limit is a number that the method is known not to reach; it is shown with its reason.",
     ]
     for group in dict.fromkeys(case.group for case in table.cases):

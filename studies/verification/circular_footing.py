@@ -2,7 +2,7 @@
 
 A half section of weightless Tresca soil under a plate of radius 0.5 m that settles; smooth it presses only, rough it
 holds the soil sideways too. The settlement goes on, in steps that adapt, until its last half no longer raises the
-load, so that neither the step nor where it stopped decides on the answer. Elements of both kinds are too stiff and
+load, so that neither the step nor where it stopped influences the result. Elements of both kinds are too stiff and
 come from above: quadratic ones, and linear ones with averaged volumetric strains. From mesh to mesh the error is more
 than halved, at different rates, so nothing is extrapolated.
 """

@@ -2,7 +2,7 @@
 
 Implicit steps without inertia in plane strain; the load rises to P L²/EI' = 2, EI' = E I / (1 - ν²), and keeps its
 direction. L is the arm of the load, to the middle of the particles that carry it. Linear triangles are stiff in
-bending, which mixed discretisation does not mend; 4, 8 and 16 squares over the height show how they come nearer.
+bending, which mixed discretisation does not remove; 4, 8 and 16 squares over the height show how they come nearer.
 
 Particles cross from cell to cell as the beam bends. Each crossing is a jump of nodal forces, for the gradients of linear
 shape functions jump; the stresses of the particles scatter, which finer cells, crossed more often, hardly lessen. Nor does

@@ -3,9 +3,9 @@
 Cauchy stress follows a rate law and ν = 0, so σ = E ln(stretch) and σ = -w (H - X) at the place that was X above the base:
 u(X) = ∫ exp(-w (H - s) / E) ds - X, -0.986801 m at the top. The weight rises in ten implicit steps without inertia.
 
-Finer cells do not bring particles nearer: they are crossed more often, and each crossing shifts the share 1 / (particles in a
+Finer cells do not bring particles nearer: they are crossed more often, and each crossing shifts the fraction 1 / (particles in a
 cell) of the cell's force to its neighbour, which strains both. So the error grows with the number of cells crossed, and with
-the number of steps in which that happens, and falls with the number of particles in a cell. Mixed integration mends it: a
+the number of steps in which that happens, and falls with the number of particles in a cell. Mixed integration removes it: a
 full cell integrates its mean stress over its own volume, whoever has just crossed into it. With a mesh that goes with the
 particles there are no crossings, and what is left is the error of the steps' lengths.
 """
@@ -23,7 +23,7 @@ HEIGHT, WEIGHT, YOUNG, GRAVITY = 50.0, 800.0, 1e6, 10.0  # m, N/m3, Pa, m/s2
 STEPS = 10
 CROSSING = (
     "Particles that cross cells shift forces between them; more particles in a cell, not more cells, make that less. Mixed "
-    "integration mends it."
+    "integration removes it."
 )
 PLAIN, MIXED = mpm.Integration.PARTICLES, mpm.Integration.MIXED
 

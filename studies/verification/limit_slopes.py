@@ -1,7 +1,7 @@
 """Slopes at collapse, over angles and friction angles, against the stability factors of limit analysis.
 
 The stability factor is γH/c at collapse. Limit analysis minimises it over all rotations about a logarithmic spiral
-through the toe, with associated flow (Chen 1975), here anew for each slope. On flat slopes with little friction the
+through the toe, with associated flow (Chen 1975), here repeated for each slope. On flat slopes with little friction the
 spiral dips below the level of the toe before it rises to it. Where that is more than a hundredth of the height, the
 ground below and before the toe is of the same soil; else it is rigid. Quadratic finite elements raise the weight to the
 last equilibrium. Both are upper bounds: finite elements come from above and may end lower than the spiral where another
@@ -47,7 +47,7 @@ def by_finite_elements(angle, friction, spiral, cell):
     model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2)
 
     # --- 2. Its unit weight, raised to the last equilibrium ---------------------------------------------------------
-    first = COHESION / HEIGHT  # from the strength alone, not from the answer
+    first = COHESION / HEIGHT  # from the strength alone, not from the expected result
     load = lambda unit_weight: bridge.Load(unit_weight=unit_weight)  # noqa: E731
     return bridge.collapse_load(model, load, first_step=first, tolerance=5e-3).value * HEIGHT / COHESION
 

@@ -1,6 +1,6 @@
 """A half section against a quarter of the same body in three dimensions: an elastic cylinder, and a collapsing one.
 
-Two computations of one body by code that shares the laws and nothing of the geometry: rings of one radian, and
+Two computations of one body by code that has only the laws in common: rings of one radian, and
 tetrahedra between two planes of symmetry. First an elastic cylinder, as high as its radius, on rough ground under its
 weight, by particles in a quasi-static step; then the same cylinder of sand with a little cohesion, let go and
 followed by the explicit scheme with averaged strains until it has spread. What differs must be the error of the
