@@ -49,7 +49,7 @@ MEASURES = {
 """What the mesh sizes are compared by. Nearly all of the stresses' work is dissipated in the slips: what the soil stores
 elastically changes little."""
 AT_REST, REST = 1e-3, 2.0
-"""At rest is a slope whose kinetic energy has stayed below this share of its largest for so long [s]: a scarp may stand for
+"""At rest is a slope whose kinetic energy has stayed below this fraction of its maximum for so long [s]: a scarp may stand for
 a moment before it fails too."""
 
 
@@ -67,7 +67,7 @@ def parser() -> ArgumentParser:
     )  # fmt: skip
     add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
     add_number(
-        p, "--disturbed-loss", 0.9, "-", "share of its strength that disturbed clay has lost", above=0, at_most=1
+        p, "--disturbed-loss", 0.9, "-", "fraction of its strength that disturbed clay has lost", above=0, at_most=1
     )
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
     add_pic(p, 0.1)
@@ -207,7 +207,7 @@ def compare(results: list[Slide], folder: Path) -> None:
 
 
 def differences(results: list[Slide]) -> dict[str, float]:
-    """By how much the measures on the two mesh sizes differ in the end, as shares of their mean."""
+    """By how much the measures on the two mesh sizes differ in the end, as fractions of their mean."""
     if len(results) < 2:
         return {}
     ends = {column: [r.history[column][-1] for r in results] for column in MEASURES}

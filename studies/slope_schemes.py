@@ -67,7 +67,7 @@ def parser() -> ArgumentParser:
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
     add_number(p, "--time", 200.0, "s", "longest duration of a slide", above=0)
     add_number(
-        p, "--rest", 1e-3, "-", "out-of-balance ratio and share of kinetic energy at which a slide ends", above=0
+        p, "--rest", 1e-3, "-", "out-of-balance ratio and fraction of kinetic energy at which a slide ends", above=0
     )
     add_number(p, "--step", 20.0, "-", "shortest step of the implicit runs over the critical one", above=0)
     add_count(

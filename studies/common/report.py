@@ -46,7 +46,7 @@ class Report:
         title: heading.
         subtitle: one sentence below it.
         facts: the few results that count, name to text with unit.
-        movies: panels side by side; they share time, quantity and colour scale.
+        movies: panels side by side, with the same time, quantity and colour scale.
         slider: what the player's slider shows, and its unit.
         curves: tables of numbers by title, each column's values by its name, which ends in its unit; drawn over the first
             column, and following the player if that is ``time_s``.

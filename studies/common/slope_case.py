@@ -1,4 +1,4 @@
-"""The slope that several studies share: its options, mesh, soil, supports and initial stresses."""
+"""The slope of several studies: its options, mesh, soil, supports and initial stresses."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def save_pressures(path: Path, fields: Mapping[str, Field], unit: tuple[float, s
             )
             cells.set_array(quantity.scale * field.mean_stress)
             axes.add_collection(cells)
-            low, high = (np.percentile(quantity.scale * field.mean_stress, share) for share in (1, 99))
+            low, high = (np.percentile(quantity.scale * field.mean_stress, percent) for percent in (1, 99))
             axes.set_title(f"{name}: {low:.3g} to {high:.3g}", loc="left", pad=4)
         panels[0].set_ylabel("$y$ [m]")
         bar = figure.add_axes((0.25, 0.5 / total, 0.5, 0.11 / total))

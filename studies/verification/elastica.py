@@ -69,7 +69,7 @@ class Beam:
         self.moving_mesh, self.h = moving_mesh, HEIGHT / squares
         # Room for the whole way, or for that of one step.
         beside, below, above = (0.5, 0.5, 0.5) if moving_mesh else (1.0, 7.0, 1.0)
-        beside, below, above = (int(squares * share) for share in (beside, below, above))
+        beside, below, above = (int(squares * height) for height in (beside, below, above))
         sides = np.array([round(LENGTH / self.h) + beside, below + squares + above])
         body = np.array([[0.0, below], [LENGTH / self.h, below + squares]]) * self.h
         mesh = bridge.background_mesh(*bridge.box_mesh(MPI.COMM_SELF, sides * self.h, sides, body=body))

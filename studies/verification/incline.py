@@ -21,7 +21,7 @@ PLANE, ACCELERATION = 3, GRAVITY * np.sin(ANGLE)
 
 def run(quick: bool, folder) -> Result:
     cell, checks, curves, exact = RADIUS / (8 if quick else 16), [], {}, {}
-    for name, share in (("sliding", 1.0), ("rolling", 2 / 3)):
+    for name, fraction in (("sliding", 1.0), ("rolling", 2 / 3)):
         # --- 1. A cylinder on the plane ------------------------------------------------------------------------------
         counts = [round(3.0 / cell), round(2.4 * RADIUS / cell)]
         lengths = [cell * n for n in counts]
@@ -44,12 +44,12 @@ def run(quick: bool, folder) -> Result:
 
         # --- 3. Path of its centre ----------------------------------------------------------------------------------
         time, moved = np.array(path).T
-        expected = share * ACCELERATION * TIME**2 / 2
+        expected = fraction * ACCELERATION * TIME**2 / 2
         tolerance = 0.005 if name == "sliding" else 0.03
         source = "g sin(α) t² / 2" if name == "sliding" else "2/3 g sin(α) t² / 2, solid cylinder without slip"
         checks.append(Check(f"path of the centre, {name}", expected, source, moved[-1], tolerance, "m"))
         curves[name] = (time, moved)
-        exact[f"{name}, exact"] = (time, share * ACCELERATION * time**2 / 2)
+        exact[f"{name}, exact"] = (time, fraction * ACCELERATION * time**2 / 2)
 
     # --- 4. Picture -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

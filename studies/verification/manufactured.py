@@ -88,7 +88,7 @@ def by_steps(steps, scheme):
     model.seed(density=DENSITY, per_cell=1)
     model.fix(3)
     model.roller(2, (1, 0))  # only the vertex at (0, 1) moves, along y, with the velocity of the particle
-    modulus, share = LAME + 2 * SHEAR, 1 / 3  # share: shape function of that vertex at the particle
+    modulus, weight = LAME + 2 * SHEAR, 1 / 3  # weight: shape function of that vertex at the particle
     volume, mass = float(model.particles.volume[0]), float(model.particles.mass[0])
     period = 2 * np.pi * np.sqrt(DENSITY / modulus)
     omega, dt, errors = 2 * np.pi / (1.7 * period), period / steps, []
@@ -96,7 +96,7 @@ def by_steps(steps, scheme):
         at = dt * (k if scheme == "explicit" else k + 1)  # forces act at the start, or at the end, of a step
         c = np.cos(omega * at)
         u, acceleration = AMPLITUDE * (1 - c) ** 2, 2 * AMPLITUDE * omega**2 * ((1 - c**2) + (1 - c) * c)
-        model.particles.set("traction", [[0.0, (mass * acceleration + volume * modulus * u) / share]])
+        model.particles.set("traction", [[0.0, (mass * acceleration + volume * modulus * u) / weight]])
         options = {"dt": dt, "allow_unstable": True} if scheme == "explicit" else {"dt": dt}
         list(getattr(model, scheme)(dt * (k + 1), **options))
         exact = modulus * AMPLITUDE * (1 - np.cos(omega * dt * (k + 1))) ** 2
