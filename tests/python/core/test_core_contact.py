@@ -82,6 +82,18 @@ def test_a_block_on_level_ground_stops_after_v2_over_2_mu_g():
     assert ground.displacement == pytest.approx([0, 0])
 
 
+def test_soil_at_rest_sinks_in_as_its_weight_and_the_penalty_say():
+    # The lowest particles, of side d, carry the weight W: kappa = beta m_p / dt^2 on each, so that W = L d rho beta / dt^2 g.
+    model, plane, _ = block()
+    model.set_gravity((0, -G), ramp=0.1)
+    ground = model.add_contact(plane, penalty=0.5)
+    *_, report = model.explicit(0.6, damping=0.3)
+    weight, side = report.mass * G, 1 / 16
+    assert ground.force == pytest.approx([0, -weight], abs=1e-3 * weight)
+    assert -model.gap(plane) == pytest.approx(weight * report.dt**2 / (0.5 * 1000.0 * side), rel=0.1)
+    assert ground.moment == pytest.approx([0.5 * -weight], rel=1e-2)  # about the block's lower left corner
+
+
 def test_nothing_is_felt_before_the_gap_closes():
     drop = 0.2
     model, plane, _ = block(drop=drop)
@@ -113,6 +125,87 @@ def test_momentum_is_that_of_gravity_and_contact_and_no_energy_is_made(stress_up
     assert turn[:, 1] @ ground.impulse < 0  # the plane has been hit
     assert abs(report.unexplained_share) < 0.02
     assert report.kinetic_energy + report.stored_energy < before.kinetic_energy
+
+
+def test_a_wall_gives_a_block_the_momentum_of_its_impulse():
+    # The wall starts slowly and reaches 2 m/s; its displacement is the integral of a velocity that is linear in time.
+    model, _, _ = block()
+    times, speeds = [0.05, 0.25], [0.0, 2.0]
+    wall = model.add_contact(mpm.Box((0.1, 0.0), (0.4, 2.9)), velocity=(times, [[v, 0.0] for v in speeds]))
+    *_, report = model.explicit(0.55)
+    assert wall.displacement == pytest.approx([0.5 * 2.0 * 0.2 + 2.0 * 0.3, 0.0])
+    assert report.momentum == pytest.approx(-wall.impulse, abs=1e-10 * report.momentum[0])
+    assert report.momentum[0] >= report.mass * 2.0 * (1 - 1e-3)  # it is as fast as the wall, or was thrown ahead
+    assert model.gap(mpm.Box(*(np.array([(0.1, 0.0), (0.4, 2.9)]) + wall.displacement))) > -1e-3
+
+
+def test_a_block_slides_in_three_dimensions():
+    mesh = box((6, 4, 3), (3.0, 2.0, 1.5))
+    model = mpm.Model(mesh, mpm.LinearElastic(young=2e7, poisson=0.3))
+    grid = 0.125 * (np.indices((6, 6, 4)).reshape(3, -1).T + 0.5) + (0.3, 0.6, 0.3)
+    model.seed_points(grid, np.full(len(grid), 0.125**3), density=1000.0)
+    slope, friction, rise, end = np.radians(30), 0.3, 0.1, 0.6
+    model.set_gravity((G * np.sin(slope), 0.0, -G * np.cos(slope)), ramp=rise)
+    ground = model.add_contact(mpm.Plane((0, 0, 0.3 - 1e-12), (0, 0, 2)), friction=friction)
+    *_, report = model.explicit(end)
+    a, u = G * (np.sin(slope) - friction * np.cos(slope)), end - rise
+    distance = a * (rise**2 / 6 + rise * u / 2 + u**2 / 2) + a * (end - rise / 2) * report.dt / 2
+    assert along(model, (1, 0, 0)) == pytest.approx(distance, rel=5e-3)
+    assert abs(along(model, (0, 1, 0))) < 1e-4 and ground.moment.shape == (3,)
+
+
+ZIGZAG = [(1.0, 1.0), (3.0, 1.2), (3.2, 2.5), (4.0, 0.5), (6.0, 1.5)]
+CROWN = [(1.0, 0.5), (6.0, 0.8), (5.0, 2.5), (4.0, 1.0), (2.0, 2.4)]  # counterclockwise: the soil is inside
+
+
+def on_segments(points, closed):
+    """Points densely on a polyline; an open one goes on beyond its ends."""
+    points = np.array(points)
+    ends = np.roll(points, -1, axis=0) if closed else points[1:]
+    starts = (points if closed else points[:-1]).copy()
+    if not closed:
+        starts[0] -= 10 * (ends[0] - starts[0])
+        ends[-1] += 10 * (ends[-1] - starts[-1])
+    t = np.linspace(0, 1, 40001)[:, None]
+    return np.concatenate([a + t * (b - a) for a, b in zip(starts, ends, strict=True)])
+
+
+def inside(points, x):
+    """Whether x is in a closed polygon: the number of its segments to the right of x is odd."""
+    a, b = np.array(points), np.roll(points, -1, axis=0)
+    spans = (a[:, 1] > x[1]) != (b[:, 1] > x[1])
+    return (
+        np.sum(
+            spans & (x[0] < a[:, 0] + (x[1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / np.where(spans, b[:, 1] - a[:, 1], 1))
+        )
+        % 2
+    )
+
+
+def test_distances_are_those_to_the_nearest_point():
+    model = mpm.Model(box((7, 3), (7.0, 3.0)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    volume = 1e-12
+    model.seed_points([(1.0, 1.0)], [volume], density=1.0)
+    ring, hole = mpm.Polyline(CROWN, closed=True), mpm.Polyline(CROWN[::-1], closed=True)
+    line, turned = mpm.Polyline(ZIGZAG), mpm.Polyline(ZIGZAG[::-1])
+    dense, dense_ring = on_segments(ZIGZAG, False), on_segments(CROWN, True)
+    corner, far = np.array([2.0, 1.0]), np.array([4.0, 2.0])
+
+    def of(surface):
+        return model.gap(surface) + 0.5 * volume**0.5
+
+    for x in np.random.default_rng(1).uniform((0.1, 0.1), (6.9, 2.9), (60, 2)):
+        model.place(x[None])
+        nearest = np.linalg.norm(dense - x, axis=1).min()
+        assert abs(of(line)) == pytest.approx(nearest, abs=1e-3) and of(turned) == pytest.approx(-of(line), abs=1e-12)
+        nearest = np.linalg.norm(dense_ring - x, axis=1).min()
+        assert abs(of(ring)) == pytest.approx(nearest, abs=1e-3) and of(hole) == pytest.approx(-of(ring), abs=1e-12)
+        assert (of(ring) > 0) == inside(CROWN, x)
+        assert of(mpm.Disc((3, 1), 0.7)) == pytest.approx(np.hypot(*(x - (3, 1))) - 0.7, abs=1e-12)
+        beyond = np.maximum(corner - x, x - far)
+        assert of(mpm.Box(corner, far)) == pytest.approx(
+            np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0), abs=1e-12
+        )
 
 
 def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):

@@ -1,0 +1,42 @@
+"""Contact with rigid surfaces on several ranks: the motion and the reactions of one."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, spread_box
+
+import mpm_core as mpm
+
+pytestmark = pytest.mark.filterwarnings("ignore:nothing holds the particles")
+
+
+def sliding_block(comm, owners_of=bands):
+    """A soft block that slides down a polyline towards a disc, across the borders of the ranks."""
+    mesh = spread_box((24, 10), (6.0, 2.5), comm, owners_of, diagonals="alternating")
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+    grid = 0.0625 * (np.indices((16, 8)).reshape(2, -1).T + 0.5) + (1.003, 1.007)  # no point on a side of a cell
+    model.seed_points(grid, np.full(len(grid), 0.0625**2), density=1000.0)
+    model.set_gravity((4.0, -9.0))
+    ground = model.add_contact(mpm.Polyline([(0.5, 0.99), (3.0, 0.95), (5.5, 0.7)]), friction=0.2)
+    disc = model.add_contact(mpm.Disc((3.2, 1.2), 0.3), friction=0.4, velocity=(-0.5, 0.0))
+    return model, ground, disc
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_motion_and_reactions_are_the_same_on_any_partition(comm, owners_of):
+    runs = [sliding_block(comm, owners_of), sliding_block(MPI.COMM_SELF)]
+    for model, *_ in runs:
+        list(model.explicit(0.8, dt=1e-3))
+    names = (*FIELDS, "contact_slip_0", "contact_slip_1")
+    assert_same(all_by_id(runs[0][0], names), all_by_id(runs[1][0], names))
+    for one, other in zip(runs[0][1:], runs[1][1:], strict=True):
+        for name in ("force", "impulse", "moment", "displacement"):
+            value = getattr(other, name)
+            assert getattr(one, name) == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max())
+    assert runs[0][2].impulse[0] > 0  # the disc was hit
+
+
+def test_an_overlap_on_one_rank_is_refused_on_all(comm):
+    model, *_ = sliding_block(comm)
+    with pytest.raises(mpm.InputError, match="overlaps the soil by"):
+        model.add_contact(mpm.Disc((2.0, 2.0), 0.55))
