@@ -108,3 +108,52 @@ def test_suction_adds_to_effective_stress_and_does_not_pull_at_the_surface():
         exact = -(18e3 * (height - z) - effective * np.log(effective) / alpha)
         errors.append(np.abs(fem.points.stress[:, 1] - exact).max() / 18e3)
     assert errors[1] < 0.1 * height / 24 and errors[0] / errors[1] > 1.8
+
+
+def test_suction_presses_particles_at_the_surface_as_it_does_finite_elements():
+    # Under a uniform suction s the pores of a block push on its free surface alone: s times its width from above, and nothing
+    # on the whole of a block that is free all around.
+    from fenics_bridge.transfer.particle_forces import seepage_forces
+
+    domain, cell_tags, facet_tags = bridge.box_mesh(comm, (4.0, 3.0), (8, 6), body=((1.0, 1.0), (3.0, 2.0)))
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), mpm.LinearElastic(young=5e6, poisson=0.3))
+    model.seed(density=2e3, per_cell=6, cell_tag=bridge.BODY)
+    force, y = seepage_forces(model, lambda x: -7e3 + 0 * x[:, 0]), model.particles.position[:, 1]
+    assert force.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert force[y > 1.5, 1].sum() == pytest.approx(-7e3 * 2.0)
+    assert not seepage_forces(model, lambda x: 7e3 + 0 * x[:, 0]).any()
+
+
+# --- factors of safety -----------------------------------------------------------------------------------------------
+
+FRICTION, COHESION, SATURATED, SLOPE = np.radians(30.0), 1e3, 20e3, np.radians(20.0)
+SUCTION = 0.8 * WEIGHT  # Pa, uniform, of which half is effective
+
+
+@pytest.mark.parametrize(
+    "water_pressure, unit_weight",
+    [
+        (lambda d: 0.0 * d, 18e3),
+        (lambda d: WEIGHT * np.cos(SLOPE) ** 2 * d, SATURATED),
+        (lambda d: -0.5 * SUCTION + 0 * d, 18e3),
+    ],
+    ids=["dry", "seepage parallel to the slope", "suction"],
+)
+def test_an_infinite_slope_has_the_factor_of_its_closed_form(water_pressure, unit_weight):
+    # F = [c + (gamma d cos^2 b - p) tan(phi)] / (gamma d sin b cos b) at the base, d below the surface; for p = gamma_w d cos^2 b
+    # and no cohesion that is gamma' tan(phi) / (gamma tan b). The ends add what falls with the length: two lengths give the limit.
+    depth, found = 1.0, []
+    for length in (20.0, 40.0):
+        domain, _, facet_tags = bridge.box_mesh(comm, (length, depth), (int(2 * length), 4))
+        domain.geometry.x[:, 1] -= np.tan(SLOPE) * domain.geometry.x[:, 0]
+        law = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=COHESION, friction_angle=30.0, dilation_angle=30.0)
+        fem = bridge.QuasiStatic(domain, law, facet_tags, SUPPORTS)
+        fem.reconfigure(pore_pressure=lambda x: water_pressure(depth - x[:, 1] - np.tan(SLOPE) * x[:, 0]))
+        safety = bridge.factor_of_safety(fem, bridge.Load(unit_weight=unit_weight), start=0.4, tolerance=1e-3)
+        assert safety.failed
+        found.append(0.5 * (safety.value + safety.failed_at))
+    weight = unit_weight * depth
+    normal = weight * np.cos(SLOPE) ** 2 - water_pressure(depth)
+    exact = (COHESION + normal * np.tan(FRICTION)) / (weight * np.sin(SLOPE) * np.cos(SLOPE))
+    assert found[0] > found[1] > exact
+    assert 2 * found[1] - found[0] == pytest.approx(exact, rel=0.02)
