@@ -1,4 +1,4 @@
-"""A bank whose reservoir falls: its factor of safety over time by finite elements.
+"""A bank whose reservoir falls: its factor of safety over time by finite elements, and its slide by particles (`--slide`).
 
 The site is a TOML file (`meshes/drawdown.toml` unless another is given): mesh, soils, supports, and the level of the reservoir in
 time. Seepage in time gives pore pressures, strength reduction the factor of safety at chosen times. Its limits stand beside it:
@@ -15,6 +15,7 @@ from common.files import OutputError
 from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
+from common.water_slides import add_slide_options
 from common.water_slope_runs import water_slope_study
 from common.water_site import DAY
 from common.water_slopes import add_water_slope_options, safety, steady_safety
@@ -27,6 +28,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_water_slope_options(p, "drawdown", days=60.0, suction=False)
+    add_slide_options(p)
     return p
 
 

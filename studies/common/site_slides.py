@@ -73,11 +73,14 @@ class Slide:
             self.frames.append(frame)
 
 
-def slide(a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt) -> tuple[Slide, str | None]:
+def slide(
+    a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt, update: Callable[[], None] = lambda: None
+) -> tuple[Slide, str | None]:
     """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective.
 
     Args:
         a: options with time, frames, damping, pic and nmd.
+        update: called after each frame, such as for loads that change with the shape of the body.
     """
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,
@@ -91,6 +94,7 @@ def slide(a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt) ->
                 model.time + a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd
             ):
                 result.look(report)
+                update()
                 progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")
                 if interrupt.requested():
                     return result, f"interrupted at {report.time:g} s"

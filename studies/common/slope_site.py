@@ -1,6 +1,6 @@
 """A site of slopes under water that rises, falls or rains on them: mesh, soils with law and conductivity, supports, and water.
 
-`meshes/drawdown.toml` is an example. The file has the keys of a site of stages (but for the stages) and
+`meshes/drawdown.toml` and `meshes/rain.toml` are examples. The file has the keys of a site of stages (but for the stages) and
 those of a site of seepage: each soil has a law of effective stresses, a unit weight, conductivity and a retention curve. Cells of
 the mesh that no soil names are air, or water, into which the soil may slide.
 """
@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
+from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .site_file import Site, read_toml, site_of
 from .water_site import SOIL_KEYS, condition, porous_soil
@@ -58,6 +60,19 @@ class SlopeSite:
             for c in self.boundary
             if isinstance(c, water.Reservoir)
         ]
+
+    def free_water(self, time: float) -> Callable:
+        """Pressure [Pa] of the reservoirs at a time [s] at positions outside of the soil; zero above them. Collective."""
+        reservoirs = [(value_at(condition.level, time), x[0], x[-1]) for condition, x, _ in self.ground()]
+
+        def pressure(points: np.ndarray) -> np.ndarray:
+            depth = np.zeros(len(points))
+            for level, left, right in reservoirs:
+                beside = (points[:, 0] >= left - 1e-6) & (points[:, 0] <= right + 1e-6)
+                depth = np.maximum(depth, np.where(beside, level - points[:, 1], 0.0))
+            return WATER_WEIGHT * depth
+
+        return pressure
 
     def elements(
         self, degree: int, pore_pressure: Callable, laws: dict | None = None, **options: Any

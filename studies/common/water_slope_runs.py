@@ -14,9 +14,11 @@ import fenics_bridge as bridge
 from .collapse_runs import UNDECIDED
 from .page import Page
 from .results import open_results
+from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
 from .water_site import DAY
+from .water_slides import slide_of
 from .water_slope_plots import CAPTIONS, slope_pictures
 from .water_slopes import failure_time, follow, lowest
 
@@ -27,7 +29,7 @@ def water_slope_study(a: Namespace, limits_of: Callable[[Namespace, SlopeSite], 
     """Carry out a study of a slope and its water; returns its exit code. Collective.
 
     Args:
-        a: options, with those of `add_water_slope_options`.
+        a: options, with those of `add_water_slope_options` and `add_slide_options`.
         limits_of: function of options and site that returns factors of safety to compare with, by name.
     """
     start = perf_counter()
@@ -43,10 +45,15 @@ def water_slope_study(a: Namespace, limits_of: Callable[[Namespace, SlopeSite], 
         "lowest_factor_time_days": worst.time / DAY, "failure_time_days": None if failed is None else failed / DAY,
         "last_factor_of_safety": instants[-1].safety.value, "failure_shown": shown,
         "limits": [{"limit": name, "factor_of_safety": found.value} for name, found in limits.items()],
-        "wall_seconds": perf_counter() - start,
     }  # fmt: skip
+    movies, pictures, code = [], {}, 0
+    if a.slide and failed is not None:
+        slid, movies, pictures, code = slide_of(a, slope, instants, folder)
+        summary |= slid
+    summary["wall_seconds"] = perf_counter() - start
     values = {name: found.value for name, found in limits.items()}
-    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), slope_pictures(folder, instants, values))
+    page = Page(movies=movies, captions=CAPTIONS | SLIDE_CAPTIONS)
+    write_summary(folder, a, summary, comm, page, slope_pictures(folder, instants, values) | pictures)
     if comm.rank == 0:
         fails = "stands" if failed is None else f"fails after {failed / DAY:.3g} days"
         print(f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {worst.time / DAY:.3g} days")
@@ -55,4 +62,4 @@ def water_slope_study(a: Namespace, limits_of: Callable[[Namespace, SlopeSite], 
         if stopped:
             print(f"the run ended early: {stopped}", file=sys.stderr)
         print(f"results in {folder}")
-    return 1 if stopped else 0 if shown else UNDECIDED
+    return 1 if stopped else code or (0 if shown else UNDECIDED)

@@ -44,7 +44,7 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
     add_number(p, "--slower", 1.0, "-", "factor on the times of all tables of the site", above=0)
     add_count(p, "--factor-times", 6, "times, evenly over --days, at which the factor of safety is found, beside the beginning, "
               "the corners of the site's tables and three times before each of them")  # fmt: skip
-    add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
+    add_number(p, "--start", 0.3, "-", "first factor that is tried; the slope must stand with it", above=0)
     add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives to soil of less "
                "dilation; otherwise with the flow that the site gives")  # fmt: skip
     add_switch(p, "--suction", suction, "suction times effective saturation adds to effective stress (Bishop)")
@@ -54,7 +54,7 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
 class Instant:
     """The slope at one time.
 
-    time: [s]; safety: its factor; pore_pressure: function of positions; picture: of the flow, on the first rank
+    time: [s]; safety: its factor; pore_pressure: function of positions, in reservoirs too; picture: of the flow, on the first rank
     """
 
     time: float
@@ -133,7 +133,7 @@ def follow(a: Namespace, slope: SlopeSite, folder: Path) -> tuple[list[Instant],
             if stopped:
                 break
             days = f"{time / DAY:.3g} days"
-            pressure = flow.pore_pressure(a.suction)
+            pressure = flow.pore_pressure(a.suction, outside=slope.free_water(time))
             picture = flow_picture(flow, f"After {days}" if time else "At the beginning", slope.ground())
             instants.append(Instant(time, safety(a, slope, pressure, days), pressure, picture))
             files.add(instants[-1])

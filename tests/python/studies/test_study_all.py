@@ -30,6 +30,7 @@ SMALL = {
     "footing": "--cell-size 0.25 --meshes 1 --elements P1",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
+    "rain": "--cell-size 3 --elements P1 --days 3 --factor-times 1",
     "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
     "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
     "scaling": "--side-2d 4 --side-3d 2 --steps 2",

@@ -1,4 +1,4 @@
-"""The study drawdown: its sites, the limits of the factor of safety, and its course."""
+"""The studies drawdown and rain: their sites, the limits of the factor of safety, its course, and the slide."""
 
 import importlib
 import json
@@ -79,3 +79,53 @@ def test_slower_tables_take_longer(tmp_path):
     path = site("drawdown", tmp_path)
     one, ten = (read_slope_site(path, MPI.COMM_WORLD, 3.0, slower).times(1e9) for slower in (1.0, 10.0))
     assert one == [3 * 86400.0] and ten == [30 * 86400.0]
+
+
+# --- the slide -------------------------------------------------------------------------------------------------------
+
+
+def test_the_slide_begins_in_equilibrium_and_gathers_speed(tmp_path):
+    # Particles on the cells of the finite elements, under the same pore pressures, are in equilibrium to round-off; then the
+    # slope, too weak for them, moves ever faster.
+    path = site("drawdown", tmp_path, ("= 4e3", "= 2e3"), ("= 27.0", "= 20.0"))
+    options = "--days 3 --slide --slide-from lowest --time 1 --frames 4 --particles-per-cell 3 --no-film"
+    summary, rows = run("drawdown", path, tmp_path, options)
+    assert summary["slide_from_days"] == summary["lowest_factor_time_days"] == 3.0
+    assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_share"] == 0.0
+    moved = np.genfromtxt(tmp_path / "results" / "history.csv", delimiter=",", names=True)["largest_displacement_m"]
+    assert moved[0] == 0.0 and np.all(np.diff(moved, 2) > 0) and moved[-1] > 0.1
+
+
+def test_a_slope_that_stands_does_not_slide(tmp_path):
+    path = site("drawdown", tmp_path, ("cohesion = 4e3", "cohesion = 40e3"), ("cohesion = 8e3", "cohesion = 40e3"))
+    summary, rows = run("drawdown", path, tmp_path, "--days 3 --slide")
+    assert rows["factor_of_safety"].min() > 1 and summary["failure_time_days"] is None
+    assert "largest_displacement_m" not in summary
+
+
+# --- rain ------------------------------------------------------------------------------------------------------------
+
+TABLE = "[[0.0, 0.5], [2.0, 100.0], [10.0, 100.0], [12.0, 0.5]]"
+
+
+def test_rain_takes_the_suction_away_that_holds_a_slope(tmp_path):
+    summary, rows = run("rain", site("rain", tmp_path), tmp_path, "--days 10")
+    factors = rows["factor_of_safety"]
+    without = summary["limits"][0]["factor_of_safety"]
+    assert factors[0] > 1.2 * without
+    assert factors[-1] < 0.8 * factors[0] and np.all(np.diff(factors) < 0.006 * factors[:-1])
+    assert np.all(np.diff(rows["stored_water_m2"]) > 0)
+
+
+def test_a_slope_in_steady_rain_keeps_its_factor(tmp_path):
+    summary, rows = run(
+        "rain", site("rain", tmp_path, (TABLE, "[[0.0, 0.5], [8.0, 0.5]]")), tmp_path, "--days 8 --no-suction"
+    )
+    factors, without = rows["factor_of_safety"], summary["limits"][0]["factor_of_safety"]
+    assert len(factors) == 5 and factors == pytest.approx(without, rel=1e-9)
+
+
+def test_a_site_without_rain_is_refused(tmp_path):
+    path = site("rain", tmp_path, (f"rain = {TABLE}", "seepage_face = true"))
+    with pytest.raises(InputError, match="no boundary has rain"):
+        run("rain", path, tmp_path, "--days 1")

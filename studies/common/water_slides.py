@@ -1,0 +1,107 @@
+"""The slide of a slope that its water brings to failure: particles take over from finite elements, under the pore pressures of failure."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.transfer.particle_forces import seepage_forces
+
+from .figures import Pictures
+from .interrupt import Interrupt
+from .movie import Movie
+from .options import add_choice, add_count, add_flag, add_number, add_switch
+from .output_options import add_picture_options
+from .scenes import scene_of
+from .schemes import add_pic
+from .site_slides import slide, slide_pictures
+from .slope_site import SlopeSite
+from .water_site import DAY
+from .water_slopes import Instant, lowest
+
+comm = MPI.COMM_WORLD
+HOLDING = 0.9
+"""Part of the factor of safety by which the strength is divided in the equilibrium that particles take over"""
+
+
+def add_slide_options(parser: ArgumentParser) -> None:
+    """Option ``--slide``, and those of the slide."""
+    p = parser
+    add_flag(p, "--slide", "where the slope fails, follow its slide by particles")
+    add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
+               "the slide begins at the first factor below 1 that was found, or at the lowest one")  # fmt: skip
+    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_number(p, "--damping", 0.0, "-", "local damping of the slide", at_least=0, below=1)
+    add_pic(p, 0.01)
+    add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
+    add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
+    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
+    add_picture_options(p)
+
+
+def slide_of(
+    a: Namespace, slope: SlopeSite, instants: list[Instant], folder: Path
+) -> tuple[dict, list[Movie], Pictures, int]:
+    """The slide of a slope that fails: entries of the summary, movies, pictures, exit code. Collective.
+
+    Args:
+        a: options of `add_slide_options`.
+        instants: of which at least one has a factor below 1.
+    """
+    failing = [instant for instant in instants if instant.safety.value < 1.0]
+    instant = failing[0] if a.slide_from == "failure" else lowest(failing)
+    model, handover, act = handed_over(a, slope, instant)
+    scene = scene_of(model, sorted(slope.site.laws))
+    with Interrupt(comm) as interrupt:
+        result, stopped = slide(a, model, folder, interrupt, act)
+    moved = result.history["largest_displacement_m"][-1]
+    if comm.rank == 0:
+        print(f"slide from {instant.time / DAY:.3g} days on: largest displacement {moved:.3f} m after "
+              f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
+        if stopped:
+            print(f"the slide ended early: {stopped}", file=sys.stderr)
+    summary = {
+        "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
+        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_share": handover.yielded_share,
+        "particles": comm.allreduce(len(model.particles)),
+    }  # fmt: skip
+    movies = [Movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)] if scene is not None else []
+    code = interrupt.exit_code or (1 if stopped else 0)
+    return summary, movies, slide_pictures(a, result, scene, folder), code
+
+
+def handed_over(
+    a: Namespace, slope: SlopeSite, instant: Instant
+) -> tuple[mpm.Model, bridge.Handover, Callable[[], None]]:
+    """Particles at an instant of failure: in equilibrium with a strength with which the slope stands, then with their own. Collective.
+
+    Pore pressures stay in space as they are at this instant, without suction, while the soil moves through them; the function
+    that is returned too lets them act on the particles where these are now.
+    """
+    site = slope.site
+
+    def pressure(points: np.ndarray) -> np.ndarray:
+        return np.maximum(instant.pore_pressure(points), 0.0)
+
+    stronger = bridge.reduced_strength(site.laws, HOLDING * instant.safety.value)
+    fem = slope.elements(1, pressure, stronger, solver=bridge.Solver(tolerance=1e-10))
+    fem.solve(site.load())
+    if not fem.converged:
+        raise mpm.RunError(f"no equilibrium for the particles to begin with, at {instant.time / DAY:.3g} days")
+    model = site.particles(a.particles_per_cell, stronger, more=list(site.laws.values()))
+    nodal = pressure(model.mesh.points)
+
+    def act() -> None:
+        model.particles.set("traction", seepage_forces(model, lambda points: nodal))
+
+    act()
+    handover = bridge.initialise(model, fem, count_displacement=False)
+    model.assign(model.particles.material + len(site.laws))
+    return model, handover, act

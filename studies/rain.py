@@ -1,0 +1,47 @@
+"""An unsaturated slope in the rain: its factor of safety over time by finite elements, and its slide by particles (`--slide`).
+
+The site is a TOML file (`meshes/rain.toml` unless another is given): mesh, soils with retention curves, supports, and the rain in
+time. Suction times effective saturation adds to the effective stress (Bishop 1959), until rain takes it away; strength reduction
+finds the factor of safety at chosen times. Beside it stands that of the beginning without suction.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from common.files import OutputError
+from common.options import study_parser
+from common.ranks import run_study
+from common.slope_site import SlopeSite
+from common.water_slides import add_slide_options
+from common.water_slope_runs import water_slope_study
+from common.water_slopes import add_water_slope_options, safety
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_water_slope_options(p, "rain", days=15.0, suction=True)
+    add_slide_options(p)
+    return p
+
+
+def limits(a: Namespace, slope: SlopeSite) -> dict[str, bridge.Collapse]:
+    """The factor of safety at the beginning without what suction adds to it. Collective."""
+    if not any(isinstance(condition, water.Rain) for condition in slope.boundary):
+        raise mpm.InputError(f"{a.site}: no boundary has rain, expected one or more")
+    flow = slope.seepage()
+    flow.solve()
+    return {"at the beginning, without suction": safety(a, slope, flow.pore_pressure(), "without suction")}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    return water_slope_study(parser().parse_args(arguments), limits)
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)
