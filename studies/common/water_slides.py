@@ -69,7 +69,7 @@ def slide_of(
             print(f"the slide ended early: {stopped}", file=sys.stderr)
     summary = {
         "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
-        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_share": handover.yielded_share,
+        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
     }  # fmt: skip
     movies = [Movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)] if scene is not None else []

@@ -146,8 +146,8 @@ def failure_time(instants: list[Instant]) -> float | None:
     for before, after in zip([instants[0], *instants], instants):
         if after.safety.value < 1.0:
             fell = before.safety.value - after.safety.value
-            share = (before.safety.value - 1.0) / fell if fell > 0 else 1.0
-            return before.time + share * (after.time - before.time)
+            fraction = (before.safety.value - 1.0) / fell if fell > 0 else 1.0
+            return before.time + fraction * (after.time - before.time)
     return None
 
 

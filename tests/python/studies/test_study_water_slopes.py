@@ -91,7 +91,7 @@ def test_the_slide_begins_in_equilibrium_and_gathers_speed(tmp_path):
     options = "--days 3 --slide --slide-from lowest --time 1 --frames 4 --particles-per-cell 3 --no-film"
     summary, rows = run("drawdown", path, tmp_path, options)
     assert summary["slide_from_days"] == summary["lowest_factor_time_days"] == 3.0
-    assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_share"] == 0.0
+    assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_fraction"] == 0.0
     moved = np.genfromtxt(tmp_path / "results" / "history.csv", delimiter=",", names=True)["largest_displacement_m"]
     assert moved[0] == 0.0 and np.all(np.diff(moved, 2) > 0) and moved[-1] > 0.1
 
