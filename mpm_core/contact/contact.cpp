@@ -191,15 +191,19 @@ std::optional<Vector<D>> particle_force(const Contact<D>& contact, const Press<D
   }
   const auto [distance_now, normal] = distance<D>(contact.surface, x);
   const double depth = particle_radius<G>(particles, p) - distance_now - dot<D>(motion, normal);
+  const bool touches = depth > 0;
   if (press.slips)
   {
-    for (int i = 0; i < D; ++i)
-      slip[i] = (*press.slips)[static_cast<std::size_t>(i)][p];
-    update_slip<D>(normal, motion, contact.friction * std::max(depth, 0.0), slip);
+    if (touches)
+    {
+      for (int i = 0; i < D; ++i)
+        slip[i] = (*press.slips)[static_cast<std::size_t>(i)][p];
+      update_slip<D>(normal, motion, contact.friction * depth, slip);
+    }
     for (int i = 0; i < D; ++i)
       (*press.slips)[static_cast<std::size_t>(i)][p] = slip[i];
   }
-  if (!(depth > 0))
+  if (!touches)
     return std::nullopt;
   Vector<D> force;
   for (int i = 0; i < D; ++i)

@@ -58,7 +58,14 @@ void bind_contacts_of(py::module_& m)
            const std::vector<double>& times, const std::vector<Vector<D>>& velocities, double start,
            const Vector<D>& reference, const std::string& slip)
         {
-          Contact<D> contact{surface, friction, penalty, {times, velocities}, start, reference, slip};
+          Contact<D> contact{};
+          contact.surface = surface;
+          contact.friction = friction;
+          contact.penalty = penalty;
+          contact.motion = {times, velocities};
+          contact.start = start;
+          contact.reference = reference;
+          contact.slip = slip;
           model.contacts.push_back(std::move(contact));
         });
   m.def("clear_contacts", [](Model<G>& model) { model.contacts.clear(); });
