@@ -40,3 +40,19 @@ def test_an_overlap_on_one_rank_is_refused_on_all(comm):
     model, *_ = sliding_block(comm)
     with pytest.raises(mpm.InputError, match="overlaps the soil by"):
         model.add_contact(mpm.Disc((2.0, 2.0), 0.55))
+
+
+def test_a_run_goes_on_after_a_repartition_and_on_other_ranks(comm, shared_path):
+    path = shared_path / "there.h5"
+    model, *_ = sliding_block(comm)
+    list(model.explicit(0.3, dt=1e-3))
+    model.save(path)
+    model.rebalance()
+    alone = sliding_block(MPI.COMM_SELF)[0]
+    alone.restore(path)
+    for each in (model, alone):
+        list(each.explicit(0.8, dt=1e-3))
+    names = (*FIELDS, "contact_slip_0", "contact_slip_1")
+    assert_same(all_by_id(model, names), all_by_id(alone, names))
+    for one, other in zip(model.contacts, alone.contacts, strict=True):
+        assert one.impulse == pytest.approx(other.impulse, rel=1e-8, abs=1e-8 * np.abs(other.impulse).max())

@@ -157,14 +157,17 @@ KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, 
 
 
 class RigidContact:
-    """What a rigid surface feels and where it is, as `Model.add_contact` returns it; all is collective."""
+    """What a rigid surface feels and where it is, as `Model.add_contact` returns it; all is collective.
+
+    It is a probe: ``mpm_core.probes.ProbeFile("wall.csv", wall)`` records its histories.
+    """
 
     def __init__(self, model: Model, number: int) -> None:
-        self._model = model
+        self.model = model
         self._number = number
 
     def _state(self, entry: int) -> NDArray[np.float64]:
-        return np.array(_core.contact_state(self._model._core, self._number)[entry])
+        return np.array(_core.contact_state(self.model._core, self._number)[entry])
 
     @property
     def force(self) -> NDArray[np.float64]:
@@ -187,6 +190,15 @@ class RigidContact:
     def displacement(self) -> NDArray[np.float64]:
         """Displacement of the surface since it was added [m], shape (D,)."""
         return self._state(3)
+
+    def values(self) -> dict[str, float]:
+        """Numbers by name of column, as a probe gives them: time, force, impulse, moment, displacement."""
+        axes = "xyz"[: self.model.mesh.dim]
+        state = _core.contact_state(self.model._core, self._number)
+        columns = [("force", "N", axes), ("impulse", "N.s", axes), ("moment", "N.m", "xyz"[3 - len(state[2]) :])]
+        columns.append(("displacement", "m", axes))
+        names = [f"{name}_{axis}_{unit}" for name, unit, along in columns for axis in along]
+        return {"time_s": self.model.time, **dict(zip(names, np.concatenate(state).tolist(), strict=True))}
 
 
 Velocity: TypeAlias = ArrayLike | tuple[Sequence[float], ArrayLike] | None

@@ -5,6 +5,7 @@ import pytest
 from core_cases import box
 
 import mpm_core as mpm
+from mpm_core.probes import ProbeFile
 
 G = 9.81
 pytestmark = pytest.mark.filterwarnings("ignore:nothing holds the particles")
@@ -123,7 +124,7 @@ def test_momentum_is_that_of_gravity_and_contact_and_no_energy_is_made(stress_up
         assert np.array(report.momentum) + ground.impulse == pytest.approx(start, abs=1e-10 * np.abs(start).max())
         assert report.external_work <= 1e-9 * before.kinetic_energy  # of the contact, the only force from outside
     assert turn[:, 1] @ ground.impulse < 0  # the plane has been hit
-    assert abs(report.unexplained_share) < 0.02
+    assert abs(report.unexplained_fraction) < 0.02
     assert report.kinetic_energy + report.stored_energy < before.kinetic_energy
 
 
@@ -206,6 +207,19 @@ def test_distances_are_those_to_the_nearest_point():
         assert of(mpm.Box(corner, far)) == pytest.approx(
             np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0), abs=1e-12
         )
+
+
+def test_a_surface_is_a_probe(tmp_path):
+    model, plane, _ = block()
+    model.set_gravity((0, -G), ramp=0.1)
+    ground = model.add_contact(plane, friction=0.3, velocity=(0.1, 0.0))
+    with ProbeFile(tmp_path / "ground.csv", ground) as file:
+        for _ in model.explicit(0.2, every=0.1):
+            file.record()
+    rows = np.genfromtxt(tmp_path / "ground.csv", delimiter=",", names=True, deletechars="")
+    assert rows["time_s"] == pytest.approx([0.1, 0.2]) and rows["displacement_x_m"] == pytest.approx([0.01, 0.02])
+    last = [rows[name][-1] for name in ("force_x_N", "force_y_N", "impulse_y_N.s", "moment_z_N.m")]
+    assert last == pytest.approx([*ground.force, ground.impulse[1], *ground.moment], rel=1e-6)
 
 
 def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
