@@ -22,7 +22,7 @@ template <class G>
 void find_means(const Mesh<G::dim>& mesh, NodeExchange& exchange, const ExplicitOptions& options, double dt,
                 VelocityField<G>& field)
 {
-  if (options.mixed_discretisation)
+  if (options.nmd)
     average_strains(mesh, exchange, field, dt);
   if (options.integration == Integration::dual_domain)
     average_gradients(mesh, exchange, field);
@@ -35,7 +35,7 @@ template <class G>
 void update_particles(Model<G>& model, const ExplicitOptions& options, double dt, bool stress, PhaseClock& clock)
 {
   clock.begin(Phase::particles);
-  particle_pass(model, {dt, true, stress, options.pic_fraction, options.mixed_discretisation, dt});
+  particle_pass(model, {dt, true, stress, options.pic_fraction, options.nmd, dt});
   agree_on_failure(model);
   if (model.failure)
     return;
@@ -116,7 +116,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
     find_means(model.mesh, model.exchange, options, dt, field);
   }
   clock.begin(Phase::particles);
-  particle_pass(model, {dt, false, true, 0, options.mixed_discretisation, dt});
+  particle_pass(model, {dt, false, true, 0, options.nmd, dt});
   clock.begin(Phase::node_sums);
   map_to_nodes(model); // the stresses have changed
   clock.begin(Phase::momentum);
@@ -140,7 +140,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = options.integration;
-    field.integration.averaged = options.mixed_discretisation;
+    field.integration.average_stress = options.nmd;
   }
   model.last.dt = dt;
   begin_contacts(model, {model.time, dt});

@@ -19,7 +19,7 @@ struct ExplicitOptions
   StressUpdate stress_update = StressUpdate::modified_last;
   double damping = 0;      ///< local damping alpha of FLAC, in [0, 1)
   double pic_fraction = 0; ///< of a step, in [0, 1]
-  bool mixed_discretisation = false;
+  bool nmd = false;        ///< nodal mixed discretisation
   Integration integration = Integration::particles;
 };
 

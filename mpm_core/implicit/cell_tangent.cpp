@@ -150,7 +150,7 @@ CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const
   }
   if (!options.hold_positions)
     add_spin(c, stress, strain, tangent);
-  if (options.mixed_discretisation)
+  if (options.nmd)
     split_volumetric(c, tangent);
   if (options.average_stress)
     split_mean_stress(tangent);

@@ -35,7 +35,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.time = model.time;
   step.length = dt;
   field.integration.kind = options.integration;
-  field.integration.averaged = options.average_stress;
+  field.integration.average_stress = options.average_stress;
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   if (options.quasi_static)
@@ -73,7 +73,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   VelocityField<G>& field = model.fields.front();
   // Trial: stresses under u = dt v, from the step's start (I2)
   update(step.halos.nodes, field.velocity);
-  if (step.options.mixed_discretisation)
+  if (step.options.nmd)
     average_strains(mesh, exchange, field, step.dt); // (T6)
   const auto count = try_stresses(mesh, material_points(model), field, tangents, step);
   if (step.options.average_stress)
@@ -106,7 +106,7 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
   add_ghost_entries(step, stiffness);
   add_inertia_entries(field, step, system.owned, stiffness);
   add_support_entries(system, stiffness);
-  if (!step.options.mixed_discretisation)
+  if (!step.options.nmd)
     return;
   volumetric_force_entries(mesh, step, system, tangent.volumetric_force);
   volumetric_strain_entries(mesh, field, system, tangent.volumetric_strain);
@@ -160,13 +160,13 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
 {
   const ImplicitOptions& options = step.options;
   VelocityField<G>& field = model.fields.front();
-  if (options.mixed_discretisation)
+  if (options.nmd)
     average_strains(model.mesh, model.exchange, field, step.dt);
   find_acceleration(step, field);
   const double pic = pic_fraction(model, step);
   find_velocity_change(field, pic, step.dt);
   const auto start = model.particles;
-  particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.mixed_discretisation, law_dt(step),
+  particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step),
                         options.hold_positions}); // (18), (20), stresses
   agree_on_failure(model);
   if (model.failure)

@@ -11,9 +11,9 @@ namespace mpm
 {
 struct ImplicitOptions
 {
-  double damping = 0; ///< local damping alpha, in [0, 1), see damped_inertia.h; not used in quasi-static steps
-  double pic = 0;     ///< PIC fraction of a critical time step, in [0, 1]
-  bool mixed_discretisation = false;
+  double damping = 0;          ///< local damping alpha, in [0, 1), see damped_inertia.h; not used in quasi-static steps
+  double pic = 0;              ///< PIC fraction of a critical time step, in [0, 1]
+  bool nmd = false;            ///< nodal mixed discretisation
   bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
   Integration integration = Integration::particles; ///< by particles or mixed
   GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass

@@ -62,7 +62,7 @@ TrialStrain<D> cell_strain(const Mesh<D>& mesh, const VelocityField<G>& field, c
     hoop = step.dt * in_cell.value[0] / mesh.shapes[cell].centre[0];
     add_hoop(strain, hoop);
   }
-  if (step.options.mixed_discretisation)
+  if (step.options.nmd)
     set_volumetric<G>(strain, mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain));
   if (step.options.hold_positions)
   {

@@ -37,7 +37,7 @@ void write_checkpoint(MPI_Comm comm, const std::filesystem::path& path, const Me
 std::string checkpoint_description(MPI_Comm comm, const std::filesystem::path& path);
 
 /// A table for `StateTables::cells` that says which cells each rank owns, and in which order. Needed where the mesh has
-/// been cut anew since the run began, so that a restart can cut it the same way.
+/// been repartitioned since the run began, so that a restart can take the same partition.
 template <int D>
 Table owned_cells_table(const Mesh<D>& mesh);
 

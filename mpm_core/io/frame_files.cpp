@@ -103,7 +103,7 @@ bool FrameFiles::can_image()
   return true;
 }
 
-std::byte* FrameFiles::room()
+std::byte* FrameFiles::buffer()
 {
   if (_next > 0)
     put_values();

@@ -37,10 +37,10 @@ public:
   template <class T>
   std::span<T> next()
   {
-    return {reinterpret_cast<T*>(room()), _datasets[_next - 1].local_bytes() / sizeof(T)};
+    return {reinterpret_cast<T*>(buffer()), _datasets[_next - 1].local_bytes() / sizeof(T)};
   }
 
-  /// Room for all ranks' values of the dataset that `next` gave room for, (rows.total, width) row-major, where ranks
+  /// Memory for all ranks' values of the dataset that `next` opened, (rows.total, width) row-major, where ranks
   /// put the file together in memory; else empty. Each row is to be filled in by one rank, whichever has it.
   template <class T>
   std::span<T> whole() const
@@ -82,7 +82,7 @@ private:
   void read_tables();
   /// Whether the file can be put together in memory; if so, the tables are there.
   bool can_image();
-  std::byte* room();
+  std::byte* buffer();
   /// Writes the values of the latest dataset.
   void put_values();
   void put(const void* bytes, std::size_t count, std::int64_t place);

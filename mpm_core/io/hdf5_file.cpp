@@ -70,7 +70,7 @@ Hdf5File::Hdf5File(MPI_Comm comm, std::filesystem::path path, int user_block, in
                   " characters; it has " + std::to_string(_path.string().size()));
   check();
   const Quiet quiet;
-  if ((_rank == 0 || _by_mpi) && has_room(table_block))
+  if ((_rank == 0 || _by_mpi) && reserve(table_block))
   {
     const hid_t access = access_properties(_comm, _by_mpi);
     const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
@@ -111,7 +111,7 @@ void Hdf5File::note_obstacle(const std::string& reason)
     _failure = "cannot write " + _path.string() + ": " + reason;
 }
 
-bool Hdf5File::has_room(std::int64_t bytes)
+bool Hdf5File::reserve(std::int64_t bytes)
 {
   _needed += bytes;
   std::string obstacle = _rank == 0 ? reservation_obstacle(_path, _needed) : "";
@@ -125,7 +125,7 @@ bool Hdf5File::has_room(std::int64_t bytes)
 void Hdf5File::create_group(const std::string& name)
 {
   const Quiet quiet;
-  if (_file < 0 || !has_room(table_size))
+  if (_file < 0 || !reserve(table_size))
     return;
   const hid_t group = H5Gcreate2(_file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   note(group >= 0, "write");
@@ -140,7 +140,7 @@ std::vector<std::int64_t> Hdf5File::make(std::span<const Dataset> datasets)
   std::int64_t bytes = 0;
   for (const Dataset& dataset : datasets)
     bytes += table_size + dataset.rows.total * dataset.row_bytes();
-  if (_rank == 0 && has_room(bytes))
+  if (_rank == 0 && reserve(bytes))
   {
     const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
     H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); // or the place would not be known yet
@@ -180,7 +180,7 @@ void Hdf5File::write_compressed(const Dataset& dataset, const void* values)
 {
   const RowSlice& rows = dataset.rows;
   const Quiet quiet;
-  if (_file < 0 || !has_room(table_size + rows.total * dataset.row_bytes()))
+  if (_file < 0 || !reserve(table_size + rows.total * dataset.row_bytes()))
     return;
   const int rank = dataset.width == 1 ? 1 : 2;
   const hsize_t columns = static_cast<hsize_t>(dataset.width);
@@ -220,7 +220,7 @@ void Hdf5File::write_compressed(const Dataset& dataset, const void* values)
 void Hdf5File::write_text(const std::string& name, const std::string& text)
 {
   const Quiet quiet;
-  if (_file < 0 || !has_room(table_size + static_cast<std::int64_t>(text.size())))
+  if (_file < 0 || !reserve(table_size + static_cast<std::int64_t>(text.size())))
     return;
   const hid_t type = H5Tcopy(H5T_C_S1);
   H5Tset_size(type, text.size() + 1);

@@ -99,8 +99,8 @@ private:
   void note(bool succeeded, const char* doing);
   /// Takes note of what the system refused.
   void note_obstacle(const std::string& reason);
-  /// Reserves room for more bytes; if it cannot be had, that is noted and they must not be written.
-  bool has_room(std::int64_t bytes);
+  /// Reserves space for more bytes; a failure is noted, and they must not be written.
+  bool reserve(std::int64_t bytes);
 
   MPI_Comm _comm;
   int _rank = 0;

@@ -77,14 +77,14 @@ std::vector<T> Hdf5Input::read(const std::string& name, const RowSlice& rows, in
 {
   const Quiet quiet;
   const auto [total, columns] = shape(name);
-  const std::int64_t room = stored_bytes(name) / (width * static_cast<std::int64_t>(sizeof(T)));
-  if (columns != width || rows.local < 0 || rows.before < 0 || rows.before + rows.local > total || total > room)
+  const std::int64_t stored = stored_bytes(name) / (width * static_cast<std::int64_t>(sizeof(T)));
+  if (columns != width || rows.local < 0 || rows.before < 0 || rows.before + rows.local > total || total > stored)
   {
     reject(name, "it has " + std::to_string(total) + " rows of " + std::to_string(columns) + " in " +
                      std::to_string(stored_bytes(name)) + " bytes, expected at least " +
                      std::to_string(rows.before + rows.local) + " rows of " + std::to_string(width));
     // Never more than the file can hold, whatever it says of itself.
-    return std::vector<T>(rows.local > 0 && rows.local <= room ? static_cast<std::size_t>(rows.local * width) : 0);
+    return std::vector<T>(rows.local > 0 && rows.local <= stored ? static_cast<std::size_t>(rows.local * width) : 0);
   }
   std::vector<T> values(static_cast<std::size_t>(rows.local * width));
   if (total == 0)

@@ -20,8 +20,8 @@ struct Sum
   std::string failure;
 };
 
-/// Sum over this rank's share of the words behind the stamp of the scrambled word and place.
-Sum summed_share(MPI_Comm comm, const std::filesystem::path& path, std::int64_t length)
+/// Sum over this rank's part of the words behind the stamp of the scrambled word and place.
+Sum summed_part(MPI_Comm comm, const std::filesystem::path& path, std::int64_t length)
 {
   int rank = 0, size = 1;
   MPI_Comm_rank(comm, &rank);
@@ -57,7 +57,7 @@ void raise_together(MPI_Comm comm, const char* doing, const std::filesystem::pat
 /// Checksum of a file of this length over all ranks.
 std::uint64_t checksum(MPI_Comm comm, const char* doing, const std::filesystem::path& path, std::int64_t length)
 {
-  Sum sum = summed_share(comm, path, length);
+  Sum sum = summed_part(comm, path, length);
   raise_together(comm, doing, path, sum.failure);
   MPI_Allreduce(MPI_IN_PLACE, &sum.checksum, 1, MPI_UINT64_T, MPI_SUM, comm);
   return sum.checksum;

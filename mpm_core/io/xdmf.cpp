@@ -46,11 +46,11 @@ void add_data_item(std::string& text, const XdmfData& data)
 const std::string document_head = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n";
 const std::string document_end = "</Domain>\n</Xdmf>\n";
 const std::string series_end = "</Grid>\n" + document_end;
-/// The end of a series that has room behind it; and the end of that room.
-const std::string open_end = series_end + "<?room ", room_end = "?>\n";
+/// The end of a series with reserved space behind it; and the end of that space.
+const std::string open_end = series_end + "<?room ", space_end = "?>\n";
 const std::string blank(open_end.size(), ' ');
 
-constexpr std::size_t least_room = 1 << 16;
+constexpr std::size_t least_space = 1 << 16;
 
 /// Spaces to put where the file is this long, so that an end written behind them lies in one page: the system writes
 /// that at once, even if the run is killed meanwhile.
@@ -128,7 +128,7 @@ std::string XdmfSeries::write_single(const std::string& content)
 std::string XdmfSeries::append(const std::string& frame)
 {
   const std::size_t from = _end + open_end.size(), spaces = spaces_before_end(from + frame.size());
-  if (from + frame.size() + spaces + open_end.size() > _room_end)
+  if (from + frame.size() + spaces + open_end.size() > _space_end)
     return rewrite(frame, true);
   _addition.assign(frame).append(spaces, ' ').append(open_end);
   errno = 0;
@@ -141,7 +141,7 @@ std::string XdmfSeries::append(const std::string& frame)
 
 std::string XdmfSeries::finish() { return _file ? rewrite({}, false) : ""; }
 
-std::string XdmfSeries::rewrite(const std::string& frame, bool with_room)
+std::string XdmfSeries::rewrite(const std::string& frame, bool with_space)
 {
   std::string text =
       document_head + "<Grid Name=\"" + _name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
@@ -154,18 +154,18 @@ std::string XdmfSeries::rewrite(const std::string& frame, bool with_room)
     text += before;
   }
   text += frame;
-  if (!with_room)
+  if (!with_space)
     return replaced_file(_path, text + series_end);
   text.append(spaces_before_end(text.size()), ' ');
   const std::size_t end = text.size();
   text += open_end;
-  text.append(std::max(least_room, end), ' ');
-  std::string failure = replaced_file(_path, text + room_end);
+  text.append(std::max(least_space, end), ' ');
+  std::string failure = replaced_file(_path, text + space_end);
   if (!failure.empty())
     return failure;
   _frames = frames;
   _end = end;
-  _room_end = text.size();
+  _space_end = text.size();
   _file.emplace(_path.c_str(), O_RDWR);
   return {};
 }

@@ -40,7 +40,7 @@ inline const char* const end_of_frame = "</Grid>\n";
 ///
 /// A frame is added without writing those before it once more. The file goes on after the document's end with a
 /// processing instruction of many spaces, which readers skip. A frame, and the document's new end, are written among
-/// these spaces; then the old end, with the beginning of the instruction, is blotted out. When there is no room left,
+/// these spaces; then the old end, with the beginning of the instruction, is blotted out. When the space is used up,
 /// or at the end, the whole file is written aside and renamed.
 ///
 /// Functions give what went wrong, with path and reason; an empty text if nothing did.
@@ -55,19 +55,19 @@ public:
   std::string write_single(const std::string& content);
   /// Adds a frame, from `begin_of_frame` to `end_of_frame`; if that fails, all is as before.
   std::string append(const std::string& frame);
-  /// Leaves the document without room behind it. Nothing is added after that.
+  /// Leaves the document without space behind it. Nothing is added after that.
   std::string finish();
 
 private:
   /// @param frame  is added to those that the file has
-  std::string rewrite(const std::string& frame, bool with_room);
+  std::string rewrite(const std::string& frame, bool with_space);
 
   std::filesystem::path _path;
   std::string _name;
   std::size_t _frames = 0;         ///< where frames begin in the file
   std::size_t _end = 0;            ///< where the document's end begins
-  std::size_t _room_end = 0;       ///< where the spaces end
-  std::optional<Descriptor> _file; ///< with room behind the document
+  std::size_t _space_end = 0;      ///< where the spaces end
+  std::optional<Descriptor> _file; ///< with space behind the document
   std::string _addition;
 };
 } // namespace mpm

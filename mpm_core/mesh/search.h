@@ -26,7 +26,7 @@ Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 
 /// The cell of point x, found by walking from cell `start` over neighbours, each time across the facet that x lies
 /// farthest behind. Where the walk ends at a boundary or goes round in circles, the bins of the mesh decide, so the
-/// answer is right on any mesh. A point that is not finite is outside.
+/// result is correct on any mesh. A point that is not finite is outside.
 template <int D>
 Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 

@@ -70,7 +70,7 @@ void find_cell_strains(const Mesh<D>& mesh, const VelocityField<G>& field, const
             scratch.motion[r].displacement.value[0] / mesh.shapes[runs[batch.first_run + r].cell].centre[0];
       add_hoop(strain, hoop);
     }
-    if (options.averaged)
+    if (options.nmd)
     {
       Lanes theta{};
       for (std::size_t r = first; r < last; ++r)
@@ -113,7 +113,7 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
     {
       const Matrix<D> gradient = dual_gradient(mesh, field, at<D>(particles.position, p), run.cell);
       CellStrain<D> strain = strain_increment<D>(gradient, options.dt);
-      if (options.averaged)
+      if (options.nmd)
         set_volumetric<G>(strain, mean_of_nodes<D>(mesh.cells[run.cell], field.volumetric_strain));
       for (int k = 0; k < n_stress<D>; ++k)
         scratch.strain[k][p - batch.first] = strain.increment[k];

@@ -11,7 +11,7 @@ namespace
 /// What sorting costs per particle, over what a particle out of cell order costs more in a step than one in its place.
 constexpr double sort_cost = 0.8;
 
-/// The new cell of a particle that is no longer in its old one; `none` when it is not to be gathered.
+/// The new cell of a particle that is no longer in its old one; `none` when it is not to be added to moments.
 template <int D>
 Index new_cell(const Mesh<D>& mesh, const NodeExchange& exchange, const Particles<D>& particles, Index p,
                Migration& migration, std::optional<Failure<D>>& failure)
@@ -40,12 +40,12 @@ void follow_leaving(Model<G>& model, const Run& run, VelocityField<G>& field)
     if (cell == run.cell)
       continue;
     CellMoments<G> moments{};
-    gather<G>(model.particles, p, p + 1, shape, moments);
+    add_moments<G>(model.particles, p, p + 1, shape, moments);
     take_out(moments, field.moments[run.cell]);
     if (!field.tractions.empty())
     {
       TractionMoments<D> tractions{};
-      gather(model.particles, p, p + 1, shape, tractions);
+      add_moments(model.particles, p, p + 1, shape, tractions);
       take_out(tractions, field.tractions[run.cell]);
     }
     field.left.push_back(run.cell);
@@ -57,8 +57,8 @@ void follow_leaving(Model<G>& model, const Run& run, VelocityField<G>& field)
 }
 
 template <class G, int D>
-void gather_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Index> entered,
-                    std::span<const Index> field_of_law, std::vector<VelocityField<G>>& fields)
+void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Index> entered,
+                 std::span<const Index> field_of_law, std::vector<VelocityField<G>>& fields)
 {
   std::vector<std::vector<Index>> cells(fields.size());
   for (Index p : entered)
@@ -66,8 +66,8 @@ void gather_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::spa
     const Index cell = particles.cell[p], material = particles.material[p];
     const auto number = static_cast<std::size_t>(field_of_law[static_cast<std::size_t>(material)]);
     VelocityField<G>& field = fields[number];
-    gather<G>(particles, p, p + 1, mesh.shapes[cell], field.moments[cell]);
-    gather_tractions(particles, mesh.shapes[cell], p, p + 1, cell, field);
+    add_moments<G>(particles, p, p + 1, mesh.shapes[cell], field.moments[cell]);
+    add_tractions(particles, mesh.shapes[cell], p, p + 1, cell, field);
     cells[number].push_back(cell);
   }
   for (std::size_t f = 0; f < cells.size(); ++f)
@@ -94,7 +94,7 @@ void migrate_particles(Model<G>& model)
   migration.far_partners.clear();
   std::vector<Index> arrivals(static_cast<std::size_t>(arrived));
   std::iota(arrivals.begin(), arrivals.end(), model.particles.size() - arrived);
-  gather_entered(model.mesh, model.particles, arrivals, model.field_of_law, model.fields);
+  add_entered(model.mesh, model.particles, arrivals, model.field_of_law, model.fields);
 
   // Particles out of order cut the runs of two cells. Sorting is due when they have cost as much as it does.
   CellOrder& order = model.order;
@@ -108,8 +108,8 @@ void migrate_particles(Model<G>& model)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void follow_leaving(Model<G>&, const Run&, VelocityField<G>&);                                              \
-  template void gather_entered(const Mesh<G::dim>&, const Particles<G::dim>&, std::span<const Index>,                  \
-                               std::span<const Index>, std::vector<VelocityField<G>>&);                                \
+  template void add_entered(const Mesh<G::dim>&, const Particles<G::dim>&, std::span<const Index>,                     \
+                            std::span<const Index>, std::vector<VelocityField<G>>&);                                   \
   template void migrate_particles(Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -8,25 +8,25 @@ namespace mpm
 {
 /// Adds the tractions of particles to the moments of their cell, where a field has any.
 template <class G, int D = G::dim>
-inline void gather_tractions(const Particles<D>& particles, const CellShape<D>& shape, Index first, Index last,
-                             Index cell, VelocityField<G>& field)
+inline void add_tractions(const Particles<D>& particles, const CellShape<D>& shape, Index first, Index last, Index cell,
+                          VelocityField<G>& field)
 {
   if (!field.tractions.empty())
-    gather(particles, first, last, shape, field.tractions[cell]);
+    add_moments(particles, first, last, shape, field.tractions[cell]);
 }
 
 /// Takes out of a cell's moments the particles of a run that have left it, and notes where they went.
 template <class G>
 void follow_leaving(Model<G>& model, const Run& run, VelocityField<G>& field);
 
-/// Gathers particles that came into cells of this rank, from its own cells or from other ranks.
+/// Adds particles that came into cells of this rank, from its own cells or from other ranks, to their moments.
 /// @param fields  of the model; `field_of_law` says which of them moves the particles of a law
 template <class G, int D = G::dim>
-void gather_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Index> entered,
-                    std::span<const Index> field_of_law, std::vector<VelocityField<G>>& fields);
+void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Index> entered,
+                 std::span<const Index> field_of_law, std::vector<VelocityField<G>>& fields);
 
-/// Takes outflow particles out, sends migrating ones to their ranks and gathers arrivals; sorts when order has been
-/// lost.
+/// Takes outflow particles out, sends migrating ones to their ranks and adds arrivals to moments; sorts when order has
+/// been lost.
 /// @note Collective
 template <class G>
 void migrate_particles(Model<G>& model);

@@ -5,7 +5,7 @@
 /// The balance of nodal works says nothing of the stresses: it is an identity. So the work of the stresses is taken at
 /// the particles, V sigma : d epsilon by the trapezoidal rule, and compared with what changed their kinetic energy:
 ///
-///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_pic = what nobody asked for.
+///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_pic = unexplained energy.
 ///
 /// The difference comes from particles that cross cells, from averages and integration over cells, whose forces are not
 /// those of the particles' stresses, and from the time step.
@@ -51,7 +51,7 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p);
 template <class G, int D>
 double energy_balance(const Model<G, D>& model, double kinetic);
 
-/// Begins the balance anew with the particles as they are.
+/// Resets the balance to the present particles.
 template <class G, int D>
 void start_energy_balance(Model<G, D>& model);
 } // namespace mpm

@@ -25,19 +25,19 @@ void find_whole_cells(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
       for (std::size_t k = 0; k < 2; ++k)
         fills[node][k] += fill(c)[k];
   sum_shared(exchange, fills);
-  const auto is_full = [](const std::array<double, 2>& f, double share) { return f[0] >= share * f[1]; };
+  const auto is_full = [](const std::array<double, 2>& f, double fraction) { return f[0] >= fraction * f[1]; };
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
     const bool among_full =
-        std::ranges::all_of(mesh.cells[c], [&](Index node) { return is_full(fills[node], full_share_around); });
-    whole[c] = field.moments[c].mass > 0 && (among_full || is_full(fill(c), full_share));
+        std::ranges::all_of(mesh.cells[c], [&](Index node) { return is_full(fills[node], full_fraction_around); });
+    whole[c] = field.moments[c].mass > 0 && (among_full || is_full(fill(c), full_fraction));
   }
 }
 
 /// Sums for the mean stresses of the dual domains, over all ranks.
 template <class G, int D = G::dim>
-void gather_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
-                         const std::vector<Run>& runs, CellIntegration<D>& integration)
+void map_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                      const std::vector<Run>& runs, CellIntegration<D>& integration)
 {
   integration.dual_cells.assign(static_cast<std::size_t>(mesh.owned_cells), {});
   integration.dual_nodes.assign(mesh.points.size(), {});
@@ -48,7 +48,7 @@ void gather_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Part
     std::array<DualStress<D>*, D + 1> nodes;
     for (int k = 0; k <= D; ++k)
       nodes[k] = &integration.dual_nodes[mesh.cells[run.cell][k]];
-    gather_dual<D>(particles, run.first, run.last, mesh.shapes[run.cell], integration.dual_cells[run.cell], nodes);
+    add_dual_stress<D>(particles, run.first, run.last, mesh.shapes[run.cell], integration.dual_cells[run.cell], nodes);
   }
   sum_shared(exchange, integration.dual_nodes);
 }
@@ -118,7 +118,7 @@ void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const P
                             const std::vector<Run>& runs, VelocityField<G>& field)
 {
   find_whole_cells(mesh, exchange, field);
-  gather_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
+  map_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
   replace_internal_forces(mesh, field);
 }
 

@@ -6,13 +6,13 @@
 
 namespace mpm
 {
-/// A cell is full when its particles have this share of its volume (Al-Kafaji 2013, Formulation of a dynamic material
-/// point method for geomechanical problems, section 3; so does Anura3D).
-inline constexpr double full_share = 0.9;
+/// A cell is full when its particles fill this fraction of its volume (Al-Kafaji 2013, Formulation of a dynamic
+/// material point method for geomechanical problems, section 3; so does Anura3D).
+inline constexpr double full_fraction = 0.9;
 
 /// A cell of ten particles is not full any more when two of them have moved on. So one counts as full, too, when the
-/// cells around each of its nodes are filled by this share on the average; at a free surface it is about a half.
-inline constexpr double full_share_around = 0.75;
+/// cells around each of its nodes are filled by this fraction on the average; at a free surface it is about a half.
+inline constexpr double full_fraction_around = 0.75;
 
 /// The volume that a cell integrates its stress over. Cells that are not full, at the free surface, are left to their
 /// particles in all modes: there stresses are small and nodes are light, so that forces from a mean with the cells

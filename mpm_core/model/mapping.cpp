@@ -39,7 +39,7 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if constexpr (!G::has_hoop)
     if (field.integration.kind == Integration::dual_domain)
       integrate_dual_domains(mesh, exchange, particles, runs, field);
-  if (field.integration.averaged)
+  if (field.integration.average_stress)
     average_forces(mesh, exchange, field);
 }
 

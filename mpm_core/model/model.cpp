@@ -135,8 +135,8 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
   field.tractions.assign(loaded ? cells : 0, TractionMoments<G::dim>{});
 }
 
-/// Only particles within round-off of the opposite facet touch a node with less than this share of the mass of a whole
-/// particle.
+/// Only particles within round-off of the opposite facet touch a node with less than this fraction of the mass of a
+/// whole particle.
 /// @note Collective
 template <class G>
 void find_least_masses(Model<G>& model)
@@ -169,9 +169,9 @@ void prepare(Model<G>& model)
   {
     VelocityField<G>& field = field_of(model, run.material);
     const auto& shape = model.mesh.shapes[run.cell];
-    gather<G>(model.particles, run.first, run.last, shape, field.moments[run.cell]);
+    add_moments<G>(model.particles, run.first, run.last, shape, field.moments[run.cell]);
     if (loaded)
-      gather(model.particles, run.first, run.last, shape, field.tractions[run.cell]);
+      add_moments(model.particles, run.first, run.last, shape, field.tractions[run.cell]);
   }
   find_least_masses(model);
   model.inventory = taken_inventory(model);

@@ -123,7 +123,7 @@ inline const VelocityField<G>& field_of(const Model<G>& model, Index material)
   return model.fields[static_cast<std::size_t>(model.field_of_law[static_cast<std::size_t>(material)])];
 }
 
-/// Gives the model its laws, with room for their state variables, and the number of the velocity field of each.
+/// Gives the model its laws, with storage for their state variables, and the number of the velocity field of each.
 /// @param field_of_law  from 0, without gaps; empty for one field
 /// @throws InputError numbers with gaps, or not one for each law
 template <class G>
@@ -150,7 +150,7 @@ inline Vector<D> gravity_at(const Model<G>& model, double time)
   return g;
 }
 
-/// Sorts the particles, gathers runs and moments, and gives nodes the sums and velocities at the start; needed after
+/// Sorts the particles, finds runs and moments, and gives nodes the sums and velocities at the start; needed after
 /// anything but a step has changed the particles. Does nothing when they are up to date.
 /// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive
 /// @note Collective
@@ -190,7 +190,7 @@ void sort_particles(Model<G>& model);
 
 /// Finds the runs of the particles as they are now, and which of them are the first ones of their field in their cells.
 /// Cells that the last particle of a field has left get moments of exactly zero.
-/// @param again  the order of the particles is as before, and only those of scattered runs have changed cells
+/// @param again  the order of the particles is as before, and only those of runs out of order have changed cells
 template <class G>
 void find_cell_runs(Model<G>& model, bool again);
 } // namespace mpm

@@ -11,8 +11,8 @@ namespace mpm
 {
 namespace
 {
-/// Steps after which the moments of all cells are gathered from the particles again, so that round-off does not add up.
-constexpr std::int64_t gathering_interval = 64;
+/// Steps after which the moments of all cells are summed over the particles again, so that round-off does not add up.
+constexpr std::int64_t summation_interval = 64;
 
 /// A second chance for the particles whose law failed, unless the step is lost anyway.
 template <class G, int D = G::dim>
@@ -108,9 +108,9 @@ void update_moments(const Particles<D>& particles, const PassOptions& options, c
 }
 
 /// Moves and strains the particles of a batch, and brings the moments of their cells to where they are then.
-/// @param gather_all  gather the moments from the particles, instead of moving them along
+/// @param from_particles  sum the moments over the particles, instead of following the motion of the cell
 template <class Kind, class G, int D = G::dim>
-void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch, bool gather_all,
+void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch, bool from_particles,
                 BatchScratch<D>& scratch)
 {
   VelocityField<G>& field = field_of(model, batch.material);
@@ -120,8 +120,8 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     model.energy.pic_loss += pic_loss(model.mesh, model.particles, field, runs[r], options.pic_fraction);
   if (options.move)
     for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-      runs[r].scattered = !move_particles<D>(model.particles, runs[r].first, runs[r].last,
-                                             model.mesh.shapes[runs[r].cell], scratch.motion[r - batch.first_run]);
+      runs[r].out_of_order = !move_particles<D>(model.particles, runs[r].first, runs[r].last,
+                                                model.mesh.shapes[runs[r].cell], scratch.motion[r - batch.first_run]);
   if (options.stress)
     update_stress<Kind>(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
@@ -132,19 +132,19 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     CellMoments<G>& moments = field.moments[run.cell];
     if (run.first_in_cell && options.stress)
       model.energy.stress_work += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
-    if (gather_all)
+    if (from_particles)
     {
       if (run.first_in_cell)
         moments = {};
-      gather<G>(model.particles, run.first, run.last, shape, moments);
+      add_moments<G>(model.particles, run.first, run.last, shape, moments);
       if (options.stress)
         model.energy.ahead +=
             Kind::template half_work_of_run<G>(stress_sum<G>(model.particles, run.first, run.last), scratch, i);
     }
     else if constexpr (Kind::moves_moments)
       update_moments<G>(model.particles, options, run, i, scratch, moments, model.energy.ahead);
-    gather_tractions(model.particles, shape, run.first, run.last, run.cell, field);
-    if (run.scattered)
+    add_tractions(model.particles, shape, run.first, run.last, run.cell, field);
+    if (run.out_of_order)
       follow_leaving(model, run, field);
   }
 }
@@ -153,12 +153,12 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
 template <class Kind, class G>
 void pass_batches(Model<G>& model, const PassOptions& options)
 {
-  const bool gather_all = !Kind::moves_moments || model.totals.steps % gathering_interval == 0;
+  const bool from_particles = !Kind::moves_moments || model.totals.steps % summation_interval == 0;
   BatchScratch<G::dim> scratch{};
   for (std::size_t r = 0; r < model.order.runs.size();)
   {
     const Batch batch = next_batch(model.order.runs, r);
-    pass_batch<Kind>(model, options, batch, gather_all, scratch);
+    pass_batch<Kind>(model, options, batch, from_particles, scratch);
     r = batch.last_run;
   }
 }
@@ -185,7 +185,7 @@ void particle_pass(Model<G>& model, const PassOptions& options)
   Migration& migration = model.migration;
   if (migration.entered.empty())
     return;
-  gather_entered(model.mesh, model.particles, migration.entered, model.field_of_law, model.fields);
+  add_entered(model.mesh, model.particles, migration.entered, model.field_of_law, model.fields);
   model.order.out_of_order += static_cast<Index>(migration.entered.size());
   migration.entered.clear();
   if (migration.migrating.empty() && migration.lost.empty())

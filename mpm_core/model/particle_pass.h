@@ -13,15 +13,15 @@ struct PassOptions
   bool move;           ///< velocities (18) and positions (20)
   bool stress;         ///< strain increment and stress update
   double pic_fraction; ///< fraction of the grid's velocity in the particle's, 0 is FLIP
-  bool averaged;       ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
+  bool nmd;            ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
   double law_dt;       ///< duration of the increment for laws [s]; infinite where they are given all time
   bool small = false;  ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal
-/// `velocity_change` and `velocity` of their field, updates their stresses, finds their cells, and gathers the moments
+/// `velocity_change` and `velocity` of their field, updates their stresses, finds their cells, and sums the moments
 /// of the particles as they are then. Particles in ghost cells are put on the list of migrating ones, those that are in
-/// no local cell on the list of lost ones, and neither is gathered.
+/// no local cell on the list of lost ones, and neither is added to moments.
 template <class G>
 void particle_pass(Model<G>& model, const PassOptions& options);
 } // namespace mpm

@@ -6,7 +6,7 @@
 
 namespace mpm
 {
-/// Gives particles new positions, finds their cells anew, anywhere in the mesh, and sends them to the ranks that own
+/// Gives particles new positions, searches their cells in the whole mesh, and sends them to the ranks that own
 /// these. Initial positions stay as they are.
 /// @param positions  [m], (n, D), one row for each particle of this rank in the present order
 /// @throws InputError on all ranks, naming a particle that would be outside of the mesh; then no particle is changed

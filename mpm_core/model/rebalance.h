@@ -7,7 +7,7 @@
 namespace mpm
 {
 /// Replaces the model's mesh by the same one cut otherwise, and sends each particle to the rank that owns its cell now.
-/// Sums over cells are gathered anew.
+/// Moments of cells are summed again.
 /// @param mesh  with the same cells, by their numbers over all ranks
 /// @post There are no boundary conditions; they must be set again, for the new nodes
 /// @note Collective

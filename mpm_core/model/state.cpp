@@ -15,7 +15,7 @@ enum class Kind
 {
   common, ///< the same on all ranks
   sum,    ///< a sum over ranks; the first rank takes it
-  own     ///< of one rank only; begins anew
+  own     ///< of one rank only; starts from zero after a restart
 };
 
 /// A name with the number of a velocity field; that of the first one goes without.

@@ -12,7 +12,7 @@ namespace mpm
 template <class G, int D = G::dim>
 std::vector<Table> rank_state(const Model<G>& model);
 
-/// Sums over the filled cells of this rank, as they were gathered: taken anew from the particles they would differ in
+/// Sums over the filled cells of this rank, as they were summed: summed again over the particles they would differ in
 /// their last bits, and a run that goes on with them would be another one. The first number of a row is the cell over
 /// all ranks.
 /// @pre prepare(model) has been called

@@ -3,7 +3,7 @@
 /// One velocity on the nodes: what the particles that move with it give them, and how they move.
 
 #include "transfer/dual_domain.h"
-#include "transfer/mixed_discretisation.h"
+#include "transfer/nodal_mixed_discretisation.h"
 #include "transfer/nodes.h"
 #include "transfer/supports.h"
 
@@ -30,7 +30,8 @@ template <int D>
 struct CellIntegration
 {
   Integration kind = Integration::particles; ///< of the run under way
-  bool averaged = false; ///< mean stresses averaged over nodes, as strains are in a run with nodal mixed discretisation
+  bool average_stress =
+      false; ///< mean stresses are averaged over nodes, as strains are in a run with nodal mixed discretisation
   std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole;         ///< per owned cell, at the step's start: 1 where full; not with particles
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< with dual domains, as are the mean gradients of nodes

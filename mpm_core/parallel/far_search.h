@@ -32,7 +32,7 @@ struct FarSearch
 };
 
 /// Places of points that are anywhere in the mesh. The walk goes on from rank to rank, and where it ends outside of the
-/// mesh all ranks look into their bins, so the answer is that of `find_cell` on one rank.
+/// mesh all ranks look into their bins, so that the result is that of `find_cell` on one rank.
 /// @param owned_cells  local number of each owned cell, by its global number
 /// @note Collective over all ranks
 template <int D>

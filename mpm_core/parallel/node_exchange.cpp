@@ -22,7 +22,7 @@ NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm)
   if (exchange.size == 1)
     return exchange;
 
-  // A directory: rank (number mod size) learns who has each node, and answers all who have it.
+  // A directory: rank (number mod size) learns who has each node, and replies to all ranks that have it.
   const auto size = static_cast<std::size_t>(exchange.size);
   std::unordered_map<GlobalIndex, Index> local;
   std::vector<std::vector<GlobalIndex>> ask(size);
@@ -37,17 +37,17 @@ NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm)
   for (std::size_t r = 0; r < size; ++r)
     for (GlobalIndex number : asked[r])
       ranks_of[number].push_back(static_cast<int>(r));
-  std::vector<std::vector<GlobalIndex>> answers(size); // number, other rank, ...
+  std::vector<std::vector<GlobalIndex>> replies(size); // number, other rank, ...
   for (const auto& [number, ranks] : ranks_of)
     for (int r : ranks)
       for (int other : ranks)
         if (other != r)
-          answers[static_cast<std::size_t>(r)].insert(answers[static_cast<std::size_t>(r)].end(), {number, other});
+          replies[static_cast<std::size_t>(r)].insert(replies[static_cast<std::size_t>(r)].end(), {number, other});
   std::map<int, std::vector<GlobalIndex>> shared;
-  for (const auto& answer : exchanged(answers, comm))
-    for (std::size_t k = 0; k < answer.size(); k += 2)
+  for (const auto& reply : exchanged(replies, comm))
+    for (std::size_t k = 0; k < reply.size(); k += 2)
     {
-      const GlobalIndex number = answer[k], rank = answer[k + 1];
+      const GlobalIndex number = reply[k], rank = reply[k + 1];
       shared[static_cast<int>(rank)].push_back(number);
       if (rank < exchange.rank)
         exchange.owned[local[number]] = 0;

@@ -11,7 +11,7 @@
 
 namespace mpm
 {
-/// Which nodes this rank shares with which others, and the room for their messages.
+/// Which nodes this rank shares with which others, and the buffers of their messages.
 struct NodeExchange
 {
   /// Nodes shared with one neighbour, in the same order on both sides.
@@ -26,7 +26,7 @@ struct NodeExchange
   int size = 1;
   std::vector<Neighbour> neighbours; ///< by rising rank
   std::vector<Index> shared_nodes;   ///< all nodes that have a neighbour
-  std::vector<double> own;           ///< this rank's share of them during a sum
+  std::vector<double> own;           ///< this rank's part of them during a sum
   std::vector<unsigned char> owned;  ///< per node: 1 on exactly one of the ranks that share it, for global sums
 };
 

@@ -89,7 +89,8 @@ std::vector<Index> weighted_parts(const Mesh<D>& mesh, std::span<const GlobalInd
   CellGraph graph = cell_graph(mesh, weights, comm);
   std::vector<SCOTCH_Num> parts(weights.size() + 1);
   const bool good = find_parts(graph, comm, parts);
-  if (const std::string text = shared_failure(comm, good ? "" : "PT-SCOTCH could not cut the mesh"); !text.empty())
+  if (const std::string text = shared_failure(comm, good ? "" : "PT-SCOTCH could not partition the mesh");
+      !text.empty())
     throw RunError(text);
   return {parts.begin(), parts.end() - 1};
 }
@@ -98,8 +99,8 @@ template <int D>
 std::vector<Index> weighted_parts(const Mesh<D>&, std::span<const GlobalIndex>, MPI_Comm)
 {
   throw RunError(
-      "the mesh cannot be cut anew: this program was built without PT-SCOTCH (Debian: libptscotch-dev). Without "
-      "`rebalance`, or with a large one, a run keeps the mesh as it is cut");
+      "the mesh cannot be repartitioned: this program was built without PT-SCOTCH (Debian: libptscotch-dev). Without "
+      "`rebalance`, or with a large one, a run keeps its first partition");
 }
 #endif
 

@@ -35,11 +35,11 @@ std::vector<int> owners(const Mesh<D>& mesh, const NodeExchange& exchange, std::
       const auto found = directory.find(entry);
       entry = found == directory.end() ? -1 : found->second;
     }
-  const Lists answers = exchanged(questions, exchange.comm);
+  const Lists replies = exchanged(questions, exchange.comm);
   std::vector<int> ranks;
   std::vector<std::size_t> next(size, 0);
   for (GlobalIndex cell : cells)
-    ranks.push_back(static_cast<int>(answers[keeper(cell)][next[keeper(cell)]++]));
+    ranks.push_back(static_cast<int>(replies[keeper(cell)][next[keeper(cell)]++]));
   return ranks;
 }
 

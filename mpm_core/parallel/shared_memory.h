@@ -20,7 +20,7 @@ public:
   SharedMemory(const SharedMemory&) = delete;
   SharedMemory& operator=(const SharedMemory&) = delete;
 
-  /// Makes room for so many bytes; what was there is lost if that is more than ever before.
+  /// Provides so many bytes; the contents are lost if the memory has to grow.
   /// @return false, on all ranks, if the ranks are on several machines, or the machine refuses
   bool resize(std::size_t bytes);
 

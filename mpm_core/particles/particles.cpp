@@ -151,7 +151,7 @@ void find_runs_again(const Particles<D>& particles, Index longest, std::vector<R
   std::vector<Run> found;
   found.reserve(runs.size() + runs.size() / 8);
   for (const Run& run : runs)
-    if (run.scattered)
+    if (run.out_of_order)
       append_one_by_one(particles, run.first, run.last, longest, found);
     else
       append(found, run, longest);

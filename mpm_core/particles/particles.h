@@ -16,7 +16,7 @@ struct Run
   Index cell;
   Index material;
   bool first_in_cell = false; ///< whether it is the first one in its cell
-  bool scattered = false;     ///< whether some of its particles are in another cell by now
+  bool out_of_order = false;  ///< whether some of its particles are in another cell by now
 };
 
 /// All columns have one entry per particle; those of optional fields may be absent.
@@ -128,7 +128,7 @@ void remove(Particles<D>& particles, std::span<const Index> numbers);
 template <int D>
 void find_runs(const Particles<D>& particles, Index longest, std::vector<Run>& runs);
 
-/// The same after no particles have changed cells but some of runs that are marked as scattered.
+/// The same after no particles have changed cells but some of runs that are marked as out of order.
 template <int D>
 void find_runs_again(const Particles<D>& particles, Index longest, std::vector<Run>& runs);
 

@@ -16,7 +16,7 @@ using Barycentric = std::array<double, D + 1>;
 int lattice_size(int dimension, int k) { return dimension == 2 ? k * (k + 1) / 2 : k * (k + 1) * (k + 2) / 6; }
 
 /// Points (i + a, j + a, ...) / (k - 1 + (D+1) a) with i + j + ... = k - 1. With a = 1/(D+1) the outermost layer stands
-/// off the faces by as much as a point of equal share should.
+/// off the faces by as much as a point of equal volume should.
 template <int D>
 void add_lattice(int k, int left, int depth, std::array<int, D + 1>& numbers, std::vector<Barycentric<D>>& points)
 {

@@ -9,7 +9,7 @@
 
 namespace mpm
 {
-/// Barycentric coordinates of `count` points placed evenly in a simplex, each standing for the same share of its
+/// Barycentric coordinates of `count` points placed evenly in a simplex, each representing the same fraction of its
 /// volume. Rows of D+1 numbers. The points are the lattice of 1, 3, 6, 10, 15, ... points (triangle) or 1, 4, 10, 20,
 /// ... (tetrahedron), in the cell itself or in each of the 4^s (8^s) cells it divides into: 1 3 4 6 10 12 15 16 21 24
 /// ... in a triangle.

@@ -44,7 +44,7 @@ std::vector<OutputIndexField> output_fields(const IntegerFields& fields)
 }
 
 /// Nodal fields of a model by name.
-/// @param carrier  to the nodes of the mesh as it is written; null if the model's is cut in the same way
+/// @param carrier  to the nodes of the mesh as it is written; null if the model's has the same partition
 template <class G, int D = G::dim>
 std::vector<OutputField> nodal_fields(const Model<G>& model, const std::vector<std::string>& names, RowCarrier* carrier)
 {

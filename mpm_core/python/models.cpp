@@ -290,7 +290,7 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
       .def_readwrite("damping", &ExplicitOptions::damping)
-      .def_readwrite("mixed_discretisation", &ExplicitOptions::mixed_discretisation)
+      .def_readwrite("mixed_discretisation", &ExplicitOptions::nmd)
       .def_readwrite("integration", &ExplicitOptions::integration);
   py::class_<RunOptions>(m, "RunOptions")
       .def(py::init<>())

@@ -183,8 +183,8 @@ py::dict single_precision(const Model<G>& model, const std::vector<std::string>&
   return copies;
 }
 
-/// Notes that the particles are no longer as a step left them: sums are to be gathered, and the energy balance begins
-/// anew.
+/// Notes that the particles are no longer as a step left them: moments are to be summed again, and the energy balance
+/// begins anew.
 template <class G>
 void changed(Model<G>& model)
 {

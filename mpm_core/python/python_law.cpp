@@ -82,7 +82,7 @@ struct PythonObject
   /// Whether its update takes an `increment` beside the rest
   bool takes_increment;
   /// Whether an exception of it has been printed; shared by all copies
-  std::shared_ptr<bool> has_told = std::make_shared<bool>(false);
+  std::shared_ptr<bool> has_warned = std::make_shared<bool>(false);
 };
 
 /// The points of a batch one by one, so that an exception is that of a single point
@@ -108,9 +108,9 @@ BatchReport called(const PythonObject& object, const PointBatch<D>& points)
   }
   catch (py::error_already_set& error)
   {
-    if (!*object.has_told)
+    if (!*object.has_warned)
       error.discard_as_unraisable("the update of a law");
-    *object.has_told = true;
+    *object.has_warned = true;
   }
   if (points.size == 1)
     return {0, {0}};

@@ -3,8 +3,8 @@
 namespace mpm
 {
 template <int D>
-void gather_dual(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, DualStress<D>& cell,
-                 const std::array<DualStress<D>*, D + 1>& nodes)
+void add_dual_stress(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                     DualStress<D>& cell, const std::array<DualStress<D>*, D + 1>& nodes)
 {
   const auto add = [](DualStress<D>& sum, double volume, const std::array<double, n_symmetric<D>>& stress)
   {
@@ -29,7 +29,7 @@ std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
                                              const std::array<const DualStress<D>*, D + 1>& nodes)
 {
   // Nodes, and the cell's share, that no particle has any weight in leave theirs to the others
-  const double own = cell.volume > 0 ? dual_share * bubble_mean<D> : 0;
+  const double own = cell.volume > 0 ? dual_fraction * bubble_mean<D> : 0;
   double known = 0;
   for (const DualStress<D>* node : nodes)
     known += node->volume > 0 ? 1 : 0;
@@ -46,8 +46,8 @@ std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template void gather_dual<D>(const Particles<D>&, Index, Index, const CellShape<D>&, DualStress<D>&,                 \
-                               const std::array<DualStress<D>*, D + 1>&);                                              \
+  template void add_dual_stress<D>(const Particles<D>&, Index, Index, const CellShape<D>&, DualStress<D>&,             \
+                                   const std::array<DualStress<D>*, D + 1>&);                                          \
   template std::array<double, n_symmetric<D>> dual_mean<D>(const DualStress<D>&,                                       \
                                                            const std::array<const DualStress<D>*, D + 1>&);
 INSTANTIATE(2)

@@ -18,8 +18,8 @@
 
 namespace mpm
 {
-/// The cell's share of the gradient at its centre, the bubble's largest value.
-inline constexpr double dual_share = 0.5;
+/// The cell's fraction of the gradient at its centre, the bubble's largest value.
+inline constexpr double dual_fraction = 0.5;
 
 /// Mean of the bubble over a cell, over its largest value: (D+1)^(D+1) D! / (2D+1)!
 template <int D>
@@ -48,7 +48,7 @@ inline DualWeights<D> dual_weights(const CellShape<D>& shape, const Vector<D>& x
   }
   for (double& n : weights.node)
     bubble *= (D + 1) * (n /= sum);
-  weights.cell = dual_share * bubble;
+  weights.cell = dual_fraction * bubble;
   for (double& n : weights.node)
     n *= 1 - weights.cell;
   return weights;
@@ -65,8 +65,8 @@ struct DualStress
 
 /// Adds the particles [first, last) of one cell to its sum and to those of its nodes.
 template <int D>
-void gather_dual(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, DualStress<D>& cell,
-                 const std::array<DualStress<D>*, D + 1>& nodes);
+void add_dual_stress(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                     DualStress<D>& cell, const std::array<DualStress<D>*, D + 1>& nodes);
 
 /// The mean stress that a cell integrates: its own share and that of its nodes.
 template <int D>

@@ -34,7 +34,8 @@ void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& sh
 } // namespace
 
 template <class G, int D>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<G>& moments)
+void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                 CellMoments<G>& moments)
 {
   constexpr int S = G::n_working;
   std::array<const double*, 2 * D + S + 2> columns;
@@ -96,8 +97,8 @@ void gather(const Particles<D>& particles, Index first, Index last, const CellSh
 }
 
 template <int D>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
-            TractionMoments<D>& moments)
+void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                 TractionMoments<D>& moments)
 {
   for (Index p = first; p < last; ++p)
     for (int a = 0; a < D; ++a)
@@ -199,12 +200,12 @@ Working<G> stress_sum(const Particles<D>& particles, Index first, Index last)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template void gather(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&, CellMoments<G>&);             \
+  template void add_moments(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&, CellMoments<G>&);        \
   template void move(CellMoments<G>&, const CellMotion<G::dim>&);                                                      \
   template Working<G> stress_sum<G>(const Particles<G::dim>&, Index, Index);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-template void gather(const Particles<2>&, Index, Index, const CellShape<2>&, TractionMoments<2>&);
-template void gather(const Particles<3>&, Index, Index, const CellShape<3>&, TractionMoments<3>&);
+template void add_moments(const Particles<2>&, Index, Index, const CellShape<2>&, TractionMoments<2>&);
+template void add_moments(const Particles<3>&, Index, Index, const CellShape<3>&, TractionMoments<3>&);
 } // namespace mpm

@@ -3,7 +3,7 @@
 /// Cell moments: all that the nodes need to know of the particles in a cell.
 ///
 /// A linear shape function is affine inside a cell, so each nodal sum over the particles of a cell, such as
-/// sum m_p N_i(x_p), follows from a few moments of the particles about the cell's centre. They are gathered in one pass
+/// sum m_p N_i(x_p), follows from a few moments of the particles about the cell's centre. They are summed in one pass
 /// over the particles and scattered to nodes once per cell, instead of evaluating shape functions per particle and
 /// node.
 
@@ -67,12 +67,13 @@ struct CellMotion
 
 /// Adds the particles [first, last), all in this cell, to its moments.
 template <class G, int D = G::dim>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, CellMoments<G>& moments);
+void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                 CellMoments<G>& moments);
 
 /// The same for the tractions they carry.
 template <int D>
-void gather(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
-            TractionMoments<D>& moments);
+void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                 TractionMoments<D>& moments);
 
 /// Takes moments of the same cell out of others, such as those of a particle that leaves it.
 template <class Moments>

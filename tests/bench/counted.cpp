@@ -52,7 +52,7 @@ void run_explicit(Model<G> model, bool mixed, int steps)
 {
   ExplicitOptions options;
   options.damping = 0.75;
-  options.mixed_discretisation = mixed;
+  options.nmd = mixed;
   const double dt = 0.5 * critical(model);
   for (int step = 0; step < steps; ++step)
     explicit_step(model, options, dt);

@@ -75,17 +75,17 @@ void count_particles(benchmark::State& state, Index particles)
 }
 
 template <int D>
-void gather_moments(benchmark::State& state)
+void sum_moments(benchmark::State& state)
 {
   Filled<D> box(static_cast<int>(state.range(0)));
   std::vector<CellMoments<Cartesian<D>>> moments(box.mesh.cells.size());
   for (auto _ : state)
     for (const Run& run : box.runs)
-      gather<Cartesian<D>>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], moments[run.cell]);
+      add_moments<Cartesian<D>>(box.particles, run.first, run.last, box.mesh.shapes[run.cell], moments[run.cell]);
   count_particles(state, box.particles.size());
 }
-BENCHMARK(gather_moments<2>)->Arg(18)->Arg(112);
-BENCHMARK(gather_moments<3>)->Arg(5)->Arg(24);
+BENCHMARK(sum_moments<2>)->Arg(18)->Arg(112);
+BENCHMARK(sum_moments<3>)->Arg(5)->Arg(24);
 
 template <int D>
 void move(benchmark::State& state)
@@ -141,7 +141,7 @@ struct Gathered : Filled<D>
     std::vector<Index> cells;
     for (const Run& run : this->runs)
     {
-      gather<Cartesian<D>>(this->particles, run.first, run.last, this->mesh.shapes[run.cell], moments[run.cell]);
+      add_moments<Cartesian<D>>(this->particles, run.first, run.last, this->mesh.shapes[run.cell], moments[run.cell]);
       cells.push_back(run.cell);
     }
     part = make_part<D>(this->mesh, cells, {});

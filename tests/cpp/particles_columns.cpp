@@ -165,9 +165,9 @@ TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
   for (int round = 0; round < 20; ++round)
   {
     for (Run& run : again)
-      run.scattered = random() % 4 == 0;
+      run.out_of_order = random() % 4 == 0;
     for (const Run& run : again)
-      if (run.scattered)
+      if (run.out_of_order)
         for (Index p = run.first; p < run.last; p += 1 + static_cast<Index>(random() % 5))
           particles.cell[p] = static_cast<Index>(random() % 9);
     find_runs_again(particles, 16, again);
@@ -175,7 +175,7 @@ TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
     ASSERT_EQ(again.size(), anew.size());
     for (std::size_t r = 0; r < anew.size(); ++r)
       EXPECT_TRUE(again[r].first == anew[r].first && again[r].last == anew[r].last && again[r].cell == anew[r].cell &&
-                  again[r].material == anew[r].material && !again[r].scattered);
+                  again[r].material == anew[r].material && !again[r].out_of_order);
   }
 }
 

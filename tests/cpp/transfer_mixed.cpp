@@ -1,5 +1,5 @@
 #include "boxes.h"
-#include "transfer/mixed_discretisation.h"
+#include "transfer/nodal_mixed_discretisation.h"
 
 #include <gtest/gtest.h>
 

@@ -59,8 +59,8 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
   std::vector<TractionMoments<D>> tractions(mesh.cells.size(), TractionMoments<D>{});
   for (const Run& run : runs)
   {
-    gather<Cartesian<D>>(particles, run.first, run.last, mesh.shapes[run.cell], moments[run.cell]);
-    gather<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
+    add_moments<Cartesian<D>>(particles, run.first, run.last, mesh.shapes[run.cell], moments[run.cell]);
+    add_moments<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
   scatter<Cartesian<D>>(mesh, test::whole(mesh), moments, tractions, nodes);
@@ -168,7 +168,7 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
     ++last;
   const CellShape<D>& shape = mesh.shapes[cell];
   CellMoments<Cartesian<D>> moments{}, expected{};
-  gather<Cartesian<D>>(particles, 0, last, shape, moments);
+  add_moments<Cartesian<D>>(particles, 0, last, shape, moments);
   const std::vector<Vector<D>> change = random_vectors<D>(mesh.points.size(), 22, 1);
   const std::vector<Vector<D>> displacement = random_vectors<D>(mesh.points.size(), 23, 0.1);
   const auto field = [&](const auto& nodal)
@@ -190,7 +190,7 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
       }
     }
   }
-  gather<Cartesian<D>>(particles, 0, last, shape, expected);
+  add_moments<Cartesian<D>>(particles, 0, last, shape, expected);
   using Numbers = std::array<double, sizeof(moments) / sizeof(double)>;
   const auto got = std::bit_cast<Numbers>(moments), wanted = std::bit_cast<Numbers>(expected);
   for (std::size_t k = 0; k < got.size(); ++k)
@@ -212,9 +212,9 @@ TYPED_TEST(NodesTest, SumsOfFewAndManyParticlesAreThoseOneByOne)
   for (Index count = 1; count <= 13; ++count)
   {
     CellMoments<Cartesian<D>> together{}, one_by_one{};
-    gather<Cartesian<D>>(particles, 3, 3 + count, mesh.shapes[0], together);
+    add_moments<Cartesian<D>>(particles, 3, 3 + count, mesh.shapes[0], together);
     for (Index p = 3; p < 3 + count; ++p)
-      gather<Cartesian<D>>(particles, p, p + 1, mesh.shapes[0], one_by_one);
+      add_moments<Cartesian<D>>(particles, p, p + 1, mesh.shapes[0], one_by_one);
     const auto got = std::bit_cast<Numbers>(together), wanted = std::bit_cast<Numbers>(one_by_one);
     for (std::size_t k = 0; k < got.size(); ++k)
       EXPECT_NEAR(got[k], wanted[k], 1e-13) << count;

@@ -71,31 +71,31 @@ Result<D> result_of(const Start<D>& a, double x, double multiplier)
 
 /// The return, for a point that yields. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the
 /// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between
-/// them the yield function has its root. The unknown is the share of that x. In small increments the share is small,
-/// and the secant method takes a few evaluations; where it does not get there, by bracketing.
+/// them the yield function has its root. The unknown is the fraction of that x. In small increments the fraction is
+/// small, and the secant method takes a few evaluations; where it does not get there, by bracketing.
 template <int D>
 Result<D> returned(const Start<D>& a)
 {
   const double sum = a.elastic + a.plastic;
   const double critical = (std::log(2 * a.pressure / a.preconsolidation) + a.elastic * a.volumetric) / sum;
-  const auto at = [&](double share)
+  const auto at = [&](double fraction)
   {
-    const double x = critical * share, left = 1 - share;
+    const double x = critical * fraction, left = 1 - fraction;
     const double pc = a.preconsolidation * std::exp(a.plastic * x);
-    return result_of(a, x, share / (left * pc * sum * mean_growth(sum * critical * left)));
+    return result_of(a, x, fraction / (left * pc * sum * mean_growth(sum * critical * left)));
   };
   const double scale = a.preconsolidation * a.preconsolidation;
   const auto excess = [&](const Result<D>& r) { return r.yield(a.slope_squared) / scale; };
   const Sample start{0, excess(at(0))};
   Sample before = start;
-  double share = 1e-3;
-  for (int evaluations = 0; evaluations < 8 && share > 0 && share < 1; ++evaluations)
+  double fraction = 1e-3;
+  for (int evaluations = 0; evaluations < 8 && fraction > 0 && fraction < 1; ++evaluations)
   {
-    const Result<D> result = at(share);
-    const Sample now{share, excess(result)};
+    const Result<D> result = at(fraction);
+    const Sample now{fraction, excess(result)};
     if (std::abs(now.f) <= 1e-13)
       return result;
-    share -= now.f * (now.x - before.x) / (now.f - before.f);
+    fraction -= now.f * (now.x - before.x) / (now.f - before.f);
     before = now;
   }
   return at(root_between([&](double s) { return excess(at(s)); }, start, {1, -1}));

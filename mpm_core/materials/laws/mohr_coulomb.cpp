@@ -21,10 +21,10 @@ constexpr std::size_t lanes = 8;
 
 /// Share of candidates in a block from which on all of its points are treated as such, where they are: setting them
 /// side by side would cost more than the points that do not yield after all.
-constexpr double dense_share = 0.45;
+constexpr double dense_fraction = 0.45;
 
-/// Points by whose share of candidates the rest of a block is judged: where it is over `dense_share`, the others are
-/// taken for candidates unseen, a seventh of the law's time where all yield.
+/// Points by whose fraction of candidates the rest of a block is judged: where it is over `dense_fraction`, the others
+/// are taken for candidates unseen, a seventh of the law's time where all yield.
 constexpr Index sample_size = 32;
 
 /// The points of a block that may yield, side by side
@@ -83,7 +83,7 @@ ElasticStep elastic_step(const Surface& m, const PointBatch<D>& points, Index fi
   ElasticStep step;
   const Index sampled = std::min(last, first + sample_size);
   elastic_step<D, false>(m, points, first, first, sampled, step);
-  if (step.leaving > dense_share * (sampled - first))
+  if (step.leaving > dense_fraction * (sampled - first))
     elastic_step<D, true>(m, points, first, sampled, last, step);
   else
     elastic_step<D, false>(m, points, first, sampled, last, step);
@@ -220,7 +220,7 @@ Index return_block(const Surface& m, const std::optional<RegionMaps>& maps, cons
                    Index last, const ElasticStep& step, Candidates<D>& candidates)
 {
   Index plastic = 0, from = first; // points before `from` have been returned
-  if (!points.tangent && step.failed == 0 && step.leaving > dense_share * (last - first))
+  if (!points.tangent && step.failed == 0 && step.leaving > dense_fraction * (last - first))
   {
     const std::size_t size = static_cast<std::size_t>(last - first) / lanes * lanes;
     plastic += return_in_place(m, points, first, size, candidates);

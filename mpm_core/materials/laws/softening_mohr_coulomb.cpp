@@ -31,21 +31,21 @@ struct Softener
   Principal returned(double increment) const { return return_to_surface(surface(increment), trial).stress; }
 
   /// Plastic strain of the return to the surface that holds after some plastic strain
-  double answer(double increment) const
+  double plastic_strain(double increment) const
   {
     const Surface m = surface(increment);
     return deviatoric_plastic_strain(m, trial, return_to_surface(m, trial).stress);
   }
 
-  /// The plastic strain that answers itself, by the secant method: in small increments strength falls little, and a few
-  /// evaluations do. Where they do not, by bracketing.
+  /// Solves the fixed-point equation for the plastic strain increment by the secant method. In small increments the
+  /// strength falls little, and a few evaluations suffice; otherwise the root is bracketed.
   double increment() const
   {
-    double x = answer(0), excess = answer(x) - x;
+    double x = plastic_strain(0), excess = plastic_strain(x) - x;
     double next = x + excess;
     for (int iteration = 0; iteration < 6 && std::abs(excess) > 1e-12 * x && next > 0; ++iteration)
     {
-      const double next_excess = answer(next) - next;
+      const double next_excess = plastic_strain(next) - next;
       const double better = next - next_excess * (next - x) / (next_excess - excess);
       x = next;
       excess = next_excess;
@@ -54,18 +54,19 @@ struct Softener
     return std::abs(excess) <= 1e-12 * x ? x : bracketed_increment();
   }
 
-  /// The answer stays finite while the strength falls no further than to its residual, so there is a bracket.
+  /// The resulting strain stays finite while the strength falls no further than to its residual, so there is a bracket.
   double bracketed_increment() const
   {
-    const double first = answer(0);
+    const double first = plastic_strain(0);
     double bound = first;
-    double excess = answer(bound) - bound;
+    double excess = plastic_strain(bound) - bound;
     while (excess > 0)
     {
       bound *= 2;
-      excess = answer(bound) - bound;
+      excess = plastic_strain(bound) - bound;
     }
-    return excess == 0 ? bound : root_between([&](double x) { return answer(x) - x; }, {0, first}, {bound, excess});
+    return excess == 0 ? bound
+                       : root_between([&](double x) { return plastic_strain(x) - x; }, {0, first}, {bound, excess});
   }
 
   /// Derivative of the returned principal stresses by the plastic strain, at a fixed trial stress
@@ -100,7 +101,7 @@ Principal strain_gradient(const Surface& m, const Matrix3& map, Principal trial,
 }
 
 /// Adds what the loss of strength contributes to the tangent: the stress falls by its derivative by the plastic strain,
-/// and the plastic strain grows with the trial stress and with its own answer.
+/// and the plastic strain grows with the trial stress and with the softening that it causes.
 template <int D>
 void add_softening(const Softener& softener, const Surface& m, const Spectral<D>& trial, const Returned& returned,
                    double increment, double* tangent)

@@ -27,7 +27,7 @@ void copy_start(const PointBatch<D>& points, Start<D>& start)
 }
 
 /// Takes the points from where the law without viscosity has them back towards their trial stress.
-/// @param left  share of the overstress that is left at the end, 1 / (1 + a)
+/// @param left  fraction of the overstress that remains at the end, 1 / (1 + a)
 template <int D>
 void restore_overstress(const ElasticModuli& moduli, double left, const Start<D>& start, const PointBatch<D>& points)
 {

@@ -19,10 +19,10 @@ template <class F>
 double root_between(F&& f, Sample one, Sample other)
 {
   Sample oldest = other;
-  double share = 0.5;
+  double fraction = 0.5;
   for (int evaluations = 0; evaluations < 200; ++evaluations)
   {
-    const double x = one.x + share * (other.x - one.x);
+    const double x = one.x + fraction * (other.x - one.x);
     const Sample sample{x, f(x)};
     const bool replaces_one = (sample.f > 0) == (one.f > 0);
     oldest = replaces_one ? one : other;
@@ -34,11 +34,11 @@ double root_between(F&& f, Sample one, Sample other)
       return best.x;
     const double xi = (one.x - other.x) / (oldest.x - other.x), phi = (one.f - other.f) / (oldest.f - other.f);
     const bool smooth = phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi; // inverse quadratic interpolation is safe
-    share = smooth ? one.f / (other.f - one.f) * oldest.f / (other.f - oldest.f) +
-                         (oldest.x - one.x) / (other.x - one.x) * one.f / (oldest.f - one.f) * other.f /
-                             (oldest.f - other.f)
-                   : 0.5;
-    share = std::clamp(share, least, 1 - least);
+    fraction = smooth ? one.f / (other.f - one.f) * oldest.f / (other.f - oldest.f) +
+                            (oldest.x - one.x) / (other.x - one.x) * one.f / (oldest.f - one.f) * other.f /
+                                (oldest.f - other.f)
+                      : 0.5;
+    fraction = std::clamp(fraction, least, 1 - least);
   }
   return one.x;
 }

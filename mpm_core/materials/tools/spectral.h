@@ -169,14 +169,14 @@ inline SymTensor<3> recomposed(Principal s, Frame<3> frame)
       s.s1 * a.y * a.z + s.s2 * b.y * b.z + s.s3 * c.y * c.z, s.s1 * a.x * a.z + s.s2 * b.x * b.z + s.s3 * c.x * c.z};
 }
 
-/// Whether a stress may be outside the surface. In plane strain the answer is exact.
+/// Whether a stress may be outside the surface. In plane strain the result is exact.
 inline bool may_yield(const Surface& m, const SymTensor<2>& stress)
 {
   const Principal s = spectral(stress).stress;
   return is_outside(m, s.s1, s.s3);
 }
 
-/// In three dimensions the answer errs on the side of yes, by 1e-6 of the stress: the extreme principal stresses follow
+/// In three dimensions the result errs towards true, by 1e-6 of the stress: the extreme principal stresses follow
 /// from the invariants to 2e-9, far cheaper than with their directions.
 [[gnu::always_inline]] inline bool may_yield(const Surface& m, const SymTensor<3>& stress)
 {
