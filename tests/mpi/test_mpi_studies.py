@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "studies"), str(ROOT / "studies" / "verification"), str(ROOT / "tests" / "python")]
 import axisymmetric_cylinder  # noqa: E402
 import compare_fem  # noqa: E402
+import drawdown  # noqa: E402
 import handover  # noqa: E402
 import quarter_model  # noqa: E402
 import safety  # noqa: E402
@@ -81,3 +82,19 @@ def test_cylinder_of_the_verification(shared_path):
 def test_half_sections_of_the_verification(shared_path, case):
     """Rings on a rank that has none of the axis, or none of the wall; and a body of three dimensions beside them."""
     assert [check.quantity for check in case.run(True, shared_path).checks if not check.passed] == []
+
+
+def test_a_drawdown_and_its_slide(shared_path):
+    """Flow in time, factors of safety between their limits, the hand-over under pore pressures, pictures and page."""
+    path = shared_path / "site.toml"
+    if MPI.COMM_WORLD.rank == 0:
+        text = (ROOT / "meshes" / "drawdown.toml").read_text().replace('"bank', f'"{ROOT}/meshes/bank')
+        path.write_text(
+            text.replace("= 4e3", "= 2e3").replace("= 27.0", "= 15.0")
+        )  # linear elements on large cells are too stiff
+    MPI.COMM_WORLD.barrier()
+    options = "--cell-size 3 --elements P1 --days 3 --factor-times 1 --slide --time 0.3 --frames 2 --particles-per-cell 3 --no-film"
+    summary = summary_of(drawdown, shared_path / "results", "--site", str(path), *options.split())
+    slow, fast = (limit["factor_of_safety"] for limit in summary["limits"])
+    assert fast < summary["lowest_factor_of_safety"] < slow
+    assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["largest_displacement_m"] > 0
