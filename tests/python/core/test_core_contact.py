@@ -128,6 +128,25 @@ def test_momentum_is_that_of_gravity_and_contact_and_no_energy_is_made(stress_up
     assert report.kinetic_energy + report.stored_energy < before.kinetic_energy
 
 
+def test_a_cylinder_in_axial_symmetry_rests_on_its_weight():
+    # Per radian: mass rho H R^2 / 2, and particles as wide as in the half section, V / r = d^2.
+    model = mpm.Model(
+        box((6, 6), (1.5, 1.5)), mpm.LinearElastic(young=2e7, poisson=0.3), geometry=mpm.Geometry.AXISYMMETRIC
+    )
+    side, radius, height = 1 / 16, 1.0, 0.5
+    points = side * (np.indices((16, 8)).reshape(2, -1).T + 0.5) + (0, 0.5)
+    model.seed_points(points, side**2 * points[:, 0], density=1000.0)
+    model.set_gravity((0, -G), ramp=0.1)
+    table = mpm.Plane((0, 0.5 - 1e-12), (0, 1))
+    assert model.gap(table) == pytest.approx(0, abs=1e-9)
+    ground = model.add_contact(table, friction=0.3)
+    *_, report = model.explicit(0.6, damping=0.3)
+    weight = 1000.0 * height * radius**2 / 2 * G
+    assert report.mass * G == pytest.approx(weight)
+    assert ground.force[1] == pytest.approx(-weight, rel=1e-2)
+    assert ground.moment == pytest.approx([-weight * 2 / 3 * radius], rel=2e-2)  # pressure p r dr: at 2/3 of the radius
+
+
 def test_a_wall_gives_a_block_the_momentum_of_its_impulse():
     # The wall starts slowly and reaches 2 m/s; its displacement is the integral of a velocity that is linear in time.
     model, _, _ = block()
