@@ -7,8 +7,6 @@ from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scat
 
 import mpm_core as mpm
 
-pytestmark = pytest.mark.filterwarnings("ignore:nothing holds the particles")
-
 
 def sliding_block(comm, owners_of=bands):
     """A soft block that slides down a polyline towards a disc, across the borders of the ranks."""

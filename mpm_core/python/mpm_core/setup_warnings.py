@@ -42,7 +42,7 @@ def _nothing_acts(model: Model) -> str:
 
 
 def _nothing_holds(model: Model) -> str:
-    if model._conditions or not np.any(model.gravity):
+    if model._conditions or model._contacts or not np.any(model.gravity):
         return ""
     return "nothing holds the particles, which fall freely: there is gravity and no boundary condition (model.fix, model.roller)"
 

@@ -8,7 +8,7 @@ import mpm_core as mpm
 from mpm_core.probes import ProbeFile
 
 G = 9.81
-pytestmark = pytest.mark.filterwarnings("ignore:nothing holds the particles")
+pytestmark = pytest.mark.filterwarnings("error:nothing holds the particles")  # a surface does
 
 
 def rotation(angle):
