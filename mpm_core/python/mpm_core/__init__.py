@@ -30,7 +30,7 @@ from ._core import (
 from ._core import compiler as compiler
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
-from .contact import Box, Disc, Plane, Polyline, RigidContact, Sphere
+from .contact import RigidContact
 from .element import ElementTest
 from .energy import EnergyWarning
 from .ghost import GhostPenalty
@@ -45,6 +45,7 @@ from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
 from .space import Space, parts, space
+from .surfaces import Box, Disc, Plane, Polyline, Sphere
 
 for _law in law_types:
     _law.__signature__ = signature_of(_law)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -15,145 +15,10 @@ from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
 from .mesh import floats
+from .surfaces import KINDS, Surface
 
 if TYPE_CHECKING:
     from .model import Model
-
-
-@dataclass(frozen=True)
-class Plane:
-    """A rigid half space.
-
-    Args:
-        point: any point on its surface [m], shape (D,).
-        normal: direction out of it, towards the soil, of any length, shape (D,).
-    """
-
-    point: ArrayLike
-    normal: ArrayLike
-
-    def _checked(self, dim: int) -> Any:
-        point, normal = floats("point", self.point, (dim,)), floats("normal", self.normal, (dim,))
-        length = float(np.linalg.norm(normal))
-        if length == 0:
-            raise InputError(f"normal is {normal.tolist()}, expected a direction, not zero")
-        return getattr(_core, f"Plane{dim}")(point.tolist(), (normal / length).tolist()), point
-
-
-@dataclass(frozen=True)
-class Disc:
-    """A rigid cylinder whose axis is at right angles to the plane; in axial symmetry a torus, or a sphere on the axis.
-
-    Args:
-        centre: [m], shape (2,).
-        radius: [m].
-    """
-
-    centre: ArrayLike
-    radius: float
-
-    def _checked(self, dim: int) -> Any:
-        if dim != 2:
-            raise InputError("surface is a Disc, expected a Sphere, Box or Plane in three dimensions")
-        return _ball(self.centre, self.radius, dim)
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """A rigid sphere in three dimensions.
-
-    Args:
-        centre: [m], shape (3,).
-        radius: [m].
-    """
-
-    centre: ArrayLike
-    radius: float
-
-    def _checked(self, dim: int) -> Any:
-        if dim != 3:
-            raise InputError("surface is a Sphere, expected a Disc, Box, Plane or Polyline in two dimensions")
-        return _ball(self.centre, self.radius, dim)
-
-
-def _ball(centre: ArrayLike, radius: float, dim: int) -> Any:
-    at = floats("centre", centre, (dim,))
-    return getattr(_core, f"Ball{dim}")(at.tolist(), positive("radius", radius, "m")), at
-
-
-@dataclass(frozen=True)
-class Box:
-    """A rigid box along the axes, with sharp edges.
-
-    Args:
-        lower, upper: its corners with the smallest and with the largest coordinates [m], shape (D,).
-    """
-
-    lower: ArrayLike
-    upper: ArrayLike
-
-    def _checked(self, dim: int) -> Any:
-        lower, upper = floats("lower", self.lower, (dim,)), floats("upper", self.upper, (dim,))
-        if (lower >= upper).any():
-            raise InputError(
-                f"lower is {lower.tolist()} m and upper {upper.tolist()} m, expected lower < upper along each axis"
-            )
-        return getattr(_core, f"Box{dim}")(lower.tolist(), upper.tolist()), 0.5 * (lower + upper)
-
-
-@dataclass(frozen=True)
-class Polyline:
-    """Rigid ground or a rigid body bounded by segments, in two dimensions.
-
-    The soil is on the left as one walks from point to point: a terrain has its points from left to right. An open line goes on
-    straight beyond both ends; a closed one holds the soil inside when its points go round counterclockwise, else outside.
-
-    Args:
-        points: [m], shape (n, 2), without repetition.
-        closed: whether the last point is joined to the first.
-    """
-
-    points: ArrayLike
-    closed: bool = False
-
-    def _checked(self, dim: int) -> Any:
-        if dim != 2:
-            raise InputError("surface is a Polyline, expected a Plane, Sphere or Box in three dimensions")
-        points = floats("points", self.points, (None, 2))
-        least = 3 if self.closed else 2
-        if len(points) < least:
-            raise InputError(f"points has {len(points)} points, expected {least} or more")
-        ends = np.roll(points, -1, axis=0) if self.closed else points[1:]
-        starts = points if self.closed else points[:-1]
-        short = np.flatnonzero((starts == ends).all(axis=1))
-        if len(short):
-            raise InputError(
-                f"points has {points[short[0]].tolist()} twice in a row, at rows {short[0]} and "
-                f"{(short[0] + 1) % len(points)}, expected segments of some length; close a line by closed=True"
-            )
-        if crossing := _crossing(starts, ends):
-            raise InputError(
-                f"points makes segments {crossing[0]} and {crossing[1]} cross, expected a line that does not"
-            )
-        return _core.Polyline2(points.tolist(), bool(self.closed)), points[0]
-
-
-def _crossing(starts: NDArray, ends: NDArray) -> tuple[int, int] | None:
-    """Two segments that cross in their insides."""
-
-    def side(a: NDArray, b: NDArray, c: NDArray) -> NDArray:
-        return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-
-    for k in range(len(starts) - 1):
-        a, b, c, d = starts[k : k + 1], ends[k : k + 1], starts[k + 1 :], ends[k + 1 :]
-        across = (side(a, b, c) * side(a, b, d) < 0) & (side(c, d, a) * side(c, d, b) < 0)
-        if across.any():
-            return k, k + 1 + int(np.argmax(across))
-    return None
-
-
-Surface: TypeAlias = Plane | Disc | Sphere | Box | Polyline
-KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Polyline)}
 
 
 class RigidContact:

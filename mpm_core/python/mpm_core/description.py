@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ._core import Geometry, RunError
-from .contact import KINDS
+from .surfaces import KINDS
 
 
 def parsed(path: str, text: bytes) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .collective import collectively
-from .contact import RigidContact, Surface, Velocity, add_contact, refuse_contacts, smallest_gap
+from .contact import RigidContact, Velocity, add_contact, refuse_contacts, smallest_gap
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
@@ -30,6 +30,7 @@ from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
 from .setup_warnings import warn_of_setup
+from .surfaces import Surface
 
 
 class Model(Body):
