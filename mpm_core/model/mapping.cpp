@@ -39,8 +39,8 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if constexpr (!G::has_hoop)
     if (field.integration.kind == Integration::dual_domain)
       integrate_dual_domains(mesh, exchange, particles, runs, field);
-  if (field.integration.average_stress)
-    average_forces(mesh, exchange, field);
+  if (!field.integration.average_stress.empty())
+    average_forces(mesh, exchange, runs, field);
 }
 
 template <class G>
@@ -134,9 +134,13 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
 }
 
 template <class G, int D>
-void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
+void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field)
 {
-  const auto stress_of = [&](Index c) { return integrated_stress(mesh, field, c); };
+  const auto& by_law = field.integration.average_stress;
+  std::vector<unsigned char> averaged(static_cast<std::size_t>(mesh.owned_cells), 1);
+  for (const Run& run : runs)
+    averaged[run.cell] &= by_law[run.material];
+  const auto stress_of = [&](Index c) { return averaged[c] ? integrated_stress(mesh, field, c) : Working<G>{}; };
   average_mean_stress<G>(mesh, exchange, field, stress_of,
                          [&](Index c, double change)
                          {
@@ -159,7 +163,7 @@ void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
   template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \
   template void average_stresses(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, std::span<Working<G>>);        \
-  template void average_forces(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);
+  template void average_forces(const Mesh<G::dim>&, NodeExchange&, const std::vector<Run>&, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

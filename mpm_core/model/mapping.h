@@ -48,10 +48,11 @@ template <class G, int D = G::dim>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
 
-/// The same for the internal forces of a field on this rank: adds what the averaged mean stresses change.
+/// The same for the internal forces of a field on this rank: adds what averaging changes where
+/// `integration.average_stress` says so of all soils in a cell. The mean stress of other cells stays theirs.
 /// @note Collective
 template <class G, int D = G::dim>
-void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field);
+void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
 ///

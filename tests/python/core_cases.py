@@ -107,3 +107,16 @@ def strain_energy(model, young, poisson):
     trace = stress[:, :3].sum(axis=1)
     squares = (stress[:, :3] ** 2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1)
     return float(np.sum(volume * ((1 + poisson) * squares - poisson * trace**2)) / (2 * young))
+
+
+def averaged_over_nodes(model):
+    """Change of the mean stress of each particle's cell when it is averaged as volumetric strains are, by id."""
+    dim, cells, cell = model.mesh.dim, model.mesh.cells, model.particles.cell
+    volume = np.bincount(cell, model.particles.volume, len(cells))
+    total = np.bincount(cell, model.particles.volume * model.particles.stress[:, :dim].mean(axis=1), len(cells))
+    at_nodes = np.zeros((2, len(model.mesh.points)))
+    for vertex in cells.T:
+        np.add.at(at_nodes, (slice(None), vertex), [total, volume])
+    of_node = at_nodes[0] / np.maximum(at_nodes[1], 1e-300)
+    change = of_node[cells].mean(axis=1) - total / np.maximum(volume, 1e-300)
+    return change[cell][np.argsort(model.particles.id)]

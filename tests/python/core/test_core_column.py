@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import box, by_id, moduli, rollers, run
+from core_cases import averaged_over_nodes, box, by_id, moduli, rollers, run
 
 import mpm_core as mpm
 
@@ -27,18 +27,6 @@ def column(request):
     report = run(model, 8 * period, damping=0.7, nmd=nmd)
     assert report.unbalanced_ratio < 1e-3
     return model, nmd
-
-
-def averaged_over_nodes(model):
-    """Change of the mean stress of each particle's cell when it is averaged as volumetric strains are, by id."""
-    dim, cells, cell = model.mesh.dim, model.mesh.cells, model.particles.cell
-    volume = np.bincount(cell, model.particles.volume, len(cells))
-    mean = np.bincount(cell, model.particles.volume * model.particles.stress[:, :dim].mean(axis=1), len(cells)) / volume
-    at_nodes = np.zeros((2, len(model.mesh.points)))
-    for vertex in cells.T:
-        np.add.at(at_nodes, (slice(None), vertex), [mean * volume, volume])
-    change = (at_nodes[0] / at_nodes[1])[cells].mean(axis=1) - mean
-    return change[cell][np.argsort(model.particles.id)]
 
 
 def test_stresses_of_the_column(column):
