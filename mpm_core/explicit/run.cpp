@@ -196,12 +196,12 @@ Diagnostics diagnostics(const Model<G>& model)
   d.outflow_particles = static_cast<double>(model.totals.outflow_particles);
   d.outflow_mass = model.totals.outflow_mass;
   d.particle_steps = static_cast<double>(model.totals.particle_steps);
-  d.plastic_share = static_cast<double>(model.last.plastic);
+  d.plastic_fraction = static_cast<double>(model.last.plastic);
   std::array<double, sizeof(Diagnostics) / sizeof(double)> sums;
   std::copy_n(&d.particles, sums.size(), sums.begin());
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   std::copy_n(sums.begin(), sums.size(), &d.particles);
-  d.plastic_share = d.particles > 0 ? d.plastic_share / d.particles : 0;
+  d.plastic_fraction = d.particles > 0 ? d.plastic_fraction / d.particles : 0;
   for (double scale : scales)
     d.energy_scale = std::max(d.energy_scale, std::abs(scale));
   d.unbalanced_ratio = out_of_balance(model, gravity_at(model, model.time));

@@ -53,7 +53,7 @@ struct Diagnostics
   double outflow_particles;
   double outflow_mass;
   double particle_steps;
-  double plastic_share;    ///< of the particles, in the last step
+  double plastic_fraction; ///< of the particles, in the last step
   double unbalanced_ratio; ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
 };
 

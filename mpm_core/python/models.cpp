@@ -48,7 +48,7 @@ py::dict as_dict(const Diagnostics& d)
                   "energy_scale"_a = d.energy_scale,
                   "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
                   "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
-                  "plastic_share"_a = d.plastic_share, "unbalanced_ratio"_a = d.unbalanced_ratio);
+                  "plastic_fraction"_a = d.plastic_fraction, "unbalanced_ratio"_a = d.unbalanced_ratio);
 }
 
 template <int D>
@@ -290,7 +290,7 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
       .def_readwrite("damping", &ExplicitOptions::damping)
-      .def_readwrite("mixed_discretisation", &ExplicitOptions::nmd)
+      .def_readwrite("nmd", &ExplicitOptions::nmd)
       .def_readwrite("integration", &ExplicitOptions::integration);
   py::class_<RunOptions>(m, "RunOptions")
       .def(py::init<>())

@@ -25,7 +25,7 @@ def explicit_options(damping: float, nmd: bool, integration: Any, stress_update:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
-    options.mixed_discretisation = bool(nmd)
+    options.nmd = bool(nmd)
     options.integration = integration
     options.stress_update = stress_update
     return options

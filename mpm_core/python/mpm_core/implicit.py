@@ -40,7 +40,7 @@ def implicit_options(
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic = within("pic", pic, 0, 1)
-    options.mixed_discretisation = bool(nmd)
+    options.nmd = bool(nmd)
     if integration == Integration.DUAL_DOMAIN:
         raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")
     options.integration = integration

@@ -164,7 +164,6 @@ class Model(Body):
         values = self._core.diagnostics()
         values["momentum"] = tuple(values["momentum"][: self.mesh.dim])
         values["particle_steps"] = int(values["particle_steps"])
-        values["plastic_fraction"] = values.pop("plastic_share")
         return Report(time=self.time, steps=self._core.steps, dt=self._core.last_dt, **values)
 
     def nodal(self, name: str, velocity_field: int = 0) -> Any:

@@ -18,7 +18,7 @@ def krylov_iterations(h, law, nmd):
 def quasi_static_step(model, nmd):
     """Krylov iterations of each Newton iteration."""
     options = _core.ImplicitOptions()
-    options.quasi_static, options.mixed_discretisation = True, nmd
+    options.quasi_static, options.nmd = True, nmd
     stepper = Stepper(model, mpm.Newton(), options, 1.0)
     assert stepper.attempt(1.0) == ""
     return stepper.last.linear_iterations

@@ -27,7 +27,7 @@ def solved_step(solver, *, nmd=False, quasi_static=False):
     if not quasi_static:
         list(model.implicit(2 * DT, dt=DT, damping=0.75))
     options = _core.ImplicitOptions()
-    options.damping, options.mixed_discretisation, options.quasi_static = 0.75, nmd, quasi_static
+    options.damping, options.nmd, options.quasi_static = 0.75, nmd, quasi_static
     stepper = Stepper(model, solver, options, DT)
     assert stepper.attempt(DT) == ""
     assert model.report().plastic_fraction > (0.01 if quasi_static else 0.1)

@@ -29,7 +29,7 @@ def started_step(dim, law, *, nmd=False, quasi_static=False, damping=0.0, mixed=
     model.roller(LEFT, [1.0] + [0.3] * (dim - 1))
     model.set_gravity([0.0] * (dim - 1) + [-9.81])
     options = _core.ImplicitOptions()
-    options.mixed_discretisation, options.quasi_static, options.damping = nmd, quasi_static, damping
+    options.nmd, options.quasi_static, options.damping = nmd, quasi_static, damping
     options.hold_positions, options.average_stress = small, small and nmd
     options.integration = mpm.Integration.MIXED if mixed else mpm.Integration.PARTICLES
     step = getattr(_core, type(model._core).__name__.replace("Model", "ImplicitStep"))(model._core)
