@@ -166,7 +166,7 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
 
 template <int D>
 Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes,
-                  SeedMaterial soil, GlobalIndex first_id, Particles<D>& particles)
+                  std::span<const GlobalIndex> ids, SeedMaterial soil, Particles<D>& particles)
 {
   check_soil<D>(soil);
   Index added = 0;
@@ -179,7 +179,7 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
       continue;
     const Index p = particles.size();
     resize(particles, p + 1);
-    set_particle<D>(particles, p, first_id + static_cast<GlobalIndex>(n), x, cell, volumes[n], soil);
+    set_particle<D>(particles, p, ids[n], x, cell, volumes[n], soil);
     ++added;
   }
   return added;
@@ -238,8 +238,8 @@ INSTANTIATE(Solid)
 #undef INSTANTIATE
 #define INSTANTIATE(D)                                                                                                 \
   template std::vector<std::array<double, D + 1>> even_points<D>(int);                                                 \
-  template Index seed_points(const Mesh<D>&, std::span<const double>, std::span<const double>, SeedMaterial,           \
-                             GlobalIndex, Particles<D>&);
+  template Index seed_points(const Mesh<D>&, std::span<const double>, std::span<const double>,                         \
+                             std::span<const GlobalIndex>, SeedMaterial, Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
 } // namespace mpm

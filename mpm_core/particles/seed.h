@@ -35,10 +35,11 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
 /// Adds one particle at each given point that lies in an owned cell.
 /// @param points   (n, D) row-major [m]
 /// @param volumes  (n) [m^D]
+/// @param ids      (n) of the particles
 /// @returns number of particles added on this rank
 template <int D>
 Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span<const double> volumes,
-                  SeedMaterial soil, GlobalIndex first_id, Particles<D>& particles);
+                  std::span<const GlobalIndex> ids, SeedMaterial soil, Particles<D>& particles);
 
 /// Loads the particles next to the facets with this tag: in each filled cell behind such a facet, the force
 /// `traction * facet area` is shared evenly by the particles nearest to it. The force is dead: it moves with its

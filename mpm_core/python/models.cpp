@@ -145,14 +145,15 @@ void bind_model(py::module_& m, const std::string& suffix)
              return seed_cells<G>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
            })
       .def("seed_points",
-           [](M& model, const py::array& points, const py::array& volumes, Index material, double density,
-              GlobalIndex first_id)
+           [](M& model, const py::array& points, const py::array& volumes, const py::array& ids, Index material,
+              double density)
            {
              check_array<double>("points", points, {-1, D});
              check_array<double>("volumes", volumes, {points.shape(0)});
+             check_array<GlobalIndex>("ids", ids, {points.shape(0)});
              changed(model);
-             return seed_points<D>(model.mesh, values<double>(points), values<double>(volumes), {material, density},
-                                   first_id, model.particles);
+             return seed_points<D>(model.mesh, values<double>(points), values<double>(volumes),
+                                   values<GlobalIndex>(ids), {material, density}, model.particles);
            })
       .def("load_facets",
            [](M& model, Index facet_tag, const Vector<D>& traction)

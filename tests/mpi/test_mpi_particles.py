@@ -163,6 +163,16 @@ def test_points_are_seeded_whoever_owns_their_cells(comm):
         model.seed_points([[0.5, 0.1], [5.0, 0.1]], [1e-3, 1e-3], density=1000.0)
 
 
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_points_on_sides_between_cells_are_seeded_once(comm, owners_of):
+    mesh = spread_box((8, 8), (1.0, 1.0), comm, owners_of)
+    x = np.linspace(0.0, 1.0, 9)
+    points = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)  # the nodes
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.2))
+    assert model.seed_points(points, np.full(81, 1e-3), density=1000.0) == 81
+    np.testing.assert_array_equal(all_by_id(model, ("position",))["position"], points)
+
+
 def test_an_added_field_follows_its_particles_to_other_ranks(comm):
     model = block(comm, [40.0, 0.0])
     model.add_field("origin", unit="m", meaning="Position at the start", components=2)

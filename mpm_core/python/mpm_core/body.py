@@ -170,12 +170,13 @@ class Body(Conditions):
             if (v <= 0).any():
                 raise InputError(f"volumes is {v.min()} m^{self.mesh.dim} at least, expected positive numbers")
             rho = positive("density", density, "kg/m3")
-            return self._core.seed_points(x, v, self._material(material), rho, self._next_id)
+            rows = np.flatnonzero(inside.argmax(axis=0) == self.comm.rank)
+            return self._core.seed_points(x[rows], v[rows], self._next_id + rows, self._material(material), rho)
 
-        inside = collectively(self.comm, lambda: self._owned(points))
-        total = np.any(self.comm.allgather(inside), axis=0)
-        if not total.all():
-            first = int(np.argmin(total))
+        # By rank and point: one on a side between the cells of two ranks is in both, and the first rank has it.
+        inside = np.array(self.comm.allgather(collectively(self.comm, lambda: self._owned(points))))
+        if not inside.any(axis=0).all():
+            first = int(np.argmin(inside.any(axis=0)))
             raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")
         return self._seeded(collectively(self.comm, place), len(np.asarray(points)))
 
