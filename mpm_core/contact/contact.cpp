@@ -10,34 +10,6 @@
 
 namespace mpm
 {
-template <int D>
-Vector<D> displacement(const Motion<D>& motion, double from, double to)
-{
-  Vector<D> moved{};
-  const auto add = [&moved](double duration, const Vector<D>& a, const Vector<D>& b)
-  {
-    for (int i = 0; i < D; ++i)
-      moved[i] += 0.5 * duration * (a[i] + b[i]);
-  };
-  const auto& t = motion.times;
-  const auto& v = motion.velocities;
-  add(std::max(0.0, std::min(to, t.front()) - from), v.front(), v.front());
-  for (std::size_t k = 0; k + 1 < t.size(); ++k)
-  {
-    const double begin = std::clamp(from, t[k], t[k + 1]), end = std::clamp(to, t[k], t[k + 1]);
-    const auto at = [&](double time)
-    {
-      Vector<D> w;
-      for (int i = 0; i < D; ++i)
-        w[i] = std::lerp(v[k][i], v[k + 1][i], (time - t[k]) / (t[k + 1] - t[k]));
-      return w;
-    };
-    add(end - begin, at(begin), at(end));
-  }
-  add(std::max(0.0, to - std::max(from, t.back())), v.back(), v.back());
-  return moved;
-}
-
 template <class G>
 double particle_radius(const Particles<G::dim>& particles, Index p)
 {
@@ -298,12 +270,8 @@ double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
   return gap;
 }
 
-#define INSTANTIATE(D)                                                                                                 \
-  template Vector<D> displacement<D>(const Motion<D>&, double, double);                                                \
-  template void begin_step<D>(const Mesh<D>&, const TimeStep&, Contact<D>&);
-INSTANTIATE(2)
-INSTANTIATE(3)
-#undef INSTANTIATE
+template void begin_step<2>(const Mesh<2>&, const TimeStep&, Contact<2>&);
+template void begin_step<3>(const Mesh<3>&, const TimeStep&, Contact<3>&);
 #define INSTANTIATE(G)                                                                                                 \
   template bool add_contact_forces<G, G::dim>(const Mesh<G::dim>&, const std::vector<Run>&, const Movers&,             \
                                               std::span<const Vector<G::dim>>, const TimeStep&, Particles<G::dim>&,    \

@@ -12,24 +12,13 @@
 /// sqrt(beta) / dt_c, whatever the soil and the mesh; and with the gap and the slip at the end of the step, the nodes
 /// never get more work from it than its springs give up, as long as beta dt^2 <= dt_c^2 (docs/contact.md).
 
+#include "contact/motion.h"
 #include "contact/surfaces.h"
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
 namespace mpm
 {
-/// A translation whose velocity is linear in time between given times, and constant before and after.
-template <int D>
-struct Motion
-{
-  std::vector<double> times;         ///< rising [s]
-  std::vector<Vector<D>> velocities; ///< one for each [m/s]
-};
-
-/// Displacement of a motion from one time to a later one [m].
-template <int D>
-Vector<D> displacement(const Motion<D>& motion, double from, double to);
-
 /// A rigid surface that touches the particles, what it feels, and what it remembers.
 template <int D>
 struct Contact
@@ -51,7 +40,7 @@ struct Contact
   // Lower bounds of the gaps in each cell, found when the surface was displaced by `found_at`
   std::vector<double> clearance;
   Vector<D> found_at{};
-  double cell_size = 0; ///< displacement after which they are found anew [m]
+  double cell_size = 0; ///< displacement after which they are found again [m]
 };
 
 /// Half the side of a square or cube as large as a particle [m].
