@@ -146,9 +146,15 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
     return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
 
 
+_NEWER = ("needs_cell_size",)
+"""Properties that follow from the kind of a law, and that checkpoints of older versions do not have"""
+
+
 def _material(law: Any) -> str:
     """Text with the name and all parameters of a law and the laws within it, which differs between any two laws."""
-    names = sorted(name for name, value in vars(type(law)).items() if isinstance(value, property))
+    names = sorted(
+        name for name, value in vars(type(law)).items() if isinstance(value, property) and name not in _NEWER
+    )
     values = [getattr(law, name) for name in names]
     texts = [_value(law, value) for value in values]
     return f"{type(law).__name__}({', '.join(f'{name}={text}' for name, text in zip(names, texts, strict=True))})"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.checkpoint import _material
 from mpm_core.fingerprint import fingerprint
 
 import mpm_core as mpm
@@ -37,6 +38,7 @@ import sys
 sys.path[:0] = [{tests!r}, {place!r}]
 import law
 import mpm_core as mpm
+from mpm_core.checkpoint import _material
 from core_cases import box
 model = mpm.Model(box((2, 2)), mpm.Undrained(mpm.PythonLaw(law.Law({arguments})), water_modulus=1e7, porosity=0.4))
 model.seed(density=2000.0, per_cell=3)
@@ -126,3 +128,13 @@ def test_another_library_under_a_umat_is_refused(tmp_path):
         with pytest.raises(mpm.InputError, match="is of another materials"):
             model(law).restore(tmp_path / "state.h5")
     assert np.isfinite(model(umat(tmp_path, 1e6)).particles.stress).all()
+
+
+def test_a_law_is_described_as_in_older_checkpoints():
+    # As version 0.1.0 wrote it before laws told what they need; recorded, for old files cannot be written any more.
+    law = mpm.MohrCoulomb(young=2e5, poisson=0.3, cohesion=500.0, friction_angle=25.0, dilation_angle=5.0)
+    assert _material(law) == (
+        "MohrCoulomb(cohesion=500.0, dilation_angle=5.0, friction_angle=25.0, n_state=1, name='MohrCoulomb', "
+        "p_wave_modulus=269230.76923076925, poisson=0.3, shear_modulus=76923.07692307692, state_names=['plastic_strain'], "
+        "tension_cutoff=inf, young=200000.0)"
+    )
