@@ -38,7 +38,6 @@ import sys
 sys.path[:0] = [{tests!r}, {place!r}]
 import law
 import mpm_core as mpm
-from mpm_core.checkpoint import _material
 from core_cases import box
 model = mpm.Model(box((2, 2)), mpm.Undrained(mpm.PythonLaw(law.Law({arguments})), water_modulus=1e7, porosity=0.4))
 model.seed(density=2000.0, per_cell=3)
