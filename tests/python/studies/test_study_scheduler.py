@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import time
@@ -17,10 +18,8 @@ RECIPE = re.search(r"```bash\n(#!/bin/bash.*?)```", (ROOT / "docs/howto/cluster.
 def job(tmp_path):
     """The recipe of the documentation as a batch script, with a small slope that would take hours; started as Slurm does."""
     script = re.sub(r"^module load.*\n", "", RECIPE, flags=re.MULTILINE)
-    script = re.sub(r"--cell-size \S+", f"{' '.join(SMALL)} --time 1e4 --frames 1000", script).replace(
-        " studies/run", f" {ROOT}/studies/run"
-    )
-    script = script.replace("\nstudies/run", f"\n{ROOT}/studies/run")
+    script = re.sub(r"--cell-size \S+", f"{' '.join(SMALL)} --time 1e4 --frames 1000", script)
+    script = re.sub(r"(?<=\s)studies/run", shlex.quote(f"{ROOT}/studies/run"), script)
     (tmp_path / "job.sh").write_text(script)
     environment = {**ENVIRONMENT, "SLURM_NTASKS": "2", "SCRATCH": str(tmp_path), "OMPI_MCA_mpi_yield_when_idle": "1"}
     # Without what would have mpirun ask Slurm for its hosts.
