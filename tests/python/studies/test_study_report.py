@@ -119,7 +119,7 @@ def test_the_mouse_finds_particles_and_their_values(browser):
     move_slider(browser, 10)
     found = browser.execute_script(
         "const v = page.player.views[0], box = v.box.getBoundingClientRect(), [x, y] = v.screenOf(810);"
-        "const i = v.particleAt(box.left + x, box.top + y); return [i, page.player.told(v, i)]"
+        "const i = v.particleAt(box.left + x, box.top + y); return [i, page.player.describe(v, i)]"
     )
     row, column = divmod(810, SIDE)
     y = (row + 0.5) / SIDE
