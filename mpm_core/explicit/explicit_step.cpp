@@ -137,12 +137,15 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
 
 namespace
 {
-/// By law: 0 where nodal mixed discretisation averages strains only. In soil that rubs and hardly dilates, pressures
-/// that alternate from cell to cell would grow, if forces did not feel them, and cost it strength.
+/// By law: 0 where nodal mixed discretisation averages strains only; empty where it does for all. In soil that rubs and
+/// hardly dilates, pressures that alternate from cell to cell would grow, if forces did not feel them, and cost it
+/// strength.
 std::vector<unsigned char> averaged_laws(const std::vector<Law>& laws)
 {
   std::vector<unsigned char> averaged(laws.size());
   std::ranges::transform(laws, averaged.begin(), [](const Law& law) { return is_non_associated(law) ? 0 : 1; });
+  if (std::ranges::count(averaged, 1) == 0)
+    averaged.clear();
   return averaged;
 }
 } // namespace
