@@ -168,7 +168,9 @@ def test_nodal_values_of_a_mesh_cut_anew(comm):
     with pytest.raises(mpm.InputError, match="values has shape"):
         start.nodal_of(model.mesh, function[:-1])
     smaller = spread_box((2, 2), (1.0, 1.0), comm, bands)
-    with pytest.raises(mpm.InputError, match="other is a mesh without node .*, expected this mesh under another partition"):
+    with pytest.raises(
+        mpm.InputError, match="other is a mesh without node .*, expected this mesh under another partition"
+    ):
         start.nodal_of(smaller, np.zeros(len(smaller.points)))
 
 
