@@ -137,27 +137,26 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
 
 namespace
 {
-/// By law: 0 where nodal mixed discretisation averages strains only; empty where it does for all. In soil that rubs and
-/// hardly dilates, pressures that alternate from cell to cell would grow, if forces did not feel them, and cost it
-/// strength.
-std::vector<unsigned char> averaged_laws(const std::vector<Law>& laws)
+/// Finds by law: 0 where nodal mixed discretisation averages strains only; empty where it does for all. In frictional
+/// soil that hardly dilates, pressures that alternate from cell to cell would grow, if forces did not feel them, and
+/// cost it strength.
+void find_averaged_laws(const std::vector<Law>& laws, bool nmd, std::vector<unsigned char>& averaged)
 {
-  std::vector<unsigned char> averaged(laws.size());
-  std::ranges::transform(laws, averaged.begin(), [](const Law& law) { return is_non_associated(law) ? 0 : 1; });
-  if (std::ranges::count(averaged, 1) == 0)
-    averaged.clear();
-  return averaged;
+  averaged.clear();
+  if (!nmd || std::ranges::all_of(laws, is_non_associated))
+    return;
+  for (const Law& law : laws)
+    averaged.push_back(is_non_associated(law) ? 0 : 1);
 }
 } // namespace
 
 template <class G>
 void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
-  const auto averaged = options.nmd ? averaged_laws(model.laws) : std::vector<unsigned char>{};
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = options.integration;
-    field.integration.average_stress = averaged;
+    find_averaged_laws(model.laws, options.nmd, field.integration.average_stress);
   }
   model.last.dt = dt;
   begin_contacts(model, {model.time, dt});

@@ -137,7 +137,8 @@ template <class G, int D>
 void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field)
 {
   const auto& by_law = field.integration.average_stress;
-  std::vector<unsigned char> averaged(static_cast<std::size_t>(mesh.owned_cells), 1);
+  auto& averaged = field.integration.averaged_cells;
+  averaged.assign(static_cast<std::size_t>(mesh.owned_cells), 1);
   for (const Run& run : runs)
     averaged[run.cell] &= by_law[run.material];
   const auto stress_of = [&](Index c) { return averaged[c] ? integrated_stress(mesh, field, c) : Working<G>{}; };
