@@ -15,10 +15,10 @@ from time import perf_counter
 import numpy as np
 from common.consolidation_plots import ExcessPicture, save_excess, save_over_time
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
+from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
 from common.files import OutputError
-from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
 from common.progress import Progress
@@ -28,7 +28,6 @@ from common.summary import write_summary
 from common.water_site import DAY
 from dolfinx import fem
 from mpi4py import MPI
-from mpm_core.output import MeshOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -58,19 +57,17 @@ def parser() -> ArgumentParser:
 # --- 2. The ground in time -------------------------------------------------------------------------------------------
 
 
-class Files:
-    """What is written as time goes on: frames for ParaView, and the history of the settlements. A context manager."""
+class Files(FieldFiles):
+    """What is written as time goes on: frames for ParaView, and the history of the settlements."""
 
     def __init__(self, model: water.Consolidation, site: ConsolidationSite, folder: Path) -> None:
         self._model, self._names = model, list(site.points)
         self._places = np.array(list(site.points.values())) if comm.rank == 0 else np.empty((0, 2))
         self._start = model.pressure.x.array.copy()
         self._excess = fem.Function(model.pressure.function_space, name="excess_pore_pressure")
-        mesh = bridge.background_arrays(model.domain)
-        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
-        self._output = MeshOutput(folder / "consolidation", comm, mesh["points"], mesh["cells"][own])
-        columns = ["time_days", *(f"settlement_{name}_m" for name in self._names), "largest_excess_pressure_Pa"]
-        self.history = History(folder / "history.csv", [*columns, "water_error_m2"], comm)
+        settlements = (f"settlement_{name}_m" for name in self._names)
+        columns = ["time_days", *settlements, "largest_excess_pressure_Pa", "water_error_m2"]
+        super().__init__(model.domain, folder / "consolidation", folder / "history.csv", columns)
         self.pictures: list[ExcessPicture | None] = []
 
     def row(self, report: water.ConsolidationReport | None = None) -> None:
@@ -88,23 +85,15 @@ class Files:
         model = self._model
         stress = model.stress_function(smooth=True)
         there = bridge.evaluate_at(
-            self._points, u=model.displacement, p=model.pressure, excess=self._excess, stress=stress
+            self.points, u=model.displacement, p=model.pressure, excess=self._excess, stress=stress
         )
         fields = {"displacement": there["u"], "pore_pressure": there["p"][:, 0], "excess_pore_pressure": there["excess"][:, 0],
                   "effective_stress": there["stress"]}  # fmt: skip
-        self._output.write(model.time, fields, {})
+        self.output.write(model.time, fields, {})
         excess, moved = gathered(self._excess), gathered(model.displacement)
         days = model.time / DAY
         name = f"After {days:.0f} days" if days >= 100 else f"After {days:.3g} days"
         self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
-
-    def __enter__(self) -> Files:
-        self.history.__enter__()
-        return self
-
-    def __exit__(self, *error) -> None:
-        self.history.__exit__(*error)
-        self._output.close()
 
 
 def follow(a: Namespace, model: water.Consolidation, files: Files) -> str | None:

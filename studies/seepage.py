@@ -13,11 +13,11 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
 from common.files import OutputError
 from common.flow_steps import FlowSteps
-from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
 from common.progress import Progress
@@ -27,7 +27,6 @@ from common.seepage_plots import FlowPicture, flow_picture, save_flow
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, read_water_site
 from mpi4py import MPI
-from mpm_core.output import MeshOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -55,17 +54,13 @@ def parser() -> ArgumentParser:
 # --- 2. The flow -----------------------------------------------------------------------------------------------------
 
 
-class Files:
-    """What is written as the flow goes on: frames for ParaView and the history of the inflows. A context manager."""
+class Files(FieldFiles):
+    """What is written as the flow goes on: frames for ParaView and the history of the inflows."""
 
     def __init__(self, flow: water.Seepage, names: list[str], folder: Path) -> None:
         self._flow, self._names = flow, names
-        mesh = bridge.background_arrays(flow.domain)
-        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
-        self._n_cells = int(own.sum())
-        self._output = MeshOutput(folder / "seepage", comm, mesh["points"], mesh["cells"][own])
         columns = ["time_days", *(f"inflow_{name}_m2_per_day" for name in names), "stored_water_m2"]
-        self.history = History(folder / "history.csv", columns, comm)
+        super().__init__(flow.domain, folder / "seepage", folder / "history.csv", columns)
 
     def row(self) -> None:
         """Add the present inflows and stored water to the history. Collective."""
@@ -76,20 +71,12 @@ class Files:
     def frame(self) -> None:
         """Add pressure, head and velocity to the files for ParaView. Collective."""
         flow = self._flow
-        head = bridge.evaluate_at(self._points, p=flow.pressure_head)["p"][:, 0]
+        head = bridge.evaluate_at(self.points, p=flow.pressure_head)["p"][:, 0]
         velocity = flow.velocity()
-        dofs = cell_dofs(velocity.function_space)[: self._n_cells]
+        dofs = cell_dofs(velocity.function_space)[: self.n_cells]
         means = velocity.x.array.reshape(-1, flow.domain.geometry.dim)[dofs].mean(axis=1)
-        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self._points[:, -1]}
-        self._output.write(flow.time, fields, {"velocity": means})
-
-    def __enter__(self) -> Files:
-        self.history.__enter__()
-        return self
-
-    def __exit__(self, *error) -> None:
-        self.history.__exit__(*error)
-        self._output.close()
+        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self.points[:, -1]}
+        self.output.write(flow.time, fields, {"velocity": means})
 
 
 def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None]) -> str | None:

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.output import MeshOutput
 
 import fenics_bridge as bridge
 from fenics_bridge import water
 
+from .field_files import FieldFiles
 from .flow_steps import FlowSteps
 from .history import History
 from .options import add_choice, add_count, add_number, add_switch
@@ -87,35 +87,24 @@ def steady_safety(a: Namespace, slope: SlopeSite, time: float, title: str) -> br
     return safety(a, slope, flow.pore_pressure(a.suction), title)
 
 
-class Files:
-    """What is written as time goes on: the factors, and frames for ParaView. A context manager."""
+class Files(FieldFiles):
+    """What is written as time goes on: the factors, and frames for ParaView."""
 
     def __init__(self, flow: water.Seepage, folder: Path) -> None:
         self._flow = flow
-        mesh = bridge.background_arrays(flow.domain)
-        self._points, own = mesh["points"], mesh["cell_owners"] == comm.rank
-        self._output = MeshOutput(folder / "slope", comm, self._points, mesh["cells"][own])
         columns = ["time_days", "factor_of_safety", "failed_at_factor", "stored_water_m2"]
-        self.history = History(folder / "factors.csv", columns, comm)
+        super().__init__(flow.domain, folder / "slope", folder / "factors.csv", columns)
 
     def add(self, instant: Instant) -> None:
         """Add the factor, the pressures and the mechanism of an instant, at which the flow is. Collective."""
         flow, found = self._flow, instant.safety
         self.history.add(time_days=instant.time / DAY, factor_of_safety=found.value, failed_at_factor=found.failed_at,
                          stored_water_m2=flow.stored_water())  # fmt: skip
-        there = bridge.evaluate_at(self._points, p=flow.pressure_head, u=found.mechanism)
+        there = bridge.evaluate_at(self.points, p=flow.pressure_head, u=found.mechanism)
         head = there["p"][:, 0]
-        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self._points[:, -1],
-                  "acting_pore_pressure": instant.pore_pressure(self._points), "mechanism": there["u"]}  # fmt: skip
-        self._output.write(instant.time, fields, {})
-
-    def __enter__(self) -> Files:
-        self.history.__enter__()
-        return self
-
-    def __exit__(self, *error) -> None:
-        self.history.__exit__(*error)
-        self._output.close()
+        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self.points[:, -1],
+                  "acting_pore_pressure": instant.pore_pressure(self.points), "mechanism": there["u"]}  # fmt: skip
+        self.output.write(instant.time, fields, {})
 
 
 def follow(a: Namespace, slope: SlopeSite, folder: Path) -> tuple[list[Instant], History, str | None]:
