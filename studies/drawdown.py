@@ -22,6 +22,7 @@ from common.water_slopes import add_water_slope_options, safety, steady_safety
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge import water
 
 
 def parser() -> ArgumentParser:
@@ -32,14 +33,9 @@ def parser() -> ArgumentParser:
     return p
 
 
-def limits(a: Namespace, slope: SlopeSite) -> dict[str, bridge.Collapse]:
+def limits(a: Namespace, slope: SlopeSite, flow: water.Seepage) -> dict[str, bridge.Collapse]:
     """Factors of safety after drawdown that is slow, and fast, without limit. Collective."""
-    standing, end = slope.standing(), DAY * a.days
-    if standing is None:
-        raise mpm.InputError(f"{a.site}: no boundary has a reservoir, expected one whose level falls")
-    flow = slope.seepage()
-    flow.solve()
-    before = flow.pore_pressure()
+    standing, before, end = slope.standing(), flow.pore_pressure(), DAY * a.days
 
     def undrained(x: np.ndarray) -> np.ndarray:
         return np.maximum(before(x) - standing(x, 0.0) + standing(x, end), 0.0)
@@ -51,7 +47,7 @@ def limits(a: Namespace, slope: SlopeSite) -> dict[str, bridge.Collapse]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return water_slope_study(parser().parse_args(arguments), limits)
+    return water_slope_study(parser().parse_args(arguments), water.Reservoir, limits)
 
 
 if __name__ == "__main__":

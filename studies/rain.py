@@ -30,17 +30,13 @@ def parser() -> ArgumentParser:
     return p
 
 
-def limits(a: Namespace, slope: SlopeSite) -> dict[str, bridge.Collapse]:
+def limits(a: Namespace, slope: SlopeSite, flow: water.Seepage) -> dict[str, bridge.Collapse]:
     """The factor of safety at the beginning without what suction adds to it. Collective."""
-    if not any(isinstance(condition, water.Rain) for condition in slope.boundary):
-        raise mpm.InputError(f"{a.site}: no boundary has rain, expected one or more")
-    flow = slope.seepage()
-    flow.solve()
     return {"at the beginning, without suction": safety(a, slope, flow.pore_pressure(), "without suction")}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return water_slope_study(parser().parse_args(arguments), limits)
+    return water_slope_study(parser().parse_args(arguments), water.Rain, limits)
 
 
 if __name__ == "__main__":

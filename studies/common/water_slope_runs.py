@@ -10,6 +10,8 @@ from time import perf_counter
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
 
 from .collapse_runs import UNDECIDED
 from .page import Page
@@ -25,18 +27,29 @@ from .water_slopes import failure_time, follow, lowest
 comm = MPI.COMM_WORLD
 
 
-def water_slope_study(a: Namespace, limits_of: Callable[[Namespace, SlopeSite], dict[str, bridge.Collapse]]) -> int:
+Limits = Callable[[Namespace, SlopeSite, water.Seepage], dict[str, bridge.Collapse]]
+
+
+def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Reservoir], limits_of: Limits) -> int:
     """Carry out a study of a slope and its water; returns its exit code. Collective.
 
     Args:
         a: options, with those of `add_water_slope_options` and `add_slide_options`.
-        limits_of: function of options and site that returns factors of safety to compare with, by name.
+        changing: boundary condition that the site must have.
+        limits_of: function of options, site and steady flow at the beginning; returns factors of safety to compare with, by name.
+
+    Raises:
+        InputError: the site has no such boundary condition.
     """
     start = perf_counter()
     folder = open_results(a, comm)
     slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
-    limits = limits_of(a, slope)
-    instants, history, stopped = follow(a, slope, folder)
+    if not any(isinstance(condition, changing) for condition in slope.boundary):
+        raise mpm.InputError(f"{a.site}: no boundary has {changing.__name__.lower()}, expected one or more")
+    flow = slope.seepage()
+    flow.solve()
+    limits = limits_of(a, slope, flow)
+    instants, history, stopped = follow(a, slope, flow, folder)
     worst, failed = lowest(instants), failure_time(instants)
     shown = all(found.failed for found in [*limits.values(), *(instant.safety for instant in instants)])
     summary = {

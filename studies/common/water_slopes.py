@@ -107,11 +107,11 @@ class Files(FieldFiles):
         self.output.write(instant.time, fields, {})
 
 
-def follow(a: Namespace, slope: SlopeSite, folder: Path) -> tuple[list[Instant], History, str | None]:
-    """The slope from the steady flow of the beginning on; returns also why it ended early, if it did. Collective."""
+def follow(
+    a: Namespace, slope: SlopeSite, flow: water.Seepage, folder: Path
+) -> tuple[list[Instant], History, str | None]:
+    """The slope and its flow, steady at the beginning; returns also why it ended early, if it did. Collective."""
     end = DAY * a.days
-    flow = slope.seepage()
-    flow.solve()
     steps, instants, stopped = FlowSteps(flow, end), [], None
     corners = np.array([0.0, *slope.times(end)])
     between = np.interp(np.arange(0, len(corners) - 0.75, 0.25), np.arange(len(corners)), corners)

@@ -42,7 +42,7 @@ def run(name, path, folder, options):
         ("unit_weight = 20e3  # N/m3, saturated\n", "", "soils.bank: has no unit_weight"),
         ("[soils.bank]", "[soils.levee]", "levee"),
         ("[boundaries.face]", "[boundaries.front]", "front"),
-        ("reservoir = [[0.0, 7.0], [3.0, 1.0]]", "rain = 1.0", "no boundary has a reservoir"),
+        ("reservoir = [[0.0, 7.0], [3.0, 1.0]]", "rain = 1.0", "no boundary has reservoir"),
     ],
 )
 def test_a_wrong_site_is_named(old, new, words, tmp_path):
