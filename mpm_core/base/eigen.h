@@ -6,7 +6,7 @@
 
 #include <Eigen/Dense>
 
-namespace mpm
+namespace mpm::base
 {
 /// A view of a matrix, row by row.
 template <int D>
@@ -14,4 +14,4 @@ inline auto as_eigen(const Matrix<D>& a)
 {
   return Eigen::Map<const Eigen::Matrix<double, D, D, Eigen::RowMajor>>(a.front().data());
 }
-} // namespace mpm
+} // namespace mpm::base

@@ -15,7 +15,7 @@
 
 #include "base/tensor.h"
 
-namespace mpm
+namespace mpm::base
 {
 struct PlaneStrain
 {
@@ -82,4 +82,4 @@ inline double thickness(const Vector<G::dim>& x)
   else
     return 1;
 }
-} // namespace mpm
+} // namespace mpm::base

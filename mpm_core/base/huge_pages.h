@@ -11,7 +11,7 @@
 #include <sys/mman.h>
 #endif
 
-namespace mpm
+namespace mpm::base
 {
 /// Allocator that asks for huge pages for arrays larger than one. A step reads and writes some twenty arrays side by
 /// side; in pages of 4 KB each of them meets a new page every 512 numbers, whose address the processor has to look up
@@ -70,4 +70,4 @@ struct HugePages
 
   friend bool operator==(const HugePages&, const HugePages&) = default;
 };
-} // namespace mpm
+} // namespace mpm::base

@@ -5,7 +5,7 @@
 #include <array>
 #include <chrono>
 
-namespace mpm
+namespace mpm::base
 {
 /// The phases of an explicit step
 enum class Phase
@@ -50,4 +50,4 @@ private:
   std::chrono::steady_clock::time_point _start;
   int _phase = -1;
 };
-} // namespace mpm
+} // namespace mpm::base

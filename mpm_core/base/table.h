@@ -4,7 +4,7 @@
 
 #include "base/types.h"
 
-namespace mpm
+namespace mpm::base
 {
 /// Rows of `width` numbers; row-major.
 struct Table
@@ -15,4 +15,4 @@ struct Table
   double most_count = 0;       ///< where above 0, the numbers are counts: whole numbers from 0 to this one
   bool may_be_unknown = false; ///< a number may be NaN, such as an energy that a law does not say
 };
-} // namespace mpm
+} // namespace mpm::base

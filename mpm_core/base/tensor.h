@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::base
 {
 template <int D>
 using Matrix = std::array<Vector<D>, D>; // row-major
@@ -81,4 +81,4 @@ inline double norm(const Vector<D>& a)
 {
   return std::sqrt(dot<D>(a, a));
 }
-} // namespace mpm
+} // namespace mpm::base

@@ -10,6 +10,7 @@
 ///   In plane strain the component zz of a strain increment is zero, that of the stress is not.
 
 #include "base/huge_pages.h"
+#include "base/layers.h"
 
 #include <array>
 #include <cstddef>
@@ -18,7 +19,7 @@
 #include <string>
 #include <vector>
 
-namespace mpm
+namespace mpm::base
 {
 /// Number of a cell, node or particle on this rank.
 using Index = std::int32_t;
@@ -56,4 +57,4 @@ class RunError : public std::runtime_error
 public:
   using std::runtime_error::runtime_error;
 };
-} // namespace mpm
+} // namespace mpm::base

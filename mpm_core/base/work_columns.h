@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstddef>
 
-namespace mpm
+namespace mpm::base
 {
 /// Points handled at a time: their work arrays stay in the first-level cache
 inline constexpr std::size_t block_size = 256;
@@ -44,4 +44,4 @@ private:
   using Members = std::array<double, width>;
   std::array<WorkColumn<double>, width> _columns;
 };
-} // namespace mpm
+} // namespace mpm::base

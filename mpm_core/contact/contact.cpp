@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-namespace mpm
+namespace mpm::contact
 {
 template <class G>
 double particle_radius(const Particles<G::dim>& particles, Index p)
@@ -280,4 +280,4 @@ template void begin_step<3>(const Mesh<3>&, const TimeStep&, Contact<3>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::contact

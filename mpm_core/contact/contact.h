@@ -17,7 +17,7 @@
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
-namespace mpm
+namespace mpm::contact
 {
 /// A rigid surface that touches the particles, what it feels, and what it remembers.
 template <int D>
@@ -76,4 +76,4 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
 /// The smallest gap of this rank's particles; infinite without any [m].
 template <class G, int D = G::dim>
 double smallest_gap(const Particles<D>& particles, const Surface<D>& surface);
-} // namespace mpm
+} // namespace mpm::contact

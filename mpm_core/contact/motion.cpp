@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::contact
 {
 template <int D>
 Vector<D> displacement(const Motion<D>& motion, double from, double to)
@@ -35,4 +35,4 @@ Vector<D> displacement(const Motion<D>& motion, double from, double to)
 
 template Vector<2> displacement<2>(const Motion<2>&, double, double);
 template Vector<3> displacement<3>(const Motion<3>&, double, double);
-} // namespace mpm
+} // namespace mpm::contact

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace mpm
+namespace mpm::contact
 {
 /// A translation whose velocity is linear in time between given times, and constant before and after.
 template <int D>
@@ -19,4 +19,4 @@ struct Motion
 /// Displacement of a motion from one time to a later one [m].
 template <int D>
 Vector<D> displacement(const Motion<D>& motion, double from, double to);
-} // namespace mpm
+} // namespace mpm::contact

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mpm
+namespace mpm::contact
 {
 namespace
 {
@@ -139,4 +139,4 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
 
 template Distance<2> distance<2>(const Surface<2>&, const Vector<2>&);
 template Distance<3> distance<3>(const Surface<3>&, const Vector<3>&);
-} // namespace mpm
+} // namespace mpm::contact

@@ -6,7 +6,7 @@
 
 #include <variant>
 
-namespace mpm
+namespace mpm::contact
 {
 /// A half space; the normal, of length 1, points out of it towards the soil.
 template <int D>
@@ -52,4 +52,4 @@ struct Distance
 
 template <int D>
 Distance<D> distance(const Surface<D>& surface, const Vector<D>& x);
-} // namespace mpm
+} // namespace mpm::contact

@@ -12,7 +12,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 namespace
 {
@@ -255,4 +255,4 @@ INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
 template double critical_time_step(const Mesh<2>&, const MaterialPoints<2>&, MPI_Comm);
 template double critical_time_step(const Mesh<3>&, const MaterialPoints<3>&, MPI_Comm);
-} // namespace mpm
+} // namespace mpm::explicit_scheme

@@ -4,7 +4,7 @@
 
 #include "model/material_points.h"
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 /// When stresses are updated, and with which velocities.
 enum class StressUpdate
@@ -46,4 +46,4 @@ double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, 
 /// step: 1 - (1 - fraction)^(dt / dt_cr).
 /// @param fraction  of a critical time step, in [0, 1]
 double pic_fraction_of_step(double fraction, double dt, double critical);
-} // namespace mpm
+} // namespace mpm::explicit_scheme

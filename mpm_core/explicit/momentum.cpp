@@ -2,7 +2,7 @@
 
 #include "model/mapping.h"
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 template <class G>
 void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt, VelocityField<G>& field)
@@ -96,4 +96,4 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::explicit_scheme

@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 /// a_i = (f_ext - f_int - D)_i / m_i, with boundary conditions; D_i = alpha |R_i| sign(v_i) per component,
 /// R = f_ext - f_int.
@@ -27,4 +27,4 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field);
 template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
                 double damping, double dt, Totals& totals);
-} // namespace mpm
+} // namespace mpm::explicit_scheme

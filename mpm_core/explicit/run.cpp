@@ -7,7 +7,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 namespace
 {
@@ -215,4 +215,4 @@ Diagnostics diagnostics(const Model<G>& model)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::explicit_scheme

@@ -4,7 +4,7 @@
 
 #include "explicit/explicit_step.h"
 
-namespace mpm
+namespace mpm::explicit_scheme
 {
 struct RunOptions
 {
@@ -61,4 +61,4 @@ struct Diagnostics
 /// @note Collective
 template <class G>
 Diagnostics diagnostics(const Model<G>& model);
-} // namespace mpm
+} // namespace mpm::explicit_scheme

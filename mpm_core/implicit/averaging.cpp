@@ -2,7 +2,7 @@
 
 #include "model/integration.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G, int D>
 void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
@@ -87,4 +87,4 @@ void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

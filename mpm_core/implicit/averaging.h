@@ -5,7 +5,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes,
 /// ...
@@ -23,4 +23,4 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
 template <class G, int D = G::dim>
 void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                          CooEntries& by_displacement, CooEntries& by_strain);
-} // namespace mpm
+} // namespace mpm::implicit

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G>
 void balance(const VelocityField<G>& field, ImplicitStep<G>& step)
@@ -51,4 +51,4 @@ TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& st
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

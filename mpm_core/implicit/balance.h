@@ -4,7 +4,7 @@
 
 #include "implicit/trial.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// r = f_ext - f_int - ghost penalty - inertia of the forces at the nodes (I3), without supported directions.
 template <class G>
@@ -14,4 +14,4 @@ void balance(const VelocityField<G>& field, ImplicitStep<G>& step);
 /// @note Collective
 template <class G>
 TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& step, const TrialCount<G::dim>& count);
-} // namespace mpm
+} // namespace mpm::implicit

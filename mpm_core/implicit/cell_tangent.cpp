@@ -1,6 +1,6 @@
 #include "implicit/cell_tangent.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -163,4 +163,4 @@ CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -5,7 +5,7 @@
 #include "implicit/step.h"
 #include "transfer/kinematics.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// @param c       sum V dsigma/dstrain over the cell's particles, of the components that do work
 /// @param stress  sum V sigma at the increment's end
@@ -13,4 +13,4 @@ namespace mpm
 template <class G, int D = G::dim>
 CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
                             const CellStrain<D>& strain, const ImplicitOptions& options);
-} // namespace mpm
+} // namespace mpm::implicit

@@ -29,7 +29,7 @@
 #include <algorithm>
 #include <numbers>
 
-namespace mpm
+namespace mpm::implicit
 {
 /// g: length of each stage of a step of second order, over that of the step.
 inline constexpr double stage_fraction = 1 - 0.5 * std::numbers::sqrt2;
@@ -62,4 +62,4 @@ inline double left_by_second_order(double x)
   const double z = stage_fraction * stage_fraction * x * x;
   return (1 + 2 * z) / ((1 + z) * (1 + z));
 }
-} // namespace mpm
+} // namespace mpm::implicit

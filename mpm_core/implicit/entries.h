@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Entries that are added up where rows and columns repeat. Rows may be another rank's.
 struct CooEntries
@@ -90,4 +90,4 @@ private:
   const ImplicitSystem<D>& _system;
   Writer _writer;
 };
-} // namespace mpm
+} // namespace mpm::implicit

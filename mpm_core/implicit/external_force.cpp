@@ -1,6 +1,6 @@
 #include "implicit/external_force.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 template <int D>
 std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity,
@@ -33,4 +33,4 @@ template std::vector<Vector<3>> external_forces<3>(std::span<const NodeSums<3>>,
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

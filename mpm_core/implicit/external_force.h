@@ -4,7 +4,7 @@
 
 #include "implicit/step.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// f_ext (15) at the end of the stage, over all ranks; where the step applies a fraction of its load only, that
 /// fraction of what is out of balance at its start.
@@ -18,4 +18,4 @@ std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const
 template <class G, int D = G::dim>
 void add_external_forces(const ImplicitStep<G>& step, std::span<const unsigned char> owned,
                          std::vector<NodalForces<D>>& forces);
-} // namespace mpm
+} // namespace mpm::implicit

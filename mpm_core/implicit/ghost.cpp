@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G, int D>
 void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces)
@@ -57,4 +57,4 @@ void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

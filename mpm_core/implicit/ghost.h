@@ -4,7 +4,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Forces of the penalty for the iterate `field.velocity`.
 template <class G, int D = G::dim>
@@ -14,4 +14,4 @@ void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step
 /// boundary.
 template <class G, int D = G::dim>
 void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent);
-} // namespace mpm
+} // namespace mpm::implicit

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -135,4 +135,4 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Mesh<D>& mesh, const Material
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -16,7 +16,7 @@
 #include "model/material_points.h"
 #include "parallel/halo.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 struct GhostOptions
 {
@@ -58,4 +58,4 @@ inline Vector<D> jump_over(const GhostFacet<D>& facet, Nodal&& nodal)
   }
   return jump;
 }
-} // namespace mpm
+} // namespace mpm::implicit

@@ -18,7 +18,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace mpm
+namespace mpm::implicit
 {
 // --- Start: v0, and the first iterate (I1)
 
@@ -197,4 +197,4 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

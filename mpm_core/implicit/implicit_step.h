@@ -27,7 +27,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Begins a step of length dt [s]: maps the particles to the nodes, takes v0 (dynamic) or rest (quasi-static), under
 /// the supports, as first iterate.
@@ -72,4 +72,4 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
 /// @note Collective
 template <class G>
 bool accept_step(Model<G>& model, const ImplicitStep<G>& step);
-} // namespace mpm
+} // namespace mpm::implicit

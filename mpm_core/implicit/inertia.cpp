@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G>
 Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, double start, double end)
@@ -72,4 +72,4 @@ template std::vector<double> shear_frequencies<3>(std::span<const double>, std::
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -5,7 +5,7 @@
 #include "implicit/damped_inertia.h"
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// The force of one component of a node for its velocities at start and end of the stage, and its derivative by the
 /// iterate.
@@ -29,4 +29,4 @@ void add_inertia_entries(const VelocityField<G>& field, const ImplicitStep<G>& s
 /// @param stiffness  sum_p V_p G |grad N|^2 of each node, over all ranks [N/m]
 template <int D>
 std::vector<double> shear_frequencies(std::span<const double> stiffness, std::span<const NodeSums<D>> nodes);
-} // namespace mpm
+} // namespace mpm::implicit

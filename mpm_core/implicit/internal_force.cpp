@@ -2,7 +2,7 @@
 
 #include "transfer/nodes.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G, int D>
 void add_internal_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces)
@@ -61,4 +61,4 @@ void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Bloc
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

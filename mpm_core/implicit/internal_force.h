@@ -4,7 +4,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// f_int (14) of the trial's stresses.
 template <class G, int D = G::dim>
@@ -14,4 +14,4 @@ void add_internal_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::
 /// @pre the step's tangents belong to the iterate
 template <class G, int D = G::dim>
 void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent);
-} // namespace mpm
+} // namespace mpm::implicit

@@ -1,6 +1,6 @@
 #include "implicit/nodal_stiffness.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 template <int D>
 std::vector<double> nodal_stiffness(const Mesh<D>& mesh, const MaterialPoints<D>& points, double (*modulus)(const Law&))
@@ -23,4 +23,4 @@ std::vector<double> nodal_stiffness(const Mesh<D>& mesh, const MaterialPoints<D>
 
 template std::vector<double> nodal_stiffness(const Mesh<2>&, const MaterialPoints<2>&, double (*)(const Law&));
 template std::vector<double> nodal_stiffness(const Mesh<3>&, const MaterialPoints<3>&, double (*)(const Law&));
-} // namespace mpm
+} // namespace mpm::implicit

@@ -4,10 +4,10 @@
 
 #include "model/material_points.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// sum_p V_p M |grad N_i|^2 of each node for a modulus M of the laws [Pa]; this rank's part [N/m].
 template <int D>
 std::vector<double> nodal_stiffness(const Mesh<D>& mesh, const MaterialPoints<D>& points,
                                     double (*modulus)(const Law&));
-} // namespace mpm
+} // namespace mpm::implicit

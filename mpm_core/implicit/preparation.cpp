@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G>
 void find_active(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field, ImplicitStep<G>& step)
@@ -52,4 +52,4 @@ void make_halos_once(const Mesh<G::dim>& mesh, const NodeExchange& exchange, Imp
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

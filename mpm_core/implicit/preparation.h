@@ -4,7 +4,7 @@
 
 #include "implicit/step.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Cells with particles, and the nodes that they touch: those that the step moves. A node may have stiffness and yet
 /// hardly any mass.
@@ -23,4 +23,4 @@ void find_frequencies(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Ma
 /// @note Collective
 template <class G>
 void make_halos_once(const Mesh<G::dim>& mesh, const NodeExchange& exchange, ImplicitStep<G>& step);
-} // namespace mpm
+} // namespace mpm::implicit

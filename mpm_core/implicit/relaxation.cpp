@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -221,4 +221,4 @@ int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, dou
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -19,7 +19,7 @@
 
 #include "implicit/implicit_step.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 enum class RelaxationKind
 {
@@ -51,4 +51,4 @@ Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, Relaxatio
 /// @note Collective
 template <class G, int D = G::dim>
 int relax(Model<G>& model, ImplicitStep<G>& step, Relaxation<D>& relaxation, double tolerance, int most);
-} // namespace mpm
+} // namespace mpm::implicit

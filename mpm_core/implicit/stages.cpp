@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -120,4 +120,4 @@ void add_work(const VelocityField<G>& field, const ImplicitStep<G>& step, std::s
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

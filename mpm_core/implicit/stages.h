@@ -4,7 +4,7 @@
 
 #include "implicit/step.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// The only stage of a step, or the first one, from the velocities `field.start_velocity`.
 template <class G>
@@ -35,4 +35,4 @@ double displacement_error(const NodeExchange& exchange, const VelocityField<G>& 
 template <class G>
 void add_work(const VelocityField<G>& field, const ImplicitStep<G>& step, std::span<const unsigned char> owned,
               Totals& totals);
-} // namespace mpm
+} // namespace mpm::implicit

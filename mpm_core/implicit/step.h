@@ -7,7 +7,7 @@
 
 #include <limits>
 
-namespace mpm
+namespace mpm::implicit
 {
 struct ImplicitOptions
 {
@@ -128,4 +128,4 @@ inline double end_velocity(const ImplicitStep<G>& step, const VelocityField<G>& 
   const double carried = stage.carried.empty() ? 0 : stage.carried[node][component];
   return (field.velocity[node][component] - carried) / stage.weight;
 }
-} // namespace mpm
+} // namespace mpm::implicit

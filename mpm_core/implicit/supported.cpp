@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 template <class G>
 void impose_supports(const ImplicitStep<G>& step, VelocityField<G>& field)
@@ -35,4 +35,4 @@ template void add_support_entries(const ImplicitSystem<3>&, BlockWriter<3>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -4,7 +4,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Makes the iterate `field.velocity` satisfy the supports.
 template <class G>
@@ -13,4 +13,4 @@ void impose_supports(const ImplicitStep<G>& step, VelocityField<G>& field);
 /// Supported directions in the tangent: their corrections are zero, by the equations s (1 - P) du = 0.
 template <int D>
 void add_support_entries(const ImplicitSystem<D>& system, BlockWriter<D>& tangent);
-} // namespace mpm
+} // namespace mpm::implicit

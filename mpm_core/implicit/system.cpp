@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -104,4 +104,4 @@ INSTANTIATE(3)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -7,7 +7,7 @@
 
 #include "implicit/step.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// The nodes of the system.
 template <int D>
@@ -51,4 +51,4 @@ std::vector<double> owned_values(const ImplicitSystem<D>& system, std::span<cons
 template <int D>
 void set_nodal(NodeExchange& exchange, const ImplicitSystem<D>& system, std::span<const double> values,
                std::span<Vector<D>> nodal);
-} // namespace mpm
+} // namespace mpm::implicit

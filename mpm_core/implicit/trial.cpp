@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -255,4 +255,4 @@ TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& materia
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

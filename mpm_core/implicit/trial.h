@@ -5,7 +5,7 @@
 #include "implicit/step.h"
 #include "model/material_points.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// What a trial found among this rank's particles.
 template <int D>
@@ -22,4 +22,4 @@ struct TrialCount
 template <class G, int D = G::dim>
 TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& material, const VelocityField<G>& field,
                            bool tangents, ImplicitStep<G>& step);
-} // namespace mpm
+} // namespace mpm::implicit

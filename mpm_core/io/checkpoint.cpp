@@ -13,7 +13,7 @@
 #include <cerrno>
 #include <cstring>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -319,4 +319,4 @@ std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh)
   template std::uint64_t mesh_fingerprint(MPI_Comm, const Mesh<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::io

@@ -13,7 +13,7 @@
 
 #include <filesystem>
 
-namespace mpm
+namespace mpm::io
 {
 /// The parts of a run's state beside the particles.
 struct StateTables
@@ -71,4 +71,4 @@ Checkpoint<D> read_checkpoint(const NodeExchange& exchange, const std::filesyste
 /// @note Collective
 template <int D>
 std::uint64_t mesh_fingerprint(MPI_Comm comm, const Mesh<D>& mesh);
-} // namespace mpm
+} // namespace mpm::io

@@ -12,7 +12,7 @@
 #include <limits>
 #include <span>
 
-namespace mpm
+namespace mpm::io
 {
 /// Whole numbers below it are exact in double precision; a run counts no further.
 inline constexpr double most_exact = 9007199254740992.0;
@@ -129,4 +129,4 @@ inline GlobalIndex countable_rows(Hdf5Input& file, const std::string& name)
   file.check();
   return rows;
 }
-} // namespace mpm
+} // namespace mpm::io

@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstdint>
 
-namespace mpm
+namespace mpm::io
 {
 /// A file that closes itself.
 class Descriptor
@@ -60,4 +60,4 @@ private:
   int _file;
 };
 
-} // namespace mpm
+} // namespace mpm::io

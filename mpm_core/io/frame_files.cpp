@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -172,4 +172,4 @@ void FrameFiles::forget()
   _file.reset();
   _compressed.reset();
 }
-} // namespace mpm
+} // namespace mpm::io

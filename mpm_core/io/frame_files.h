@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::io
 {
 /// Writes one HDF5 file after another.
 ///
@@ -106,4 +106,4 @@ private:
   std::vector<std::byte> _values; ///< else, of the latest dataset
   std::string _failure;
 };
-} // namespace mpm
+} // namespace mpm::io

@@ -10,7 +10,7 @@
 #include <string>
 #include <type_traits>
 
-namespace mpm
+namespace mpm::io
 {
 static_assert(std::is_same_v<hid_t, std::int64_t>);
 
@@ -60,4 +60,4 @@ inline std::string hdf5_reason()
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, keep_last, &reason);
   return reason;
 }
-} // namespace mpm
+} // namespace mpm::io

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -257,4 +257,4 @@ void Hdf5File::close()
   }
   check();
 }
-} // namespace mpm
+} // namespace mpm::io

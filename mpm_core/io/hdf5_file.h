@@ -13,7 +13,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace mpm
+namespace mpm::io
 {
 /// How numbers are stored.
 enum class Number
@@ -113,4 +113,4 @@ private:
   std::string _failure;              ///< what failed first on this rank; empty if nothing did
   std::int64_t _needed = 0;          ///< bytes that the file may have come to need
 };
-} // namespace mpm
+} // namespace mpm::io

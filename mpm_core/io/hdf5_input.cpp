@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::io
 {
 Hdf5Input::Hdf5Input(MPI_Comm comm, std::filesystem::path path) : _comm(comm), _path(std::move(path))
 {
@@ -137,4 +137,4 @@ void Hdf5Input::check()
 
 template std::vector<double> Hdf5Input::read(const std::string&, const RowSlice&, int);
 template std::vector<std::int64_t> Hdf5Input::read(const std::string&, const RowSlice&, int);
-} // namespace mpm
+} // namespace mpm::io

@@ -4,7 +4,7 @@
 
 #include "io/hdf5_file.h"
 
-namespace mpm
+namespace mpm::io
 {
 /// An HDF5 file opened by all ranks for reading. As with `Hdf5File`, a rank on which something fails goes on through
 /// the same calls as the others, with values of zero, and `check` raises the error on all. Every function is
@@ -50,4 +50,4 @@ private:
   std::int64_t _file = -1; ///< hid_t
   std::string _failure;
 };
-} // namespace mpm
+} // namespace mpm::io

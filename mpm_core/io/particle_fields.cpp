@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -74,4 +74,4 @@ ParticleFields particle_fields(const Particles<D>& particles, const std::vector<
 
 template ParticleFields particle_fields(const Particles<2>&, const std::vector<std::string>&);
 template ParticleFields particle_fields(const Particles<3>&, const std::vector<std::string>&);
-} // namespace mpm
+} // namespace mpm::io

@@ -5,7 +5,7 @@
 #include "io/series.h"
 #include "particles/particles.h"
 
-namespace mpm
+namespace mpm::io
 {
 /// Fields that point into the particles' columns.
 /// @param names  columns of the particles, `displacement` (position minus initial position) or `plastic_strain` (the
@@ -13,4 +13,4 @@ namespace mpm
 /// @throws InputError for a field that there is not
 template <int D>
 ParticleFields particle_fields(const Particles<D>& particles, const std::vector<std::string>& names);
-} // namespace mpm
+} // namespace mpm::io

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <tuple>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -233,4 +233,4 @@ void write(MPI_Comm comm, const Frame& frame)
   }
   SeriesFile::write(files);
 }
-} // namespace mpm
+} // namespace mpm::io

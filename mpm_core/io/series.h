@@ -4,7 +4,7 @@
 
 #include "io/series_file.h"
 
-namespace mpm
+namespace mpm::io
 {
 /// What a frame says of this rank's particles.
 struct ParticleFields
@@ -93,4 +93,4 @@ void require_same_fields(MPI_Comm comm, const std::string& error, const std::str
 /// @throws RunError if a file cannot be written, with path and reason
 /// @note Collective
 void write(MPI_Comm comm, const Frame& frame);
-} // namespace mpm
+} // namespace mpm::io

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -313,4 +313,4 @@ void SeriesFile::on_writer(F&& work)
   if (const std::string failure = shared_failure(comm(), _files.is_writer() ? work() : ""); !failure.empty())
     throw RunError(failure);
 }
-} // namespace mpm
+} // namespace mpm::io

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-namespace mpm
+namespace mpm::io
 {
 /// One component of real values to write, where they are: every `stride`-th number from `first` on.
 struct OutputColumn
@@ -147,4 +147,4 @@ private:
   int _n_frames = 0;
   bool _closed = false;
 };
-} // namespace mpm
+} // namespace mpm::io

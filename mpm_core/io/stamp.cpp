@@ -10,7 +10,7 @@
 #include <cstdio>
 #include <cstring>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -126,4 +126,4 @@ void check_stamp(MPI_Comm comm, const std::filesystem::path& path)
   const bool same = checksum(comm, "read", path, stamp.bytes) == stamp.checksum;
   raise_together(comm, "read", path, same ? "" : "its checksum is not that of its content; it is damaged");
 }
-} // namespace mpm
+} // namespace mpm::io

@@ -10,7 +10,7 @@
 
 #include <filesystem>
 
-namespace mpm
+namespace mpm::io
 {
 inline constexpr int stamp_size = 512;
 inline constexpr int checkpoint_format = 1;
@@ -33,4 +33,4 @@ void stamp_file(MPI_Comm comm, const std::filesystem::path& path);
 /// truncated or damaged
 /// @note Collective
 void check_stamp(MPI_Comm comm, const std::filesystem::path& path);
-} // namespace mpm
+} // namespace mpm::io

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <fstream>
 
-namespace mpm
+namespace mpm::io
 {
 namespace
 {
@@ -169,4 +169,4 @@ std::string XdmfSeries::rewrite(const std::string& frame, bool with_space)
   _file.emplace(_path.c_str(), O_RDWR);
   return {};
 }
-} // namespace mpm
+} // namespace mpm::io

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-namespace mpm
+namespace mpm::io
 {
 /// How a dataset is described.
 struct XdmfData
@@ -70,4 +70,4 @@ private:
   std::optional<Descriptor> _file; ///< with space behind the document
   std::string _addition;
 };
-} // namespace mpm
+} // namespace mpm::io

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <tuple>
 
-namespace mpm
+namespace mpm::mesh
 {
 namespace
 {
@@ -272,4 +272,4 @@ template Mesh<2> make_mesh(const MeshInput<2>&, int);
 template Mesh<3> make_mesh(const MeshInput<3>&, int);
 template double smallest_altitude<2>(const CellShape<2>&);
 template double smallest_altitude<3>(const CellShape<3>&);
-} // namespace mpm
+} // namespace mpm::mesh

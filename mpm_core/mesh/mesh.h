@@ -8,7 +8,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::mesh
 {
 /// Linear shape functions of one cell, about its centre: N_k(x) = 1/(D+1) + gradient[k] . (x - centre).
 /// Written about the centre so that a mesh far from the origin loses no digits.
@@ -134,4 +134,4 @@ inline std::array<Index, D> facet_nodes(const std::array<Index, D + 1>& cell, in
       nodes[j++] = cell[i];
   return nodes;
 }
-} // namespace mpm
+} // namespace mpm::mesh

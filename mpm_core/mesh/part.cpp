@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::mesh
 {
 namespace
 {
@@ -72,4 +72,4 @@ void add_cells(const Mesh<D>& mesh, std::span<const Index> cells, MeshPart& part
   template void add_cells<D>(const Mesh<D>&, std::span<const Index>, MeshPart&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::mesh

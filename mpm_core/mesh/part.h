@@ -5,7 +5,7 @@
 
 #include "mesh/mesh.h"
 
-namespace mpm
+namespace mpm::mesh
 {
 /// Cells and nodes in rising order, so that sums over them do not depend on how the part came about.
 struct MeshPart
@@ -22,4 +22,4 @@ MeshPart make_part(const Mesh<D>& mesh, std::span<const Index> cells, std::span<
 /// Adds cells and their nodes.
 template <int D>
 void add_cells(const Mesh<D>& mesh, std::span<const Index> cells, MeshPart& part);
-} // namespace mpm
+} // namespace mpm::mesh

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::mesh
 {
 namespace
 {
@@ -87,4 +87,4 @@ template Location walk_to_cell<2>(const Mesh<2>&, const Vector<2>&, Index);
 template Location walk_to_cell<3>(const Mesh<3>&, const Vector<3>&, Index);
 template Location find_cell<2>(const Mesh<2>&, const Vector<2>&, Index);
 template Location find_cell<3>(const Mesh<3>&, const Vector<3>&, Index);
-} // namespace mpm
+} // namespace mpm::mesh

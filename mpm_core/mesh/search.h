@@ -4,7 +4,7 @@
 
 #include "mesh/mesh.h"
 
-namespace mpm
+namespace mpm::mesh
 {
 /// A point belongs to a cell when no shape function is below minus this: points on a facet must not fall between cells.
 inline constexpr double inside_tolerance = 1e-10;
@@ -33,4 +33,4 @@ Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 /// The cell of point x without a guess, by the bins of the mesh; `none` when outside.
 template <int D>
 Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x);
-} // namespace mpm
+} // namespace mpm::mesh

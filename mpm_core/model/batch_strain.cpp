@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -131,4 +131,4 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

@@ -8,7 +8,7 @@
 
 #include <bit>
 
-namespace mpm
+namespace mpm::model
 {
 /// Scratch of a batch, in the first-level cache.
 template <int D>
@@ -48,4 +48,4 @@ template <class G, int D = G::dim>
 void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                          const PassOptions& options, const Batch& batch, Particles<D>& particles,
                          BatchScratch<D>& scratch);
-} // namespace mpm
+} // namespace mpm::model

@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Consecutive runs of one material, at most `batch_size` particles: what a law is given at once.
 struct Batch
@@ -23,4 +23,4 @@ inline Batch next_batch(const std::vector<Run>& runs, std::size_t first_run)
     batch.last = runs[batch.last_run++].last;
   return batch;
 }
-} // namespace mpm
+} // namespace mpm::model

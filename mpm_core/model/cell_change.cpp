@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -114,4 +114,4 @@ void migrate_particles(Model<G>& model)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

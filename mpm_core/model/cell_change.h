@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Adds the tractions of particles to the moments of their cell, where a field has any.
 template <class G, int D = G::dim>
@@ -30,4 +30,4 @@ void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<c
 /// @note Collective
 template <class G>
 void migrate_particles(Model<G>& model);
-} // namespace mpm
+} // namespace mpm::model

@@ -1,6 +1,6 @@
 #include "model/contacts.h"
 
-namespace mpm
+namespace mpm::model
 {
 template <class G>
 void begin_contacts(Model<G>& model, const TimeStep& step)
@@ -38,4 +38,4 @@ void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>&
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Begins a step of all contacts. @note Not collective
 template <class G>
@@ -15,4 +15,4 @@ void begin_contacts(Model<G>& model, const TimeStep& step);
 /// @note Collective where there are contacts
 template <class G>
 void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>& field);
-} // namespace mpm
+} // namespace mpm::model

@@ -3,7 +3,7 @@
 #include "materials/laws/stored_energy.h"
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 template <class G, int D>
 ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
@@ -64,4 +64,4 @@ void start_energy_balance(Model<G, D>& model)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

@@ -12,7 +12,7 @@
 
 #include "base/types.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Sums over this rank [J].
 struct EnergyBook
@@ -54,4 +54,4 @@ double energy_balance(const Model<G, D>& model, double kinetic);
 /// Resets the balance to the present particles.
 template <class G, int D>
 void start_energy_balance(Model<G, D>& model);
-} // namespace mpm
+} // namespace mpm::model

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -90,4 +90,4 @@ INSTANTIATE(3)
 template void agree_on_failure(Model<PlaneStrain>&);
 template void agree_on_failure(Model<Axisymmetric>&);
 template void agree_on_failure(Model<Solid>&);
-} // namespace mpm
+} // namespace mpm::model

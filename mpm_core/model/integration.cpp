@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -183,4 +183,4 @@ INSTANTIATE(Solid)
                                        const std::vector<Run>&, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

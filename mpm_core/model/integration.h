@@ -4,7 +4,7 @@
 
 #include "model/velocity_field.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// A cell is full when its particles fill this fraction of its volume (Al-Kafaji 2013, Formulation of a dynamic
 /// material point method for geomechanical problems, section 3; so does Anura3D).
@@ -53,4 +53,4 @@ void average_gradients(const Mesh<D>& mesh, NodeExchange& exchange, VelocityFiel
 template <class G>
 Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Vector<G::dim>& position,
                              Index cell);
-} // namespace mpm
+} // namespace mpm::model

@@ -5,7 +5,7 @@
 #include "model/batches.h"
 #include "model/material_points.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Columns of a batch; touched only where the law needs them.
 template <int D>
@@ -56,4 +56,4 @@ void give_deformation(const MaterialPoints<D>& material, const Batch& batch, con
   for (int k = 0; k < D * D; ++k)
     points.deformation[k] = columns.deformation[k].data();
 }
-} // namespace mpm
+} // namespace mpm::model

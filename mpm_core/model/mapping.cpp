@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -168,4 +168,4 @@ void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vect
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::model
 {
 /// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes of a field, of this rank's
 /// particles.
@@ -70,4 +70,4 @@ inline double local_damping(double alpha, double residual, double momentum, doub
   const double slowed = impulse == 0 ? 0 : std::clamp(-momentum / impulse, 0.0, 1.0); // part of the step until the stop
   return alpha * residual * (1 - 2 * slowed);
 }
-} // namespace mpm
+} // namespace mpm::model

@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// A view of a model's particles.
 template <int D>
@@ -20,4 +20,4 @@ MaterialPoints<D> material_points(const Model<G>& model)
 {
   return {model.particles, model.order.runs, model.laws};
 }
-} // namespace mpm
+} // namespace mpm::model

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -196,4 +196,4 @@ void prepare(Model<G>& model)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

@@ -13,7 +13,7 @@
 
 #include <optional>
 
-namespace mpm
+namespace mpm::model
 {
 /// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
 inline constexpr Index batch_size = 256;
@@ -193,4 +193,4 @@ void sort_particles(Model<G>& model);
 /// @param again  the order of the particles is as before, and only those of runs out of order have changed cells
 template <class G>
 void find_cell_runs(Model<G>& model, bool again);
-} // namespace mpm
+} // namespace mpm::model

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -196,4 +196,4 @@ void particle_pass(Model<G>& model, const PassOptions& options)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

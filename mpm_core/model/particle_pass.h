@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// What the pass does.
 struct PassOptions
@@ -24,4 +24,4 @@ struct PassOptions
 /// no local cell on the list of lost ones, and neither is added to moments.
 template <class G>
 void particle_pass(Model<G>& model, const PassOptions& options);
-} // namespace mpm
+} // namespace mpm::model

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -100,4 +100,4 @@ void place_particles(Model<G>& model, std::span<const double> positions)
 template void place_particles(Model<PlaneStrain>&, std::span<const double>);
 template void place_particles(Model<Axisymmetric>&, std::span<const double>);
 template void place_particles(Model<Solid>&, std::span<const double>);
-} // namespace mpm
+} // namespace mpm::model

@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Gives particles new positions, searches their cells in the whole mesh, and sends them to the ranks that own
 /// these. Initial positions stay as they are.
@@ -14,4 +14,4 @@ namespace mpm
 /// @note Collective
 template <class G>
 void place_particles(Model<G>& model, std::span<const double> positions);
-} // namespace mpm
+} // namespace mpm::model

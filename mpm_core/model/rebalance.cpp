@@ -3,7 +3,7 @@
 #include "model/mapping.h"
 #include "parallel/redistribution.h"
 
-namespace mpm
+namespace mpm::model
 {
 template <class G, int D>
 void set_partition(Model<G>& model, const Mesh<D>& mesh)
@@ -29,4 +29,4 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh)
 template void set_partition(Model<PlaneStrain>&, const Mesh<2>&);
 template void set_partition(Model<Axisymmetric>&, const Mesh<2>&);
 template void set_partition(Model<Solid>&, const Mesh<3>&);
-} // namespace mpm
+} // namespace mpm::model

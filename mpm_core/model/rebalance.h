@@ -4,7 +4,7 @@
 
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Replaces the model's mesh by the same one cut otherwise, and sends each particle to the rank that owns its cell now.
 /// Moments of cells are summed again.
@@ -13,4 +13,4 @@ namespace mpm
 /// @note Collective
 template <class G, int D = G::dim>
 void set_partition(Model<G>& model, const Mesh<D>& mesh);
-} // namespace mpm
+} // namespace mpm::model

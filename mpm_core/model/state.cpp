@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-namespace mpm
+namespace mpm::model
 {
 namespace
 {
@@ -235,4 +235,4 @@ void restore_other(Model<G>& model, Particles<D>&& particles, const std::vector<
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

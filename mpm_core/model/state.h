@@ -5,7 +5,7 @@
 #include "base/table.h"
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Numbers that each rank has one of: time, totals, and what decides when particles are sorted.
 /// @post each table has one row
@@ -35,4 +35,4 @@ void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<T
 /// @note Collective
 template <class G, int D = G::dim>
 void restore_other(Model<G>& model, Particles<D>&& particles, const std::vector<Table>& ranks);
-} // namespace mpm
+} // namespace mpm::model

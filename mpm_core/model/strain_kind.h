@@ -6,7 +6,7 @@
 #include "model/batch_strain.h"
 #include "model/law_increment.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Half of the work of a batch's stresses on the strains in the scratch, particle by particle.
 template <class G, int D = G::dim>
@@ -93,4 +93,4 @@ struct StrainPerParticle
     return 0;
   }
 };
-} // namespace mpm
+} // namespace mpm::model

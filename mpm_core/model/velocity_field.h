@@ -7,7 +7,7 @@
 #include "transfer/nodes.h"
 #include "transfer/supports.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// How the stresses of a cell become forces at its nodes (14).
 enum class Integration
@@ -67,4 +67,4 @@ struct VelocityField
   std::vector<VolumeMean> volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
   std::vector<VolumeMean> mean_stress;       ///< of the nodes; empty until first used with it
 };
-} // namespace mpm
+} // namespace mpm::model

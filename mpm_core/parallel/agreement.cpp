@@ -2,7 +2,7 @@
 
 #include <functional>
 
-namespace mpm
+namespace mpm::parallel
 {
 Agreement agreement(MPI_Comm comm, const std::string& failure, const std::string& text)
 {
@@ -24,4 +24,4 @@ Agreement agreement(MPI_Comm comm, const std::string& failure, const std::string
   MPI_Bcast(found.failure.data(), length, MPI_CHAR, first, comm);
   return found;
 }
-} // namespace mpm
+} // namespace mpm::parallel

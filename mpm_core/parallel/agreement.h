@@ -6,7 +6,7 @@
 
 #include <mpi.h>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// What all ranks know of each other after one exchange.
 struct Agreement
@@ -52,4 +52,4 @@ void collectively(MPI_Comm comm, F&& work)
   if (const std::string text = shared_failure(comm, input_error_of(work)); !text.empty())
     throw InputError(text);
 }
-} // namespace mpm
+} // namespace mpm::parallel

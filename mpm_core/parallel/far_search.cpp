@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace mpm
+namespace mpm::parallel
 {
 namespace
 {
@@ -141,4 +141,4 @@ FarSearch find_far(const Mesh<D>& mesh, const std::unordered_map<GlobalIndex, In
                                  std::span<const LostPoint<D>>);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::parallel

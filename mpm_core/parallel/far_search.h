@@ -6,7 +6,7 @@
 
 #include <unordered_map>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// A point of this rank, and the owned cell from which to walk to it.
 template <int D>
@@ -38,4 +38,4 @@ struct FarSearch
 template <int D>
 FarSearch find_far(const Mesh<D>& mesh, const std::unordered_map<GlobalIndex, Index>& owned_cells,
                    const NodeExchange& exchange, std::span<const LostPoint<D>> points);
-} // namespace mpm
+} // namespace mpm::parallel

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-namespace mpm
+namespace mpm::parallel
 {
 namespace
 {
@@ -108,4 +108,4 @@ void update(const Halo& halo, double* values, int width)
 
 template Halos make_halos(const Mesh<2>&, MPI_Comm);
 template Halos make_halos(const Mesh<3>&, MPI_Comm);
-} // namespace mpm
+} // namespace mpm::parallel

@@ -8,7 +8,7 @@
 
 #include <type_traits>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Who gives whom which entries of an array; a link has the same length on both sides.
 struct Halo
@@ -46,4 +46,4 @@ void update(const Halo& halo, std::vector<T>& values)
       sizeof(T) / sizeof(double); // NOLINT(bugprone-sizeof-expression): T may be double itself
   update(halo, reinterpret_cast<double*>(values.data()), static_cast<int>(width));
 }
-} // namespace mpm
+} // namespace mpm::parallel

@@ -1,6 +1,6 @@
 #include "parallel/lists.h"
 
-namespace mpm
+namespace mpm::parallel
 {
 std::vector<std::vector<GlobalIndex>> exchanged(const std::vector<std::vector<GlobalIndex>>& send, MPI_Comm comm)
 {
@@ -24,4 +24,4 @@ std::vector<std::vector<GlobalIndex>> exchanged(const std::vector<std::vector<Gl
     received[r].assign(data.begin() + starts[r], data.begin() + starts[r + 1]);
   return received;
 }
-} // namespace mpm
+} // namespace mpm::parallel

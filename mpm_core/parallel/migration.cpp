@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace mpm
+namespace mpm::parallel
 {
 namespace
 {
@@ -146,4 +146,4 @@ Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const 
                          Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::parallel

@@ -7,7 +7,7 @@
 
 #include <unordered_map>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// A particle that now lies in a cell of another rank.
 struct MigratingParticle
@@ -44,4 +44,4 @@ std::unordered_map<GlobalIndex, Index> owned_cell_numbers(const Mesh<D>& mesh);
 template <int D>
 Index migrate(const std::unordered_map<GlobalIndex, Index>& cell_numbers, const NodeExchange& exchange,
               const Departures& departures, Particles<D>& particles);
-} // namespace mpm
+} // namespace mpm::parallel

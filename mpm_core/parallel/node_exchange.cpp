@@ -6,7 +6,7 @@
 #include <map>
 #include <unordered_map>
 
-namespace mpm
+namespace mpm::parallel
 {
 template <int D>
 NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm)
@@ -116,4 +116,4 @@ void sum_shared(NodeExchange& exchange, double* values, int width)
 
 template NodeExchange make_node_exchange(const Mesh<2>&, MPI_Comm);
 template NodeExchange make_node_exchange(const Mesh<3>&, MPI_Comm);
-} // namespace mpm
+} // namespace mpm::parallel

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <type_traits>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Which nodes this rank shares with which others, and the buffers of their messages.
 struct NodeExchange
@@ -55,4 +55,4 @@ void sum_shared(NodeExchange& exchange, Values&& values)
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
   sum_shared(exchange, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
 }
-} // namespace mpm
+} // namespace mpm::parallel

@@ -10,7 +10,7 @@
 #include <ptscotch.h>
 #endif
 
-namespace mpm
+namespace mpm::parallel
 {
 template <int D>
 std::vector<double> with_ghost_values(const Mesh<D>& mesh, std::span<const double> owned, MPI_Comm comm)
@@ -109,4 +109,4 @@ std::vector<Index> weighted_parts(const Mesh<D>&, std::span<const GlobalIndex>, 
   template std::vector<Index> weighted_parts(const Mesh<D>&, std::span<const GlobalIndex>, MPI_Comm);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::parallel

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Values of all cells that a rank knows, from those of the cells that it owns.
 /// @param owned  one number for each owned cell
@@ -26,4 +26,4 @@ std::vector<double> with_ghost_values(const Mesh<D>& mesh, std::span<const doubl
 /// @note Collective
 template <int D>
 std::vector<Index> weighted_parts(const Mesh<D>& mesh, std::span<const GlobalIndex> weights, MPI_Comm comm);
-} // namespace mpm
+} // namespace mpm::parallel

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace mpm
+namespace mpm::parallel
 {
 namespace
 {
@@ -89,4 +89,4 @@ void redistribute(const Mesh<D>& mesh, const NodeExchange& exchange, std::span<c
 
 template void redistribute(const Mesh<2>&, const NodeExchange&, std::span<const GlobalIndex>, Particles<2>&);
 template void redistribute(const Mesh<3>&, const NodeExchange&, std::span<const GlobalIndex>, Particles<3>&);
-} // namespace mpm
+} // namespace mpm::parallel

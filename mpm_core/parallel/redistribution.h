@@ -4,7 +4,7 @@
 
 #include "parallel/migration.h"
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Sends each particle to the rank that owns its cell, wherever that is; afterwards the particles are in the order of
 /// their numbers, so that it does not matter where they came from.
@@ -14,4 +14,4 @@ namespace mpm
 template <int D>
 void redistribute(const Mesh<D>& mesh, const NodeExchange& exchange, std::span<const GlobalIndex> cells,
                   Particles<D>& particles);
-} // namespace mpm
+} // namespace mpm::parallel

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace mpm
+namespace mpm::parallel
 {
 namespace
 {
@@ -60,4 +60,4 @@ void RowCarrier::exchange(std::size_t width)
   for (std::size_t i = 0; i < _order.size(); ++i)
     std::copy_n(_came.data() + i * width, width, _wanted.data() + _order[i] * width);
 }
-} // namespace mpm
+} // namespace mpm::parallel

@@ -8,7 +8,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Carries rows of numbers from ranks that have them to those that want them, as often as their values change.
 class RowCarrier
@@ -53,4 +53,4 @@ private:
   std::vector<std::size_t> _order;     ///< which of the wanted ones come, likewise
   std::vector<double> _sent, _came, _wanted;
 };
-} // namespace mpm
+} // namespace mpm::parallel

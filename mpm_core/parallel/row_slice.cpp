@@ -1,6 +1,6 @@
 #include "parallel/row_slice.h"
 
-namespace mpm
+namespace mpm::parallel
 {
 RowSlice row_slice(MPI_Comm comm, std::size_t local)
 {
@@ -12,4 +12,4 @@ RowSlice row_slice(MPI_Comm comm, std::size_t local)
   MPI_Allreduce(&rows.local, &rows.total, 1, MPI_INT64_T, MPI_SUM, comm);
   return rows;
 }
-} // namespace mpm
+} // namespace mpm::parallel

@@ -6,7 +6,7 @@
 
 #include <mpi.h>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// This rank's rows in an array that all ranks hold together, by rising rank.
 struct RowSlice
@@ -18,4 +18,4 @@ struct RowSlice
 
 /// @note Collective
 RowSlice row_slice(MPI_Comm comm, std::size_t local);
-} // namespace mpm
+} // namespace mpm::parallel

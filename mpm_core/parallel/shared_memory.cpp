@@ -2,7 +2,7 @@
 
 #include <bit>
 
-namespace mpm
+namespace mpm::parallel
 {
 SharedMemory::SharedMemory(MPI_Comm comm) : _comm(comm)
 {
@@ -67,4 +67,4 @@ void SharedMemory::free()
   _data = nullptr;
   _bytes = 0;
 }
-} // namespace mpm
+} // namespace mpm::parallel

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace mpm
+namespace mpm::parallel
 {
 /// Memory that all ranks use together, where they are on one machine.
 ///
@@ -41,4 +41,4 @@ private:
   MPI_Win _window = MPI_WIN_NULL;
   std::vector<std::byte> _alone; ///< where there is only one rank
 };
-} // namespace mpm
+} // namespace mpm::parallel

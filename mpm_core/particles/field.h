@@ -8,7 +8,7 @@
 #include <span>
 #include <string_view>
 
-namespace mpm
+namespace mpm::particles
 {
 /// An entry of the schedule of fields. Texts are kept by whoever declares the field.
 struct Field
@@ -89,4 +89,4 @@ bool is_present(const C& columns)
   else
     return true;
 }
-} // namespace mpm
+} // namespace mpm::particles

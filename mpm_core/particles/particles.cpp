@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-namespace mpm
+namespace mpm::particles
 {
 template <int D>
 void add_field(Particles<D>& particles, AddedField field, int components)
@@ -179,4 +179,4 @@ double bytes_per_particle(const Particles<D>& particles)
   template double bytes_per_particle(const Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::particles

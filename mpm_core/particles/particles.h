@@ -6,7 +6,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::particles
 {
 /// Contiguous particles [first, last) that lie in one cell and are of one material.
 struct Run
@@ -135,4 +135,4 @@ void find_runs_again(const Particles<D>& particles, Index longest, std::vector<R
 /// Bytes that the columns hold per particle
 template <int D>
 double bytes_per_particle(const Particles<D>& particles);
-} // namespace mpm
+} // namespace mpm::particles

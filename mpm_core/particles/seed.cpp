@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-namespace mpm
+namespace mpm::particles
 {
 namespace
 {
@@ -242,4 +242,4 @@ INSTANTIATE(Solid)
                              std::span<const GlobalIndex>, SeedMaterial, Particles<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::particles

@@ -7,7 +7,7 @@
 
 #include <optional>
 
-namespace mpm
+namespace mpm::particles
 {
 /// Barycentric coordinates of `count` points placed evenly in a simplex, each representing the same fraction of its
 /// volume. Rows of D+1 numbers. The points are the lattice of 1, 3, 6, 10, 15, ... points (triangle) or 1, 4, 10, 20,
@@ -48,4 +48,4 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
 template <class G>
 double load_facets(const Mesh<G::dim>& mesh, Index facet_tag, const Vector<G::dim>& traction,
                    Particles<G::dim>& particles);
-} // namespace mpm
+} // namespace mpm::particles

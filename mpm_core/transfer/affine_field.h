@@ -5,7 +5,7 @@
 #include "transfer/lanes.h"
 #include "transfer/moments.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 /// The components of a vector in a vector register; in three dimensions the last lane is free.
 template <int D>
@@ -48,4 +48,4 @@ inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& noda
   }
   return field;
 }
-} // namespace mpm
+} // namespace mpm::transfer

@@ -5,7 +5,7 @@
 #include "base/geometry.h"
 #include "transfer/lanes.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Strain increment of a cell and the rotation that goes with it.
 template <int D, class T = double>
@@ -96,4 +96,4 @@ inline void make_small(CellStrain<D, T>& strain)
     for (int j = 0; j < D; ++j)
       strain.rotation[i][j] = T{} + (i == j ? 1.0 : 0.0);
 }
-} // namespace mpm
+} // namespace mpm::transfer

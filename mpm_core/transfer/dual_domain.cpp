@@ -1,6 +1,6 @@
 #include "transfer/dual_domain.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 template <int D>
 void add_dual_stress(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
@@ -52,4 +52,4 @@ std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
                                                            const std::array<const DualStress<D>*, D + 1>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::transfer

@@ -16,7 +16,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// The cell's fraction of the gradient at its centre, the bubble's largest value.
 inline constexpr double dual_fraction = 0.5;
@@ -72,4 +72,4 @@ void add_dual_stress(const Particles<D>& particles, Index first, Index last, con
 template <int D>
 std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
                                              const std::array<const DualStress<D>*, D + 1>& nodes);
-} // namespace mpm
+} // namespace mpm::transfer

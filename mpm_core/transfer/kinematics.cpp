@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::transfer
 {
 namespace
 {
@@ -113,4 +113,4 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
   template void strain_particles(Particles<D>&, Index, Index, const CellStrain<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-} // namespace mpm
+} // namespace mpm::transfer

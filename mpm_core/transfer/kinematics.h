@@ -5,7 +5,7 @@
 #include "transfer/cell_strain.h"
 #include "transfer/moments.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Moves the particles [first, last) of a cell: v_p = flip_fraction v_p + sum N_i change_i (18),
 /// x_p += sum N_i displacement_i (20).
@@ -25,4 +25,4 @@ void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Ma
 /// Rotates the stresses of the particles [first, last), grows their volumes and accumulates their deviatoric strain.
 template <int D>
 void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain);
-} // namespace mpm
+} // namespace mpm::transfer

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Particles that a kernel treats at once: one vector register of AVX2, half of one of AVX-512, two of SSE2 or NEON.
 /// With ten particles in a cell, eight at once would leave more lanes idle than they save instructions.
@@ -129,4 +129,4 @@ inline double sum(const Lanes& a)
   const Pair halves = __builtin_shufflevector(a, a, 0, 1) + __builtin_shufflevector(a, a, 2, 3);
   return halves[0] + halves[1];
 }
-} // namespace mpm
+} // namespace mpm::transfer

@@ -2,7 +2,7 @@
 
 #include "transfer/affine_field.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 namespace
 {
@@ -208,4 +208,4 @@ INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
 template void add_moments(const Particles<2>&, Index, Index, const CellShape<2>&, TractionMoments<2>&);
 template void add_moments(const Particles<3>&, Index, Index, const CellShape<3>&, TractionMoments<3>&);
-} // namespace mpm
+} // namespace mpm::transfer

@@ -12,7 +12,7 @@
 
 #include <bit>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Moments of the particles in one cell; xi is the position from the cell's centre.
 template <class G>
@@ -102,4 +102,4 @@ inline double at_vertex(double zeroth, const Vector<D>& first, const Vector<D>& 
 {
   return zeroth * (1.0 / (D + 1)) + dot<D>(first, gradient);
 }
-} // namespace mpm
+} // namespace mpm::transfer

@@ -7,7 +7,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Volumetric strain or mean stress of a cell with its filled volume, or of a node, the mean over the cells around it
 /// weighted by theirs, with their sum. Plain doubles, so that shared nodes are summed in one message.
@@ -51,4 +51,4 @@ inline double mean_of_nodes(const std::array<Index, D + 1>& cell, std::span<cons
     sum += nodes[node].value;
   return sum * (1.0 / (D + 1));
 }
-} // namespace mpm
+} // namespace mpm::transfer

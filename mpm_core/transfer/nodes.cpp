@@ -2,7 +2,7 @@
 
 #include "transfer/affine_field.h"
 
-namespace mpm
+namespace mpm::transfer
 {
 namespace
 {
@@ -145,4 +145,4 @@ void scatter_momentum(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::transfer

@@ -7,7 +7,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// Nodal sums of one step; plain doubles, so that shared nodes are summed in one message.
 template <int D>
@@ -48,4 +48,4 @@ void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const Cel
 template <class G>
 void scatter_momentum(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
                       std::span<const Vector<G::dim>> change, std::span<Vector<G::dim>> momentum);
-} // namespace mpm
+} // namespace mpm::transfer

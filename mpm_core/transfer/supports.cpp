@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-namespace mpm
+namespace mpm::transfer
 {
 namespace
 {
@@ -94,4 +94,4 @@ template std::vector<Support<2>> make_supports<Axisymmetric>(const Mesh<2>&, Nod
                                                              std::span<const SupportRequest<2>>);
 template std::vector<Support<3>> make_supports<Solid>(const Mesh<3>&, NodeExchange&,
                                                       std::span<const SupportRequest<3>>);
-} // namespace mpm
+} // namespace mpm::transfer

@@ -6,7 +6,7 @@
 
 #include <span>
 
-namespace mpm
+namespace mpm::transfer
 {
 /// What is prescribed at a node: v . direction[k] = value[k] for k < count. The directions are orthonormal.
 template <int D>
@@ -47,4 +47,4 @@ inline void impose(const Support<D>& support, Vector<D>& v)
       v[i] += change * support.direction[k][i];
   }
 }
-} // namespace mpm
+} // namespace mpm::transfer

@@ -18,19 +18,19 @@ from pathlib import Path
 BUDGET = Path(__file__).with_name("budget.json")
 TOLERANCE = 0.03
 PHASES = {
-    "explicit step, 2D": "explicit_step<mpm::PlaneStrain>",
-    "sums at nodes, 2D": "particles_to_nodes<mpm::PlaneStrain, 2>",
-    "pass over the particles, 2D": "particle_pass<mpm::PlaneStrain>",
+    "explicit step, 2D": "explicit_step<mpm::base::PlaneStrain>",
+    "sums at nodes, 2D": "particles_to_nodes<mpm::base::PlaneStrain, 2>",
+    "pass over the particles, 2D": "particle_pass<mpm::base::PlaneStrain>",
     "motion of particles, 2D": "move_particles<2>",
     "strain of particles, 2D": "strain_particles<2>",
-    "stress sums, 2D": "stress_sum<mpm::PlaneStrain, 2>",
-    "Mohr-Coulomb, 2D": "update<2>(mpm::MohrCoulomb const&",
-    "averaged volumetric strain, 2D": "average_strains<mpm::PlaneStrain, 2>",
-    "explicit step, 3D": "explicit_step<mpm::Solid>",
-    "pass over the particles, 3D": "particle_pass<mpm::Solid>",
-    "Mohr-Coulomb, 3D": "update<3>(mpm::MohrCoulomb const&",
-    "residual and tangents of an implicit step, 2D": "find_residual<mpm::PlaneStrain>",
-    "entries of the stiffness matrix, 2D": "find_tangent<mpm::PlaneStrain, 2>",
+    "stress sums, 2D": "stress_sum<mpm::base::PlaneStrain, 2>",
+    "Mohr-Coulomb, 2D": "update<2>(mpm::materials::MohrCoulomb const&",
+    "averaged volumetric strain, 2D": "average_strains<mpm::base::PlaneStrain, 2>",
+    "explicit step, 3D": "explicit_step<mpm::base::Solid>",
+    "pass over the particles, 3D": "particle_pass<mpm::base::Solid>",
+    "Mohr-Coulomb, 3D": "update<3>(mpm::materials::MohrCoulomb const&",
+    "residual and tangents of an implicit step, 2D": "find_residual<mpm::base::PlaneStrain>",
+    "entries of the stiffness matrix, 2D": "find_tangent<mpm::base::PlaneStrain, 2>",
 }
 """What is counted: the functions, with all that they call"""
 
@@ -60,7 +60,7 @@ def counts(program: Path) -> dict[str, int]:
     for line in listing.splitlines():
         match = re.match(r" *([\d,]+) +(.*)", line)
         for phase, function in PHASES.items():
-            if match and "mpm::" + function in match[2] and "'2" not in match[2]:
+            if match and "::" + function in match[2] and "'2" not in match[2]:
                 found.setdefault(phase, int(match[1].replace(",", "")))
     missing = [phase for phase in PHASES if phase not in found]
     if missing:

@@ -9,6 +9,8 @@
 
 namespace mpm::test
 {
+using namespace mesh;
+
 template <int D>
 struct BoxArrays
 {

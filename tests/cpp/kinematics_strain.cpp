@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-using namespace mpm;
+using namespace mpm::transfer;
 
 namespace
 {

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <optional>
 
-using namespace mpm;
+using namespace mpm::materials;
 using namespace mpm::test;
-using namespace mpm::mohr_coulomb;
+using namespace mpm::materials::mohr_coulomb;
 
 namespace
 {

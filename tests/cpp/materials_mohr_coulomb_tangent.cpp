@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-using namespace mpm;
+using namespace mpm::materials;
 using namespace mpm::test;
 using mohr_coulomb::Principal;
 using mohr_coulomb::Region;

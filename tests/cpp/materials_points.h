@@ -12,6 +12,8 @@
 
 namespace mpm::test
 {
+using namespace materials;
+
 /// Points with storage. Stress, strain increment and plastic strain start at zero.
 template <int D>
 struct Points
@@ -29,7 +31,7 @@ struct Points
   template <class L>
   BatchReport update(const L& law, bool with_tangent = false)
   {
-    return mpm::update<D>(law, batch(with_tangent));
+    return materials::update<D>(law, batch(with_tangent));
   }
 
   PointBatch<D> batch(bool with_tangent)

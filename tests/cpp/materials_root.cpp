@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-using namespace mpm;
+using namespace mpm::materials;
 
 namespace
 {

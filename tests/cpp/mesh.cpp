@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-using namespace mpm;
+using namespace mpm::mesh;
 
 namespace
 {
@@ -38,7 +38,7 @@ TYPED_TEST_SUITE(MeshTest, Dimensions);
 TYPED_TEST(MeshTest, VolumesAddUpAndShapeFunctionsReproduceAffineFields)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(4, 0.2).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(4, 0.2).mesh();
   double volume = 0;
   std::mt19937 random(3);
   for (Index c = 0; c < mesh.n_cells(); ++c)
@@ -64,7 +64,7 @@ TYPED_TEST(MeshTest, VolumesAddUpAndShapeFunctionsReproduceAffineFields)
 TYPED_TEST(MeshTest, NeighboursShareAFacet)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(3, 0.2).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(3, 0.2).mesh();
   int boundary = 0;
   for (Index c = 0; c < mesh.n_cells(); ++c)
     for (int k = 0; k <= D; ++k)
@@ -83,7 +83,7 @@ TYPED_TEST(MeshTest, NeighboursShareAFacet)
 TYPED_TEST(MeshTest, SearchFindsTheCellFromAnywhere)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = D == 2 ? test::box<D>(24, 0.3).mesh() : test::box<D>(8, 0.15).mesh();
+  const Mesh<D> mesh = D == 2 ? mpm::test::box<D>(24, 0.3).mesh() : mpm::test::box<D>(8, 0.15).mesh();
   std::mt19937 random(5);
   std::uniform_int_distribution<Index> any_cell(0, mesh.n_cells() - 1);
   for (int n = 0; n < 2000; ++n)
@@ -109,7 +109,7 @@ TYPED_TEST(MeshTest, SearchFindsTheCellFromAnywhere)
 TEST(Mesh, SearchPassesAHole)
 {
   // A square ring: the straight walk from left to right ends at the hole, the point is inside all the same.
-  test::BoxArrays<2> arrays = test::box<2>(6);
+  mpm::test::BoxArrays<2> arrays = mpm::test::box<2>(6);
   std::vector<Index> kept;
   for (std::size_t c = 0; c < arrays.cells.size() / 3; ++c)
   {

@@ -7,13 +7,15 @@
 #include <gtest/gtest.h>
 #include <random>
 
+using namespace mpm::implicit;
+
 namespace
 {
 constexpr double mass = 3.0, dt = 0.1;
 
 double next_velocity(double alpha, double residual, double velocity)
 {
-  return velocity + dt / mass * (residual - mpm::local_damping(alpha, residual, mass * velocity, dt));
+  return velocity + dt / mass * (residual - local_damping(alpha, residual, mass * velocity, dt));
 }
 
 TEST(LocalDamping, IsThatOfTheImplicitScheme)
@@ -24,17 +26,17 @@ TEST(LocalDamping, IsThatOfTheImplicitScheme)
   {
     const double alpha = 0.99 * std::abs(number(random)), velocity = number(random), residual = 40 * number(random);
     const double next = next_velocity(alpha, residual, velocity);
-    EXPECT_NEAR(mpm::damped_inertia(mass, velocity, next, dt, alpha, 0, 1).force, residual, 1e-12 * 40);
+    EXPECT_NEAR(damped_inertia(mass, velocity, next, dt, alpha, 0, 1).force, residual, 1e-12 * 40);
   }
 }
 
 TEST(LocalDamping, HoldsForceTimesSignWhereTheVelocityKeepsIt)
 {
-  EXPECT_DOUBLE_EQ(mpm::local_damping(0.75, 8, 5, dt), 0.75 * 8);
-  EXPECT_DOUBLE_EQ(mpm::local_damping(0.75, -8, 5, dt), 0.75 * 8);
-  EXPECT_DOUBLE_EQ(mpm::local_damping(0.75, 8, -5, dt), -0.75 * 8);
-  EXPECT_DOUBLE_EQ(mpm::local_damping(0.75, 8, 0, dt), 0.75 * 8); // from rest R moves the node, with (1 - alpha) R
-  EXPECT_EQ(mpm::local_damping(0.75, 0, 5, dt), 0);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, 5, dt), 0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, -8, 5, dt), 0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, -5, dt), -0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, 0, dt), 0.75 * 8); // from rest R moves the node, with (1 - alpha) R
+  EXPECT_EQ(local_damping(0.75, 0, 5, dt), 0);
 }
 
 TEST(LocalDamping, NeverMakesADifferenceGrow)

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <set>
 
-using namespace mpm;
+using namespace mpm::particles;
 
 namespace
 {

@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-using namespace mpm;
+using namespace mpm::transfer;
 
 namespace
 {
@@ -27,7 +27,7 @@ std::vector<double> averaged(const Mesh<D>& mesh, const std::vector<double>& vol
   NodeExchange exchange; // one rank: nothing is shared
   std::vector<VolumeMean> nodes(mesh.points.size());
   const auto of_cell = [&](Index c) -> VolumeMean { return {theta[c], volume[c]}; };
-  average_over_nodes(mesh, test::whole(mesh), of_cell, exchange, nodes);
+  average_over_nodes(mesh, mpm::test::whole(mesh), of_cell, exchange, nodes);
   for (Index c = 0; c < mesh.n_cells(); ++c)
     if (volume[c] > 0)
       theta[c] = mean_of_nodes<D>(mesh.cells[c], nodes);
@@ -47,7 +47,7 @@ TYPED_TEST_SUITE(MixedDiscretisationTest, Dimensions);
 TYPED_TEST(MixedDiscretisationTest, LeavesTheStrainOfALinearDisplacement)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(4, 0.15).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(4, 0.15).mesh();
   const auto volume = filled_volumes(mesh, 0.3);
   const auto theta = averaged(mesh, volume, std::vector<double>(volume.size(), 0.0123));
   for (double t : theta)
@@ -58,7 +58,7 @@ TYPED_TEST(MixedDiscretisationTest, KeepsTheChangeOfVolume)
 {
   // sum_c V_c mean_i theta_i = sum_i theta_i sum_c V_c / (D + 1) = sum_c V_c theta_c
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(4, 0.15).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(4, 0.15).mesh();
   const auto volume = filled_volumes(mesh, 0.3);
   std::vector<double> theta;
   std::mt19937 random(9);
@@ -74,7 +74,7 @@ TYPED_TEST(MixedDiscretisationTest, AveragesOverFilledCellsThatShareNodes)
 {
   // Only cell 0 has strain: a node of it has theta_0 V_0 / sum V_c, and a cell the mean of its nodes.
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(2).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(2).mesh();
   const auto volume = filled_volumes(mesh, 0.2);
   ASSERT_GT(volume[0], 0);
   std::vector<double> theta(volume.size(), 0.0), at_node(mesh.points.size(), 0.0), around(mesh.points.size(), 0.0);

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-using namespace mpm;
+using namespace mpm::transfer;
 
 namespace
 {
@@ -63,7 +63,7 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
     add_moments<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
-  scatter<Cartesian<D>>(mesh, test::whole(mesh), moments, tractions, nodes);
+  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, tractions, nodes);
   return nodes;
 }
 
@@ -106,7 +106,7 @@ TYPED_TEST_SUITE(NodesTest, Dimensions);
 TYPED_TEST(NodesTest, MomentsGiveTheSumsOverParticles)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(3, 0.15).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(3, 0.15).mesh();
   const Particles<D> particles = random_particles(mesh, 400);
   const auto nodes = mapped(mesh, particles), expected = mapped_one_by_one(mesh, particles);
   for (std::size_t i = 0; i < nodes.size(); ++i)
@@ -124,7 +124,7 @@ TYPED_TEST(NodesTest, MomentsGiveTheSumsOverParticles)
 TYPED_TEST(NodesTest, MappingConservesSums)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(3, 0.15).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(3, 0.15).mesh();
   const Particles<D> particles = random_particles(mesh, 400);
   double mass = 0;
   Vector<D> momentum{}, internal{}, traction{};
@@ -160,7 +160,7 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
 {
   // v_p = flip_fraction v_p + f(x_p), then x_p += u(x_p) with affine f and u: the moments follow without the particles.
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(1).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(1).mesh();
   Particles<D> particles = random_particles(mesh, 60);
   const Index cell = particles.cell[0];
   Index last = 0;
@@ -206,7 +206,7 @@ TYPED_TEST(NodesTest, MovedMomentsAreThoseOfTheMovedParticles)
 TYPED_TEST(NodesTest, SumsOfFewAndManyParticlesAreThoseOneByOne)
 {
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(1).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(1).mesh();
   const Particles<D> particles = random_particles(mesh, 60);
   using Numbers = std::array<double, sizeof(CellMoments<Cartesian<D>>) / sizeof(double)>;
   for (Index count = 1; count <= 13; ++count)
@@ -228,7 +228,7 @@ TYPED_TEST(NodesTest, AffineNodalFieldsArriveExactly)
   // Positions move with v = A x + b, velocities change by a = A' x + b', exactly at every particle; PIC takes v_i + dt
   // a_i.
   constexpr int D = TypeParam::value;
-  const Mesh<D> mesh = test::box<D>(3, 0.15).mesh();
+  const Mesh<D> mesh = mpm::test::box<D>(3, 0.15).mesh();
   Particles<D> particles = random_particles(mesh, 200);
   const Particles<D> before = particles;
   auto affine = [](const Vector<D>& x, double scale)

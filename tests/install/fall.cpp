@@ -5,7 +5,7 @@
 
 #include <cstdio>
 
-using namespace mpm;
+using namespace mpm::explicit_scheme;
 
 int main(int argc, char** argv)
 {

@@ -1,6 +1,6 @@
 #include "materials/laws/association.h"
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -30,4 +30,4 @@ bool non_associated(const Hencky& law) { return non_associated(law.law); }
 } // namespace
 
 bool is_non_associated(const Law& law) { return non_associated(law); }
-} // namespace mpm
+} // namespace mpm::materials

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string_view>
 
-namespace mpm
+namespace mpm::materials
 {
 /// Most state variables that a law may have
 inline constexpr int max_states = 73;
@@ -87,4 +87,4 @@ struct BatchReport
   /// state are left as they were
   std::vector<Index> failed;
 };
-} // namespace mpm
+} // namespace mpm::materials

@@ -6,7 +6,7 @@
 
 #include <numbers>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -236,4 +236,4 @@ BatchReport update(const CamClay& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const CamClay&, const PointBatch<2>&);
 template BatchReport update<3>(const CamClay&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

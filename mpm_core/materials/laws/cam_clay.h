@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/tools/parameter.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Modified Cam-Clay with pressure-dependent elasticity.
 ///
@@ -59,4 +59,4 @@ double shear_modulus(const CamClay& law);
 /// point without pressure or of which values are not finite fails, and its tangent is zero.
 template <int D>
 BatchReport update(const CamClay& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

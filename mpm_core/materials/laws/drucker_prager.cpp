@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -136,4 +136,4 @@ BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const DruckerPrager&, const PointBatch<2>&);
 template BatchReport update<3>(const DruckerPrager&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/tools/parameter.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Drucker-Prager, linear elastic and perfectly plastic, with non-associated flow and a cut-off of the mean stress.
 ///
@@ -63,4 +63,4 @@ double p_wave_modulus(const DruckerPrager& law);
 /// failed point is given the elastic tangent.
 template <int D>
 BatchReport update(const DruckerPrager& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::materials
 {
 void check(const ExternalLaw& law)
 {
@@ -13,4 +13,4 @@ void check(const ExternalLaw& law)
   require(law.wave_modulus > 0 && std::isfinite(law.wave_modulus), "p_wave_modulus", law.wave_modulus,
           "positive and finite [Pa]");
 }
-} // namespace mpm
+} // namespace mpm::materials

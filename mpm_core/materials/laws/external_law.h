@@ -5,7 +5,7 @@
 
 #include <functional>
 
-namespace mpm
+namespace mpm::materials
 {
 /// A law that is not of this library: functions that update a batch, such as ones that call Python.
 struct ExternalLaw
@@ -48,4 +48,4 @@ BatchReport update(const ExternalLaw& law, const PointBatch<D>& points)
   else
     return law.solid(points);
 }
-} // namespace mpm
+} // namespace mpm::materials

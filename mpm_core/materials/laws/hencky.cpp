@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -98,4 +98,4 @@ BatchReport update(const Hencky& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const Hencky&, const PointBatch<2>&);
 template BatchReport update<3>(const Hencky&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

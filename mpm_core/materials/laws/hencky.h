@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::materials
 {
 /// A law taken between Kirchhoff stress and logarithmic strain, for strains that are not small.
 ///
@@ -43,4 +43,4 @@ inline double shear_modulus(const Hencky& law) { return shear_modulus(law.law); 
 /// Updates stress and state of a batch of points (and fills its tangent where wanted, consistent with the update).
 template <int D>
 BatchReport update(const Hencky& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

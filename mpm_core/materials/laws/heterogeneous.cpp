@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -122,4 +122,4 @@ BatchReport update(const Heterogeneous& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const Heterogeneous&, const PointBatch<2>&);
 template BatchReport update<3>(const Heterogeneous&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

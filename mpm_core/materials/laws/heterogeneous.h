@@ -2,7 +2,7 @@
 
 #include "materials/laws/law_list.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// A law of which some parameters differ from point to point, such as a strength that grows with depth.
 ///
@@ -46,4 +46,4 @@ inline Needs needs(const Heterogeneous& law) { return needs(law.law); }
 /// Updates stress and state of a batch of points (and fills its tangent where wanted, consistent with the update).
 template <int D>
 BatchReport update(const Heterogeneous& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,8 +4,8 @@
 
 #include "materials/laws/undrained.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Any constitutive law, as a plain value
 using Law = LawList<Heterogeneous, Hencky, Undrained>;
-} // namespace mpm
+} // namespace mpm::materials

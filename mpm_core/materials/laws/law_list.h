@@ -15,7 +15,7 @@
 #include <string>
 #include <variant>
 
-namespace mpm
+namespace mpm::materials
 {
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
@@ -108,4 +108,4 @@ BatchReport update(const std::variant<L...>& law, const PointBatch<D>& points)
 {
   return std::visit([&](const auto& l) { return update<D>(l, points); }, law);
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -2,7 +2,7 @@
 
 #include "materials/tools/elasticity.h"
 
-namespace mpm
+namespace mpm::materials
 {
 double p_wave_modulus(const LinearElastic& law) { return p_wave_modulus(elastic_moduli(law.young, law.poisson)); }
 
@@ -31,4 +31,4 @@ BatchReport update(const LinearElastic& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const LinearElastic&, const PointBatch<2>&);
 template BatchReport update<3>(const LinearElastic&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

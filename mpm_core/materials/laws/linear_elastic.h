@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/tools/parameter.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Isotropic linear elasticity, in rate form between Cauchy stress and strain increment.
 struct LinearElastic
@@ -28,4 +28,4 @@ double p_wave_modulus(const LinearElastic& law);
 /// Updates the stress of a batch of points (and fills its tangent where wanted).
 template <int D>
 BatchReport update(const LinearElastic& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

@@ -9,7 +9,7 @@
 // The loops marked `ivdep` vectorise: no branch, and every local a scalar in the end. (`omp simd` would not do: it
 // turns a local struct into an array over the lanes, which g++ 12 then cannot vectorise.)
 
-namespace mpm
+namespace mpm::materials
 {
 using namespace mohr_coulomb;
 
@@ -268,4 +268,4 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const MohrCoulomb&, const PointBatch<2>&);
 template BatchReport update<3>(const MohrCoulomb&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

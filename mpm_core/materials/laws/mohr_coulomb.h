@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/tools/parameter.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Mohr-Coulomb, linear elastic and perfectly plastic, with non-associated flow and a tension cut-off.
 ///
@@ -51,4 +51,4 @@ double p_wave_modulus(const MohrCoulomb& law);
 /// the return: the derivative of the final stress by the strain increment. A failed point is given the elastic one.
 template <int D>
 BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

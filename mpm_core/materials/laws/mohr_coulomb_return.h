@@ -18,7 +18,7 @@
 #include <limits>
 #include <numbers>
 
-namespace mpm::mohr_coulomb
+namespace mpm::materials::mohr_coulomb
 {
 /// Principal stresses, s1 >= s2 >= s3
 struct Principal
@@ -237,4 +237,4 @@ inline double deviatoric_plastic_strain(const Surface& m, Principal trial, Princ
   const double squares = (d1 - d2) * (d1 - d2) + (d2 - d3) * (d2 - d3) + (d3 - d1) * (d3 - d1);
   return std::sqrt(squares) * m.plastic_per_root_square; // 2/3 dev : dev = 2/9 squares, and dev = 2 G e
 }
-} // namespace mpm::mohr_coulomb
+} // namespace mpm::materials::mohr_coulomb

@@ -1,6 +1,6 @@
 #include "materials/laws/mohr_coulomb_tangent.h"
 
-namespace mpm::mohr_coulomb
+namespace mpm::materials::mohr_coulomb
 {
 namespace
 {
@@ -134,4 +134,4 @@ void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& 
 
 template void write_tangent<2>(const Surface&, const RegionMaps&, const Spectral<2>&, const Returned&, double*);
 template void write_tangent<3>(const Surface&, const RegionMaps&, const Spectral<3>&, const Returned&, double*);
-} // namespace mpm::mohr_coulomb
+} // namespace mpm::materials::mohr_coulomb

@@ -4,7 +4,7 @@
 
 #include "materials/tools/spectral.h"
 
-namespace mpm::mohr_coulomb
+namespace mpm::materials::mohr_coulomb
 {
 using Matrix3 = std::array<std::array<double, 3>, 3>;
 
@@ -21,4 +21,4 @@ RegionMaps region_maps(const Surface& m);
 template <int D>
 void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& trial, const Returned& returned,
                    double* tangent);
-} // namespace mpm::mohr_coulomb
+} // namespace mpm::materials::mohr_coulomb

@@ -3,7 +3,7 @@
 #include "materials/laws/mohr_coulomb_tangent.h"
 #include "materials/tools/root.h"
 
-namespace mpm
+namespace mpm::materials
 {
 using namespace mohr_coulomb;
 
@@ -199,4 +199,4 @@ BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const SofteningMohrCoulomb&, const PointBatch<2>&);
 template BatchReport update<3>(const SofteningMohrCoulomb&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

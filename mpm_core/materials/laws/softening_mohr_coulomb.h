@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/laws/mohr_coulomb.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// How strength falls from its peak to its residual
 enum class Softening
@@ -78,4 +78,4 @@ inline double shear_modulus(const SofteningMohrCoulomb& law) { return law.peak.y
 /// (implicit), and so is the tangent. A failed point is given the elastic tangent.
 template <int D>
 BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -113,4 +113,4 @@ double stored_energy(const Law& law, const SymTensor<D>& stress, const double* s
 
 template double stored_energy<2>(const Law&, const SymTensor<2>&, const double*);
 template double stored_energy<3>(const Law&, const SymTensor<3>&, const double*);
-} // namespace mpm
+} // namespace mpm::materials

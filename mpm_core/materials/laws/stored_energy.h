@@ -4,7 +4,7 @@
 
 #include "materials/laws/law.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Stored energy of a point per present volume [J/m3], from its Cauchy stress [Pa] and its state variables.
 ///
@@ -15,4 +15,4 @@ namespace mpm
 /// @returns NaN for laws that do not say what they store: those written in Python, and UMATs
 template <int D>
 double stored_energy(const Law& law, const SymTensor<D>& stress, const double* state);
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -77,4 +77,4 @@ CamClay reduced_strength(const CamClay& law, double factor)
   reduced.critical_slope = 6 * sine / (3 - sine);
   return reduced;
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,7 +4,7 @@
 
 #include "materials/laws/law.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// c / F and tan(phi) / F. The dilation angle stays where it can, and is limited to the new friction angle: associated
 /// flow stays associated.
@@ -38,4 +38,4 @@ std::variant<L...> reduced_strength(const std::variant<L...>& law, double factor
 {
   return std::visit([&](const auto& l) -> std::variant<L...> { return reduced_strength(l, factor); }, law);
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -98,4 +98,4 @@ BatchReport update_in_parts(const Law& law, const PointBatch<D>& points, const s
 
 template BatchReport update_in_parts<2>(const Law&, const PointBatch<2>&, const std::vector<Index>&);
 template BatchReport update_in_parts<3>(const Law&, const PointBatch<3>&, const std::vector<Index>&);
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,7 +4,7 @@
 
 #include "materials/laws/law.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Most parts that a strain increment is cut into.
 inline constexpr int most_parts = 64;
@@ -17,4 +17,4 @@ inline constexpr int most_parts = 64;
 /// @returns how many of them yielded, and those that failed to the end, which are as they were
 template <int D>
 BatchReport update_in_parts(const Law& law, const PointBatch<D>& points, const std::vector<Index>& failed);
-} // namespace mpm
+} // namespace mpm::materials

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <dlfcn.h>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -206,4 +206,4 @@ BatchReport update(const Umat& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const Umat&, const PointBatch<2>&);
 template BatchReport update<3>(const Umat&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

@@ -3,7 +3,7 @@
 #include "materials/laws/batch.h"
 #include "materials/tools/parameter.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Arguments of Abaqus's subroutine UMAT, in its order; Fortran passes all by address, and the length of CMNAME last.
 using UmatFunction = void (*)(double* stress, double* statev, double* ddsdde, double* sse, double* spd, double* scd,
@@ -82,4 +82,4 @@ void check(const Umat& law);
 /// Updates stress and state of a batch of points, one call of the UMAT each; DDSDDE is the tangent.
 template <int D>
 BatchReport update(const Umat& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

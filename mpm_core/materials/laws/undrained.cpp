@@ -1,6 +1,6 @@
 #include "materials/laws/undrained.h"
 
-namespace mpm
+namespace mpm::materials
 {
 std::vector<std::string> state_names(const Undrained& law)
 {
@@ -44,4 +44,4 @@ BatchReport update(const Undrained& law, const PointBatch<D>& points)
 
 template BatchReport update<2>(const Undrained&, const PointBatch<2>&);
 template BatchReport update<3>(const Undrained&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

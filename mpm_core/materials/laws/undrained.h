@@ -2,7 +2,7 @@
 
 #include "materials/laws/hencky.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// A saturated soil that does not drain, in effective stresses.
 ///
@@ -48,4 +48,4 @@ inline double shear_modulus(const Undrained& law) { return shear_modulus(law.ske
 /// Updates stress and state of a batch of points (and fills its tangent where wanted, consistent with the update).
 template <int D>
 BatchReport update(const Undrained& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
-namespace mpm
+namespace mpm::materials
 {
 namespace
 {
@@ -95,4 +95,4 @@ BatchReport update(const ViscoplasticMohrCoulomb& law, const PointBatch<D>& poin
 
 template BatchReport update<2>(const ViscoplasticMohrCoulomb&, const PointBatch<2>&);
 template BatchReport update<3>(const ViscoplasticMohrCoulomb&, const PointBatch<3>&);
-} // namespace mpm
+} // namespace mpm::materials

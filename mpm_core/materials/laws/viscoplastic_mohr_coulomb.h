@@ -2,7 +2,7 @@
 
 #include "materials/laws/mohr_coulomb.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Viscoplastic Mohr-Coulomb: stresses outside the surface relax back to it in time.
 ///
@@ -56,4 +56,4 @@ inline double shear_modulus(const ViscoplasticMohrCoulomb& law)
 /// failed point is given the elastic tangent.
 template <int D>
 BatchReport update(const ViscoplasticMohrCoulomb& law, const PointBatch<D>& points);
-} // namespace mpm
+} // namespace mpm::materials

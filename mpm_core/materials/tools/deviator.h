@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::materials
 {
 template <int D>
 double mean(const SymTensor<D>& stress)
@@ -65,4 +65,4 @@ void write_deviatoric_tangent(const SymTensor<D>& s, double ratio, double shear,
       tangent[i * n + j] = entry;
     }
 }
-} // namespace mpm
+} // namespace mpm::materials

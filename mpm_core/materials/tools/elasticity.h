@@ -4,7 +4,7 @@
 
 #include "materials/laws/batch.h"
 
-namespace mpm
+namespace mpm::materials
 {
 /// Lame's constants [Pa]
 struct ElasticModuli
@@ -88,4 +88,4 @@ std::vector<Index> unusable_points(const ElasticModuli& moduli, const PointBatch
       unusable.push_back(i);
   return unusable;
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <sstream>
 
-namespace mpm
+namespace mpm::materials
 {
 std::string number_text(double number)
 {
@@ -19,4 +19,4 @@ void refuse(std::string_view name, double value, std::string_view range)
   message << name << " = " << value << ", but it must be " << range;
   throw InputError(message.str());
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-namespace mpm
+namespace mpm::materials
 {
 /// A number in a law, or in a law within it: `entry<&MohrCoulomb::young>`
 template <auto... members>
@@ -191,4 +191,4 @@ void check_parameters(const L& law)
       refuse(parameter.name, value, range);
     }
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string_view>
 
-namespace mpm
+namespace mpm::materials
 {
 /// Throws InputError naming the parameter, its value and the allowed range, unless `allowed` holds.
 inline void require(bool allowed, std::string_view name, double value, std::string_view range)
@@ -17,4 +17,4 @@ inline void require(bool allowed, std::string_view name, double value, std::stri
   message << name << " = " << value << ", but it must be " << range;
   throw InputError(message.str());
 }
-} // namespace mpm
+} // namespace mpm::materials

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mpm
+namespace mpm::materials
 {
 /// A function's value at a place
 struct Sample
@@ -42,4 +42,4 @@ double root_between(F&& f, Sample one, Sample other)
   }
   return one.x;
 }
-} // namespace mpm
+} // namespace mpm::materials

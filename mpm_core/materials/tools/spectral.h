@@ -4,7 +4,7 @@
 
 #include "materials/laws/mohr_coulomb_return.h"
 
-namespace mpm::mohr_coulomb
+namespace mpm::materials::mohr_coulomb
 {
 /// Principal directions of a stress
 template <int D>
@@ -190,4 +190,4 @@ inline bool may_yield(const Surface& m, const SymTensor<2>& stress)
   const double margin = 1e-6 * (std::abs(s1) + std::abs(s3) + m.cohesion_cos);
   return (yield(m, s1, s3) > -margin) | (s1 - m.tension > -margin);
 }
-} // namespace mpm::mohr_coulomb
+} // namespace mpm::materials::mohr_coulomb

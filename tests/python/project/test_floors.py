@@ -10,22 +10,22 @@ import pytest
 ROOT = Path(__file__).parents[3]
 CORE = ROOT / "mpm_core"
 
-# The folders of the core from the lowest floor up, and what each may include besides itself; an include points down, never up.
-BELOW_STEPS = {"base", "mesh", "materials", "particles", "parallel", "transfer"}
-MAY_SEE = {
-    "base": set(),
-    "mesh": {"base"},
-    "materials": {"base"},
-    "particles": {"base", "mesh"},
-    "parallel": {"base", "mesh", "particles"},
-    "transfer": {"base", "mesh", "materials", "particles", "parallel"},
-    "contact": {"base", "mesh", "particles", "transfer"},
-    "model": BELOW_STEPS | {"contact"},
-    "explicit": BELOW_STEPS | {"contact", "model"},
-    "implicit": BELOW_STEPS | {"contact", "model", "explicit"},
-    "io": BELOW_STEPS,
-    "python": BELOW_STEPS | {"contact", "model", "explicit", "implicit", "io"},
-}
+
+def declared_layers():
+    """By folder of the core, the folders below it: what `base/layers.h` lets its namespace use, and what lies below those."""
+    below = {}
+    header = (CORE / "base" / "layers.h").read_text(encoding="utf-8")
+    for name, body in re.findall(r"^namespace (\w+)\n\{\n((?:using namespace \w+;\n)*)\}", header, re.MULTILINE):
+        used = re.findall(r"using namespace (\w+);", body)
+        below[name] = set(used).union(*(below[layer] for layer in used))
+    return {folder_of(name): {folder_of(layer) for layer in layers} for name, layers in below.items()}
+
+
+def folder_of(namespace):
+    return namespace.removesuffix("_scheme")
+
+
+MAY_SEE = declared_layers()
 
 
 def includes(source):
@@ -37,9 +37,19 @@ def sources(floor):
     return [path for path in (CORE / floor).rglob("*") if path.suffix in {".h", ".cpp"}]
 
 
-def test_every_folder_with_sources_is_a_known_floor():
+def test_every_folder_with_sources_is_a_layer():
     folders = {path.relative_to(CORE).parts[0] for path in CORE.rglob("*") if path.suffix in {".h", ".cpp"}}
-    assert folders <= set(MAY_SEE)
+    assert folders == set(MAY_SEE)
+
+
+@pytest.mark.parametrize("floor", MAY_SEE)
+def test_namespaces_follow_folders(floor):
+    namespaces = {
+        name
+        for path in sources(floor)
+        for name in re.findall(r"^namespace mpm::(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    assert {folder_of(name) for name in namespaces} == {floor}
 
 
 @pytest.mark.parametrize("floor", MAY_SEE)
