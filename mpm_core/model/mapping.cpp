@@ -75,7 +75,8 @@ void find_velocity_change(VelocityField<G>& field, double pic_fraction, double d
 template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
 {
-  const auto of_cell = [&](Index c) -> VolumeMean
+  const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
+  const auto strain_of = [&](Index c)
   {
     double divergence = 0;
     for (int k = 0; k <= D; ++k)
@@ -85,9 +86,9 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
       if constexpr (G::has_hoop)
         divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
     }
-    return {dt * divergence, integrated_volume(mesh, field, c)};
+    return dt * divergence * volume_of(c);
   };
-  average_over_nodes(mesh, field.part, of_cell, exchange, field.volumetric_strain);
+  average_over_nodes(mesh, field.part, volume_of, strain_of, exchange, field.volumetric_strain);
 }
 
 namespace
@@ -102,21 +103,19 @@ double mean_of(const Working<G>& stress)
   return sum / G::n_normal;
 }
 
-/// The cells' change of mean stress times volume when it is averaged over nodes, handed to `take` cell by cell.
+/// The change of mean stress times volume of filled cells when it is averaged over nodes, handed to `take` cell by
+/// cell.
 template <class G, class StressOf, class Take>
 void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                          StressOf&& stress_of, Take&& take)
 {
   field.mean_stress.resize(mesh.points.size());
-  const auto of_cell = [&](Index c) -> VolumeMean
-  {
-    const double volume = integrated_volume(mesh, field, c);
-    return {volume > 0 ? mean_of<G>(stress_of(c)) / volume : 0, volume};
-  };
-  average_over_nodes<G::dim>(mesh, field.part, of_cell, exchange, field.mean_stress);
+  const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
+  const auto integral_of = [&](Index c) { return mean_of<G>(stress_of(c)); };
+  average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
   for (Index c : field.part.cells)
-    take(c, integrated_volume(mesh, field, c) * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) -
-                mean_of<G>(stress_of(c)));
+    if (const double volume = volume_of(c); volume != 0)
+      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral_of(c));
 }
 } // namespace
 

@@ -9,8 +9,8 @@
 
 namespace mpm::transfer
 {
-/// Volumetric strain or mean stress of a cell with its filled volume, or of a node, the mean over the cells around it
-/// weighted by theirs, with their sum. Plain doubles, so that shared nodes are summed in one message.
+/// Volumetric strain or mean stress of a node: the mean over the cells around it, weighted by their filled volumes, and
+/// the sum of these. Plain doubles, so that shared nodes are summed in one message.
 struct VolumeMean
 {
   double value;
@@ -19,21 +19,25 @@ struct VolumeMean
 
 /// Means over the filled cells around each node of a part of the mesh (method of Detournay & Dzik 2006; with volume
 /// weights this followed by `mean_of_nodes` is its own transpose).
-/// @param of_cell  value of a cell and its filled volume, 0 where it is empty; a callable Index -> VolumeMean
+/// @param volume_of    filled volume of a cell, 0 where it is empty; a callable Index -> double
+/// @param integral_of  what is averaged, integrated over a filled cell; a callable Index -> double
 /// @note Collective
-template <int D, class OfCell>
-void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, OfCell&& of_cell, NodeExchange& exchange,
-                        std::span<VolumeMean> nodes)
+template <int D, class VolumeOf, class IntegralOf>
+void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, VolumeOf&& volume_of, IntegralOf&& integral_of,
+                        NodeExchange& exchange, std::span<VolumeMean> nodes)
 {
   for (Index node : part.nodes)
     nodes[node] = {};
   for (Index c : part.cells)
   {
-    const VolumeMean cell = of_cell(c);
+    const double volume = volume_of(c);
+    if (volume == 0)
+      continue;
+    const double integral = integral_of(c);
     for (Index node : mesh.cells[c])
     {
-      nodes[node].value += cell.value * cell.volume;
-      nodes[node].volume += cell.volume;
+      nodes[node].value += integral;
+      nodes[node].volume += volume;
     }
   }
   sum_shared(exchange, nodes);
