@@ -65,36 +65,51 @@ struct Surface
   double plastic_per_root_square; ///< sqrt(2) / 6G [1/Pa]
 };
 
-/// The constants of a material; angles in radians
-inline Surface surface(const ElasticModuli& moduli, double poisson, double cohesion, double phi, double psi,
-                       double tension_cutoff)
+/// Friction angle phi and dilation angle psi of a material, by what enters its constants
+struct Angles
 {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
+  double sin_phi, cos_phi, sin_psi;
+};
+
+/// The constants of a material
+[[gnu::always_inline]] inline Surface surface(const ElasticModuli& moduli, double poisson, double cohesion,
+                                              Angles angles, double tension_cutoff)
+{
+  constexpr double infinity = std::numeric_limits<double>::infinity(), third = 1.0 / 3;
   Surface s{};
   s.moduli = moduli;
   s.poisson = poisson;
-  s.sin_phi = std::sin(phi);
-  s.sin_psi = std::sin(psi);
-  s.cohesion_cos = cohesion * std::cos(phi);
-  const double n = (1 + s.sin_phi) / (1 - s.sin_phi);
+  s.sin_phi = angles.sin_phi;
+  s.sin_psi = angles.sin_psi;
+  s.cohesion_cos = cohesion * angles.cos_phi;
+  const double per_rest = 1 / (1 - s.sin_phi); // divisions are what this takes longest for
+  const double n = (1 + s.sin_phi) * per_rest;
   const double m = (1 + s.sin_psi) / (1 - s.sin_psi);
   s.slope = n;
-  s.strength = 2 * s.cohesion_cos / (1 - s.sin_phi);
-  s.apex = phi > 0 ? s.cohesion_cos / s.sin_phi : infinity;
+  s.strength = 2 * s.cohesion_cos * per_rest;
+  s.apex = s.sin_phi > 0 ? s.cohesion_cos / s.sin_phi : infinity;
   s.tension = tension_cutoff < s.apex ? tension_cutoff : infinity;
   // Edges of the potential: (1, 1, m) and (1, m, m), split into mean and deviator.
   const double stiffness_ratio = (1 + poisson) / (1 - 2 * poisson); // 3K / 2G
-  const double deviator = stiffness_ratio * (m - 1) / 3;
-  const double compression_sum = (2 + m) * (2 + n) / 3 + 2 * deviator * (n - 1);
-  s.compression_w12 = ((2 + m) / 3 - deviator) / compression_sum;
-  s.compression_w3 = ((2 + m) / 3 + 2 * deviator) / compression_sum;
-  const double extension_sum = (1 + 2 * m) * (1 + 2 * n) / 3 + 2 * deviator * (n - 1);
-  s.extension_w1 = ((1 + 2 * m) / 3 - 2 * deviator) / extension_sum;
-  s.extension_w23 = ((1 + 2 * m) / 3 + deviator) / extension_sum;
+  const double deviator = stiffness_ratio * (m - 1) * third;
+  const double compression_mean = (2 + m) * third, extension_mean = (1 + 2 * m) * third;
+  const double per_compression = 1 / (compression_mean * (2 + n) + 2 * deviator * (n - 1));
+  s.compression_w12 = (compression_mean - deviator) * per_compression;
+  s.compression_w3 = (compression_mean + 2 * deviator) * per_compression;
+  const double per_extension = 1 / (extension_mean * (1 + 2 * n) + 2 * deviator * (n - 1));
+  s.extension_w1 = (extension_mean - 2 * deviator) * per_extension;
+  s.extension_w23 = (extension_mean + deviator) * per_extension;
   s.per_plane_stiffness = 1 / (moduli.shear + (moduli.lambda + moduli.shear) * s.sin_phi * s.sin_psi);
   s.lateral = poisson / (1 - poisson);
   s.plastic_per_root_square = std::numbers::sqrt2 / (6 * moduli.shear);
   return s;
+}
+
+/// The constants of a material; angles in radians
+inline Surface surface(const ElasticModuli& moduli, double poisson, double cohesion, double phi, double psi,
+                       double tension_cutoff)
+{
+  return surface(moduli, poisson, cohesion, Angles{std::sin(phi), std::cos(phi), std::sin(psi)}, tension_cutoff);
 }
 
 /// Mohr-Coulomb yield function [Pa], as a shear stress; positive outside

@@ -1,7 +1,10 @@
 #include "materials/laws/softening_mohr_coulomb.h"
 
-#include "materials/laws/mohr_coulomb_tangent.h"
+#include "base/work_columns.h"
+#include "materials/laws/softening_tangent.h"
 #include "materials/tools/root.h"
+
+// The loops marked `ivdep` vectorise, as those of mohr_coulomb.cpp do.
 
 namespace mpm::materials
 {
@@ -9,159 +12,225 @@ using namespace mohr_coulomb;
 
 namespace
 {
-Surface surface_of(const MohrCoulomb& law)
+/// Candidates are filled up to a multiple of this, so that none is left to the scalar remainder of a vector loop.
+constexpr std::size_t lanes = 8;
+
+/// Accuracy of the plastic strain of a band over the softening strain, and so of the fraction of strength that is lost
+constexpr double accuracy = 1e-13;
+
+/// Steps of the secant method after which the roots that are left are bracketed
+constexpr int most_secants = 6;
+
+/// The points of a block that may yield, side by side
+template <int D>
+struct Candidates
 {
-  constexpr double degree = std::numbers::pi / 180;
-  return mohr_coulomb::surface(elastic_moduli(law.young, law.poisson), law.poisson, law.cohesion,
-                               law.friction_angle * degree, law.dilation_angle * degree, law.tension_cutoff);
-}
+  std::size_t size = 0, padded = 0;
+  WorkColumn<Index> point; ///< number in the batch
+  WorkColumns<Spectral<D>> trial;
+  WorkColumn<double> band_strain, bands_per_cell, deviation;
+  WorkColumn<double> increment, excess; ///< of the plastic strain, and by how much that of its surface is larger
+  WorkColumn<double> next, next_excess; ///< the same at the place that the secant points to
+  WorkColumns<Returned> returned;       ///< stresses on the surface last looked at
 
-/// A trial stress and how the strength falls with the plastic strain of its return
-struct Softener
-{
-  const SofteningMohrCoulomb& law;
-  double band_strain;    ///< at the increment's start
-  double bands_per_cell; ///< cell size over the reference length
-  double cohesion_deviation;
-  Principal trial;
-
-  /// Surface after a further plastic strain
-  Surface surface(double increment) const { return mohr_coulomb_surface(band_strain + bands_per_cell * increment); }
-
-  Principal returned(double increment) const { return return_to_surface(surface(increment), trial).stress; }
-
-  /// Plastic strain of the return to the surface that holds after some plastic strain
-  double plastic_strain(double increment) const
+  SofteningPoint at(const FallingStrength& strength, std::size_t i)
   {
-    const Surface m = surface(increment);
-    return deviatoric_plastic_strain(m, trial, return_to_surface(m, trial).stress);
+    const Principal stress{trial.column(0).data()[i], trial.column(1).data()[i], trial.column(2).data()[i]};
+    return {strength, band_strain.data()[i], bands_per_cell.data()[i], deviation.data()[i], stress};
   }
-
-  /// Solves the fixed-point equation for the plastic strain increment by the secant method. In small increments the
-  /// strength falls little, and a few evaluations suffice; otherwise the root is bracketed.
-  double increment() const
-  {
-    double x = plastic_strain(0), excess = plastic_strain(x) - x;
-    double next = x + excess;
-    for (int iteration = 0; iteration < 6 && std::abs(excess) > 1e-12 * x && next > 0; ++iteration)
-    {
-      const double next_excess = plastic_strain(next) - next;
-      const double better = next - next_excess * (next - x) / (next_excess - excess);
-      x = next;
-      excess = next_excess;
-      next = better;
-    }
-    return std::abs(excess) <= 1e-12 * x ? x : bracketed_increment();
-  }
-
-  /// The resulting strain stays finite while the strength falls no further than to its residual, so there is a bracket.
-  double bracketed_increment() const
-  {
-    const double first = plastic_strain(0);
-    double bound = first;
-    double excess = plastic_strain(bound) - bound;
-    while (excess > 0)
-    {
-      bound *= 2;
-      excess = plastic_strain(bound) - bound;
-    }
-    return excess == 0 ? bound
-                       : root_between([&](double x) { return plastic_strain(x) - x; }, {0, first}, {bound, excess});
-  }
-
-  /// Derivative of the returned principal stresses by the plastic strain, at a fixed trial stress
-  Principal derivative(double increment) const
-  {
-    const double step = 1e-5 * law.softening_strain;
-    const double low = std::max(0.0, increment - step), high = increment + step;
-    const Principal a = returned(low), b = returned(high);
-    const double size = high - low;
-    return {(b.s1 - a.s1) / size, (b.s2 - a.s2) / size, (b.s3 - a.s3) / size};
-  }
-
-private:
-  Surface mohr_coulomb_surface(double strain) const { return surface_of(softened(law, strain, cohesion_deviation)); }
 };
 
-/// Derivative of the plastic strain of a return by the trial stress (principal values) at a fixed surface
-Principal strain_gradient(const Surface& m, const Matrix3& map, Principal trial, Principal stress, double increment)
+/// What the elastic step found in a block.
+struct ElasticStep
 {
-  const std::array<double, 3> change{trial.s1 - stress.s1, trial.s2 - stress.s2, trial.s3 - stress.s3};
-  const double mean = (change[0] + change[1] + change[2]) / 3;
-  const double factor = increment > 0 ? 1 / (6 * m.moduli.shear * m.moduli.shear * increment) : 0.0;
-  std::array<double, 3> gradient;
-  for (std::size_t j = 0; j < 3; ++j)
+  WorkColumn<std::int64_t> may_leave; ///< 1 for points that may yield
+  std::int64_t failed = 0;            ///< number of points whose trial stress is not usable
+};
+
+/// Elastic step of the points of a block: stresses become trial stresses where they are usable.
+/// @tparam intact  whether no point has lost strength yet, nor is weaker than the law: all have the peak's surface
+template <int D, bool intact>
+void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, Index first, Index last,
+                  ElasticStep& step)
+{
+  const FallingStrength s = strength; // a copy that no store can alias
+  const Surface peak = surface_after(s, 0, 0);
+  std::int64_t failed = 0;
+#pragma GCC ivdep
+  for (Index i = first; i < last; ++i)
   {
-    gradient[j] = change[j] - mean;
-    for (std::size_t i = 0; i < 3; ++i)
-      gradient[j] -= map[i][j] * (change[i] - mean);
-    gradient[j] *= factor;
+    const SymTensor<D> trial = elastic_trial<D>(s.moduli, points, i);
+    const bool usable = is_usable<D>(trial);
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
+    bool leaves;
+    if constexpr (intact)
+      leaves = may_yield(peak, trial);
+    else
+      leaves = may_yield(surface_after(s, points.state[1][i], points.state[2][i]), trial);
+    step.may_leave[static_cast<std::size_t>(i - first)] = usable & leaves ? 1 : 0;
+    failed += usable ? 0 : 1;
   }
-  return {gradient[0], gradient[1], gradient[2]};
+  step.failed += failed;
 }
 
-/// Adds what the loss of strength contributes to the tangent: the stress falls by its derivative by the plastic strain,
-/// and the plastic strain grows with the trial stress and with the softening that it causes.
+/// Elastic step of the points of a block; lists those that may yield.
 template <int D>
-void add_softening(const Softener& softener, const Surface& m, const Spectral<D>& trial, const Returned& returned,
-                   double increment, double* tangent)
+void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, Index first, Index last,
+                  ElasticStep& step, Candidates<D>& candidates)
 {
-  const Matrix3 map = region_maps(m).of[static_cast<std::size_t>(returned.region)];
-  const Principal fall = softener.derivative(increment);
-  const Principal gradient = strain_gradient(m, map, trial.stress, returned.stress, increment);
-  const Principal d{trial.stress.s1 - returned.stress.s1, trial.stress.s2 - returned.stress.s2,
-                    trial.stress.s3 - returned.stress.s3};
-  const double mean = (d.s1 + d.s2 + d.s3) / 3;
-  const double yielded = increment > 0 ? increment : std::numeric_limits<double>::min();
-  const double own = -((d.s1 - mean) * fall.s1 + (d.s2 - mean) * fall.s2 + (d.s3 - mean) * fall.s3) /
-                     (6 * m.moduli.shear * m.moduli.shear * yielded);
-  const SymTensor<D> by_strain = recomposed(fall, trial.frame), by_trial = recomposed(gradient, trial.frame);
-  const double volumetric = m.moduli.lambda * (by_trial[0] + by_trial[1] + by_trial[2]);
-  for (std::size_t i = 0; i < n_stress<D>; ++i)
-    for (std::size_t j = 0; j < n_stress<D>; ++j)
-      tangent[i * n_stress<D> + j] +=
-          by_strain[i] * ((j < 3 ? volumetric : 0.0) + 2 * m.moduli.shear * by_trial[j]) / (1 - own);
-}
-
-/// Whether a point is surely elastic: it has its whole strength yet, and the trial stress is inside. Most points of a
-/// slope are, and this spares them their own surface and their principal stresses.
-template <int D>
-bool is_intact(const Surface& peak, const PointBatch<D>& points, Index i, const SymTensor<D>& trial)
-{
-  return points.state[1][i] == 0 && points.state[2][i] >= 0 && !may_yield(peak, trial);
-}
-
-/// Returns one trial stress that may be outside; whether it was.
-template <int D>
-bool update_point(const SofteningMohrCoulomb& law, const PointBatch<D>& points, Index i, const SymTensor<D>& trial)
-{
-  const Spectral<D> spectrum = spectral(trial);
-  const double bands = points.cell_size ? points.cell_size[i] / law.reference_length : 1;
-  const Softener softener{law, points.state[1][i], bands, points.state[2][i], spectrum.stress};
-  if (!is_outside(softener.surface(0), spectrum.stress.s1, spectrum.stress.s3))
-    return false;
-  const double increment = softener.increment();
-  const Surface m = softener.surface(increment);
-  const Returned returned = return_to_surface(m, spectrum.stress);
-  const SymTensor<D> stress = recomposed(returned.stress, spectrum.frame);
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    points.stress[k][i] = stress[k];
-  points.state[0][i] += increment;
-  points.state[1][i] += softener.bands_per_cell * increment;
-  if (points.tangent)
+  std::int64_t changed = 0;
+  for (Index i = first; i < last; ++i)
+    changed += (points.state[1][i] == 0) & (points.state[2][i] >= 0) ? 0 : 1;
+  if (changed == 0)
+    elastic_step<D, true>(strength, points, first, last, step);
+  else
+    elastic_step<D, false>(strength, points, first, last, step);
+  candidates.size = 0;
+  for (Index i = first; i < last; ++i) // without a branch on the single point
   {
-    double* const tangent = points.tangent + static_cast<std::size_t>(i) * n_stress<D> * n_stress<D>;
-    write_tangent<D>(m, region_maps(m), spectrum, returned, tangent);
-    add_softening<D>(softener, m, spectrum, returned, increment, tangent);
+    candidates.point[candidates.size] = i;
+    candidates.size += static_cast<std::size_t>(step.may_leave[static_cast<std::size_t>(i - first)]);
   }
-  return true;
+}
+
+/// Copies trial stresses and states of the candidates, and fills up with copies of the first one.
+template <int D>
+void gather(const PointBatch<D>& points, double per_reference_length, Candidates<D>& candidates)
+{
+  candidates.padded = (candidates.size + lanes - 1) / lanes * lanes;
+  for (std::size_t i = candidates.size; i < candidates.padded; ++i)
+    candidates.point[i] = candidates.point[0];
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < candidates.padded; ++i)
+  {
+    const Index p = candidates.point[i];
+    SymTensor<D> trial;
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      trial[k] = points.stress[k][p];
+    candidates.trial.set(i, spectral(trial));
+    candidates.band_strain[i] = points.state[1][p];
+    candidates.deviation[i] = points.state[2][p];
+  }
+  for (std::size_t i = 0; i < candidates.padded; ++i)
+    candidates.bands_per_cell[i] =
+        points.cell_size ? points.cell_size[candidates.point[i]] * per_reference_length : 1.0;
+}
+
+/// Returns to the surfaces that hold after the given plastic strains, and by how much the plastic strains of these
+/// returns are larger. Not inlined, so that all points go through the same instructions and round alike.
+template <int D, bool with_cutoff>
+[[gnu::noinline]] void return_stresses(const FallingStrength& strength, Candidates<D>& candidates,
+                                       WorkColumn<double>& increment, WorkColumn<double>& excess)
+{
+  const FallingStrength s = strength; // a copy that no store can alias
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < candidates.padded; ++i)
+  {
+    const SofteningPoint point = candidates.at(s, i);
+    const Surface m = point.surface_at(increment[i]);
+    const Returned returned = return_to_surface<with_cutoff>(m, point.trial);
+    candidates.returned.set(i, returned);
+    excess[i] = deviatoric_plastic_strain(m, point.trial, returned.stress) - increment[i];
+  }
+}
+
+/// Root of the excess of a point that the secant method did not find. The strain stays finite while the strength falls
+/// no further than to its residual, so there is a bracket.
+double bracketed_increment(const SofteningPoint& point)
+{
+  const double first = point.excess_at(0);
+  double bound = first;
+  double excess = point.excess_at(bound);
+  while (excess > 0)
+  {
+    bound *= 2;
+    excess = point.excess_at(bound);
+  }
+  const auto excess_at = [&](double x) { return point.excess_at(x); };
+  return excess == 0 ? bound : root_between(excess_at, {0, first}, {bound, excess});
+}
+
+/// One step of the secant method for all candidates whose root is not found: their strength still changes.
+/// @returns number of them before the step
+template <int D>
+std::int64_t secant_step(double per_softening_strain, Candidates<D>& c)
+{
+  std::int64_t left = 0;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < c.padded; ++i)
+  {
+    const double x = c.next[i], excess = c.next_excess[i];
+    const bool found = std::abs(excess) * c.bands_per_cell[i] * per_softening_strain <= accuracy;
+    const double slope = (excess - c.excess[i]) / (x - c.increment[i]);
+    c.next[i] = found ? x : x - excess / slope;
+    c.increment[i] = found ? c.increment[i] : x;
+    c.excess[i] = found ? c.excess[i] : excess;
+    left += found ? 0 : 1;
+  }
+  return left;
+}
+
+/// Solves the fixed-point equations for the plastic strain increments, all candidates side by side, by the secant
+/// method. In small increments the strength falls little, and a few returns suffice; otherwise the root is bracketed.
+/// @post `next` are the increments, and `returned` the stresses
+template <int D, bool with_cutoff>
+void find_increments(const FallingStrength& s, Candidates<D>& c)
+{
+  c.increment.fill(0);
+  return_stresses<D, with_cutoff>(s, c, c.increment, c.excess);
+  c.next = c.excess;
+  for (int step = 0; step <= most_secants; ++step)
+  {
+    return_stresses<D, with_cutoff>(s, c, c.next, c.next_excess);
+    if (secant_step(s.per_softening_strain, c) == 0)
+      return;
+  }
+  for (std::size_t i = 0; i < c.padded; ++i)
+    if (!(std::abs(c.next_excess[i]) * c.bands_per_cell[i] * s.per_softening_strain <= accuracy))
+      c.next[i] = bracketed_increment(c.at(s, i));
+  return_stresses<D, with_cutoff>(s, c, c.next, c.next_excess);
+}
+
+/// Final stresses and states of the candidates that yielded; the others are as they are to be.
+/// @returns how many yielded
+template <int D>
+Index write_back(const PointBatch<D>& points, Candidates<D>& candidates)
+{
+  double *const plastic_strain = points.state[0], *const band_strain = points.state[1];
+  std::int64_t plastic = 0;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < candidates.size; ++i)
+  {
+    const Index p = candidates.point[i];
+    const Returned returned = candidates.returned.at(i);
+    const bool yields = returned.region != Region::elastic;
+    const SymTensor<D> stress = recomposed(returned.stress, candidates.trial.at(i).frame);
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      points.stress[k][p] = yields ? stress[k] : points.stress[k][p];
+    const double increment = yields ? candidates.next[i] : 0.0;
+    plastic_strain[p] += increment;
+    band_strain[p] += candidates.bands_per_cell[i] * increment;
+    plastic += yields ? 1 : 0;
+  }
+  return static_cast<Index>(plastic);
+}
+
+/// Tangents of the candidates that yielded.
+template <int D>
+void write_tangents(const FallingStrength& strength, Candidates<D>& candidates, double* tangents)
+{
+  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
+  for (std::size_t i = 0; i < candidates.size; ++i)
+    if (candidates.returned.at(i).region != Region::elastic)
+      write_softening_tangent<D>(candidates.at(strength, i), candidates.trial.at(i).frame, candidates.next[i],
+                                 tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
 } // namespace
 
 MohrCoulomb softened(const SofteningMohrCoulomb& law, double band_strain, double cohesion_deviation)
 {
-  const double progress = band_strain / law.softening_strain;
-  const double lost = law.shape == Softening::linear ? std::min(progress, 1.0) : -std::expm1(-progress);
+  const double lost = lost_fraction(law.shape == Softening::exponential ? 1 : 0, band_strain / law.softening_strain);
   const double factor = std::max(0.0, 1 + cohesion_deviation);
   MohrCoulomb now = law.peak;
   now.cohesion = factor * (now.cohesion + lost * (law.residual_cohesion - now.cohesion));
@@ -175,25 +244,29 @@ double p_wave_modulus(const SofteningMohrCoulomb& law) { return p_wave_modulus(l
 template <int D>
 BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
 {
-  const ElasticModuli moduli = elastic_moduli(law.peak.young, law.peak.poisson);
-  const Surface peak = surface_of(law.peak);
+  const FallingStrength strength = falling_strength(law);
   if (points.tangent)
-    fill_elastic_tangent<D>(moduli, points.size, points.tangent);
+    fill_elastic_tangent<D>(strength.moduli, points.size, points.tangent);
   BatchReport report;
-  for (Index i = 0; i < points.size; ++i)
+  ElasticStep step;
+  Candidates<D> candidates;
+  constexpr auto block = static_cast<Index>(block_size);
+  for (Index first = 0; first < points.size; first += block)
   {
-    const SymTensor<D> trial = elastic_trial<D>(moduli, points, i);
-    if (!is_usable<D>(trial))
-    {
-      report.failed.push_back(i);
+    elastic_step(strength, points, first, std::min(points.size, first + block), step, candidates);
+    if (candidates.size == 0)
       continue;
-    }
-    if (!is_intact(peak, points, i, trial) && update_point<D>(law, points, i, trial))
-      ++report.plastic;
+    gather(points, 1 / law.reference_length, candidates);
+    if (law.peak.tension_cutoff < unlimited)
+      find_increments<D, true>(strength, candidates);
     else
-      for (std::size_t k = 0; k < n_stress<D>; ++k)
-        points.stress[k][i] = trial[k];
+      find_increments<D, false>(strength, candidates);
+    report.plastic += write_back(points, candidates);
+    if (points.tangent)
+      write_tangents(strength, candidates, points.tangent);
   }
+  if (step.failed > 0)
+    report.failed = unusable_points<D>(strength.moduli, points);
   return report;
 }
 

@@ -55,6 +55,28 @@ def test_stress_stays_admissible_at_the_strength_that_is_left(law, dim):
     assert state[:, 0].max() > 0.02
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_tension_cutoff_holds_while_strength_falls(dim):
+    peak = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=20e3, friction_angle=30.0, tension_cutoff=2e3)
+    law = mpm.SofteningMohrCoulomb(peak, **RESIDUAL, softening_strain=0.02, reference_length=0.1)
+    stress, _ = random_points(dim, 1000, pressure=20e3, deviator=10e3, strain=0.0)
+    stress, state = walk(law, stress, 1e-3, 100)
+    assert strength_excess(law, stress, state).max() < 1e-9
+    largest = principal(stress)[:, 0]
+    assert largest.max() < 2e3 * (1 + 1e-9)
+    assert np.isclose(largest, 2e3, rtol=1e-9).mean() > 0.05 and state[:, 1].max() > 0.02
+
+
+def test_a_point_does_not_depend_on_those_beside_it(law):
+    stress, increment = random_points(2, 300, pressure=50e3, deviator=20e3, strain=2e-3)
+    state = np.random.default_rng(5).uniform(0, [0.02, 0.2, 0.3], (300, 3))
+    together = Batch(law, stress, increment, state)
+    for first in (0, 7, 131):
+        alone = Batch(law, stress[first:][:5], increment[first:][:5], state[first:][:5])
+        assert np.abs(alone.stress - together.stress[first:][:5]).max() < 1e-9 * 50e3
+        assert np.abs(alone.state - together.state[first:][:5]).max() < 1e-12
+
+
 def test_triaxial_strength_falls_as_prescribed(law):
     test = mpm.ElementTest(law, [-50e3] * 3 + [0.0] * 3)
     for _ in range(200):
