@@ -1,6 +1,6 @@
 #include "contact/contact.h"
 
-#include "base/tensor.h"
+#include "contact/clearance.h"
 #include "transfer/affine_field.h"
 
 #include <algorithm>
@@ -23,32 +23,14 @@ double particle_radius(const Particles<G::dim>& particles, Index p)
 
 namespace
 {
-/// Bounds of the gaps in all cells. A particle is no farther from the centre of its cell than the vertices are; as much
-/// again is for its radius and for its motion in a step.
-template <int D>
-void find_clearance(const Mesh<D>& mesh, const Vector<D>& moved, Contact<D>& contact)
+/// Area of surface that a particle covers [m2]; per metre or per radian in two dimensions.
+template <class G>
+double particle_area(const Particles<G::dim>& particles, Index p, double radius)
 {
-  contact.clearance.resize(static_cast<std::size_t>(mesh.owned_cells));
-  contact.found_at = moved;
-  contact.cell_size = std::numeric_limits<double>::infinity();
-  for (Index c = 0; c < mesh.owned_cells; ++c)
-  {
-    const Vector<D>& centre = mesh.shapes[c].centre;
-    double squared = 0;
-    for (Index node : mesh.cells[c])
-    {
-      double sum = 0;
-      for (int i = 0; i < D; ++i)
-        sum += (mesh.points[node][i] - centre[i]) * (mesh.points[node][i] - centre[i]);
-      squared = std::max(squared, sum);
-    }
-    const double reach = std::sqrt(squared);
-    Vector<D> x;
-    for (int i = 0; i < D; ++i)
-      x[i] = centre[i] - moved[i];
-    contact.clearance[static_cast<std::size_t>(c)] = distance<D>(contact.surface, x).value - 3 * reach;
-    contact.cell_size = std::min(contact.cell_size, reach);
-  }
+  if constexpr (G::dim == 3)
+    return 4 * radius * radius;
+  else
+    return 2 * radius * (G::has_hoop ? particles.position[0][p] : 1);
 }
 
 /// The part of a vector along a surface.
@@ -61,49 +43,11 @@ Vector<D> tangential(Vector<D> v, const Vector<D>& normal)
   return v;
 }
 
-template <int D>
-double apart(const Vector<D>& a, const Vector<D>& b)
-{
-  double sum = 0;
-  for (int i = 0; i < D; ++i)
-    sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return std::sqrt(sum);
-}
-
-/// Moment of a force at an arm.
-template <int D>
-Vector<3> moment_of(const Vector<D>& arm, const Vector<D>& force)
-{
-  if constexpr (D == 2)
-    return {0, 0, arm[0] * force[1] - arm[1] * force[0]};
-  else
-    return {arm[1] * force[2] - arm[2] * force[1], arm[2] * force[0] - arm[0] * force[2],
-            arm[0] * force[1] - arm[1] * force[0]};
-}
-
-/// The surface in a step.
-template <int D>
-struct Moved
-{
-  Vector<D> by;       ///< its displacement at the step's start [m]
-  Vector<D> velocity; ///< in the mean over the step [m/s]
-};
-
-template <int D>
-Moved<D> moved(const Contact<D>& contact, const TimeStep& step)
-{
-  Moved<D> now{displacement<D>(contact.motion, contact.start, step.start), {}};
-  if (step.dt > 0)
-    now.velocity = displacement<D>(contact.motion, step.start, step.start + step.dt);
-  for (double& component : now.velocity)
-    component /= step.dt > 0 ? step.dt : 1;
-  return now;
-}
-
 /// Friction: adds a displacement along the surface to the elastic slip and returns it to the cone.
-/// @param longest  slip at which the spring's force is that of Coulomb
+/// @param longest  slip at which the spring's force is the shear strength
+/// @returns whether the particle sticks
 template <int D>
-void update_slip(const Vector<D>& normal, const Vector<D>& increment, double longest, Vector<D>& slip)
+bool update_slip(const Vector<D>& normal, const Vector<D>& increment, double longest, Vector<D>& slip)
 {
   for (int i = 0; i < D; ++i)
     slip[i] += increment[i];
@@ -111,6 +55,7 @@ void update_slip(const Vector<D>& normal, const Vector<D>& increment, double lon
   const double length = norm<D>(slip), scale = length > longest ? longest / length : 1;
   for (double& component : slip)
     component *= scale;
+  return scale == 1;
 }
 
 template <int D>
@@ -121,21 +66,37 @@ std::vector<Column>* slip_columns(Particles<D>& particles, const std::string& na
       return &field.columns;
   return nullptr;
 }
+
+/// Path of the surface's fastest point in a step [m].
+template <int D>
+double step_travel(const Contact<D>& contact, double dt)
+{
+  return dt * (norm<D>(contact.body.velocity) + contact.reach * norm<3>(contact.body.spin));
+}
 } // namespace
 
 template <int D>
 void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact)
 {
-  contact.force = {};
-  contact.moment = {};
-  // Steps may become shorter and longer. A spring that grew stiffer under load would make energy, so that this one only
-  // becomes softer, when the step would be too long for it.
+  prescribe_motion(step, contact.of_ranks, contact.body);
+  contact.reaction = {};
+  // Steps may become shorter and longer, and a free body may meet more soil. A spring that grew stiffer under load
+  // would make energy, so that this one only becomes softer, when it would be too stiff for the step.
+  const double load = contact.of_ranks.load;
   if (contact.stiff_step == 0)
     contact.stiff_step = step.dt;
-  contact.stiff_step = std::max(contact.stiff_step, std::sqrt(contact.penalty) * step.dt);
-  const Vector<D> by = displacement<D>(contact.motion, contact.start, step.start);
-  if (contact.clearance.empty() || apart<D>(by, contact.found_at) > contact.cell_size)
-    find_clearance<D>(mesh, by, contact);
+  contact.stiff_step = std::max(contact.stiff_step, std::sqrt(load > 0 ? 1 + load : contact.penalty) * step.dt);
+  if (contact.clearance.empty() || contact.travel > contact.cell_size)
+    find_clearance<D>(mesh, contact);
+}
+
+template <int D>
+void end_step(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact)
+{
+  for (int i = 0; i < D; ++i)
+    contact.impulse[i] += step.dt * contact.reaction.force[i];
+  move_body<D>(step, gravity, contact.of_ranks, contact.body);
+  contact.travel += step_travel(contact, step.dt);
 }
 
 namespace
@@ -144,59 +105,111 @@ namespace
 template <int D>
 struct Press
 {
-  Moved<D> surface;
   double dt;
   double stiffness; ///< per mass [1/s2]
+  Matrix<3> turn;   ///< rotation of the body in the step, less the identity
+  double per_mass;  ///< translation of a free body under a force: 1/M [1/kg]
+  double per_inertia;
   std::vector<Column>* slips;
 };
 
-/// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
-template <class G, int D = G::dim>
-std::optional<Vector<D>> particle_force(const Contact<D>& contact, const Press<D>& press, const Vector<D>& velocity,
-                                        const Particles<D>& particles, Index p)
+template <int D>
+Press<D> press_of(const Contact<D>& contact, double dt, std::vector<Column>* slips)
 {
-  Vector<D> x, motion, slip{};
-  for (int i = 0; i < D; ++i)
-  {
-    x[i] = particles.position[i][p] - press.surface.by[i];
-    motion[i] = press.dt * (velocity[i] - press.surface.velocity[i]);
-  }
-  const auto [distance_now, normal] = distance<D>(contact.surface, x);
-  const double depth = particle_radius<G>(particles, p) - distance_now - dot<D>(motion, normal);
-  const bool touches = depth > 0;
-  if (press.slips)
-  {
-    if (touches)
-    {
-      for (int i = 0; i < D; ++i)
-        slip[i] = (*press.slips)[static_cast<std::size_t>(i)][p];
-      update_slip<D>(normal, motion, contact.friction * depth, slip);
-    }
-    for (int i = 0; i < D; ++i)
-      (*press.slips)[static_cast<std::size_t>(i)][p] = slip[i];
-  }
-  if (!touches)
-    return std::nullopt;
-  Vector<D> force;
-  for (int i = 0; i < D; ++i)
-    force[i] = press.stiffness * particles.mass[p] * (depth * normal[i] - slip[i]);
-  return force;
+  const RigidBody<D>& body = contact.body;
+  Vector<3> angle;
+  for (std::size_t k = 0; k < 3; ++k)
+    angle[k] = dt * body.spin[k];
+  Matrix<3> turn = rotation_by(angle);
+  for (std::size_t k = 0; k < 3; ++k)
+    turn[k][k] -= 1;
+  const double least = D == 2 ? body.inertia[2] : std::ranges::min(body.inertia);
+  const bool free = std::ranges::count(body.drive, Drive::free) > 0;
+  return {dt,
+          contact.penalty / (contact.stiff_step * contact.stiff_step),
+          turn,
+          free ? 1 / body.mass : 0,
+          body.rotates ? 1 / least : 0,
+          slips};
 }
 
-/// Adds a force at a point to what the surface feels.
+/// A particle at the surface.
 template <int D>
-void react(const Vector<D>& force, const Vector<D>& x, const Press<D>& press, Contact<D>& contact)
+struct Touch
 {
-  Vector<D> arm;
+  Vector<D> normal; ///< out of the body
+  Vector<D> arm;    ///< from the body's centre to the nearest point of its surface
+  Vector<D> motion; ///< of the particle in the step, relative to that point
+  double overlap;   ///< at the step's start [m]
+  double depth;     ///< at its end [m]
+};
+
+template <int D>
+Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector<D>& x, const Vector<D>& velocity,
+                  double radius)
+{
+  const RigidBody<D>& body = contact.body;
+  const auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
+  Touch<D> touch;
+  touch.normal = rotated<D>(body.rotation, normal);
   for (int i = 0; i < D; ++i)
-  {
-    arm[i] = x[i] - press.surface.by[i] - contact.reference[i];
-    contact.force[i] -= force[i];
-    contact.impulse[i] -= press.dt * force[i];
-  }
-  const Vector<3> moment = moment_of<D>(arm, force);
+    touch.arm[i] = x[i] - apart * touch.normal[i] - body.displacement[i] - body.centre[i];
+  const Vector<D> turned = rotated<D>(press.turn, touch.arm);
+  for (int i = 0; i < D; ++i)
+    touch.motion[i] = press.dt * (velocity[i] - body.velocity[i]) - turned[i];
+  touch.overlap = radius - apart;
+  touch.depth = touch.overlap - dot<D>(touch.motion, touch.normal);
+  return touch;
+}
+
+/// Adds a force on a particle to what the surface feels.
+template <int D>
+void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
+{
+  const Vector<3> moment = cross(in_space<D>(arm), in_space<D>(force));
+  for (int i = 0; i < D; ++i)
+    reaction.force[i] -= force[i];
   for (std::size_t i = 0; i < 3; ++i)
-    contact.moment[i] -= moment[i];
+    reaction.moment[i] -= moment[i];
+}
+
+/// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
+template <class G, int D = G::dim>
+std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles,
+                                        Index p, Contact<D>& contact)
+{
+  const double radius = particle_radius<G>(particles, p), mass = particles.mass[p];
+  const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity, radius);
+  Reaction<D>& reaction = contact.reaction;
+  if (touch.depth > -radius)
+    reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(touch.arm, touch.arm));
+  Vector<D> slip{};
+  if (!(touch.depth > 0))
+  {
+    for (std::size_t i = 0; press.slips && i < D; ++i)
+      (*press.slips)[i][p] = 0;
+    return std::nullopt;
+  }
+  const double area = particle_area<G>(particles, p, radius), stiffness = press.stiffness * mass;
+  reaction.area += area;
+  reaction.mass += mass;
+  reaction.normal += stiffness * touch.depth;
+  reaction.energy += 0.5 * stiffness * std::max(touch.overlap, 0.0) * std::max(touch.overlap, 0.0);
+  if (press.slips)
+  {
+    for (std::size_t i = 0; i < D; ++i)
+      slip[i] = (*press.slips)[i][p];
+    reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
+    const double longest = contact.friction * touch.depth + contact.adhesion * area / stiffness;
+    reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
+    for (std::size_t i = 0; i < D; ++i)
+      (*press.slips)[i][p] = slip[i];
+  }
+  Vector<D> force;
+  for (int i = 0; i < D; ++i)
+    force[i] = stiffness * (touch.depth * touch.normal[i] - slip[i]);
+  react<D>(force, touch.arm, reaction);
+  return force;
 }
 
 /// Forces on the particles of a run, by their moments.
@@ -211,17 +224,15 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
   bool touched = false;
   for (Index p = run.first; p < run.last; ++p)
   {
-    const Vector<D> x = at<D>(particles.position, p);
     Vector<D> xi, v;
     for (int i = 0; i < D; ++i)
-      xi[i] = x[i] - centre[i];
+      xi[i] = particles.position[i][p] - centre[i];
     for (int i = 0; i < D; ++i)
       v[i] = field.value[i] + dot<D>(field.gradient[i], xi);
-    const std::optional<Vector<D>> force = particle_force<G, D>(contact, press, v, particles, p);
+    const std::optional<Vector<D>> force = particle_force<G, D>(press, v, particles, p, contact);
     if (!force)
       continue;
     touched = true;
-    react<D>(*force, x, press, contact);
     for (int i = 0; i < D; ++i)
     {
       moments.force[i] += (*force)[i];
@@ -235,14 +246,11 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
 
 template <class G, int D>
 bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const Movers& movers,
-                        std::span<const Vector<D>> velocity, const TimeStep& step, Particles<D>& particles,
-                        Contact<D>& contact, std::span<Vector<D>> forces)
+                        std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
+                        std::span<Vector<D>> forces)
 {
-  if (contact.stiff_step == 0)
-    return false;
-  const double stiffness = contact.penalty / (contact.stiff_step * contact.stiff_step);
-  const Press<D> press{moved(contact, step), step.dt, stiffness, slip_columns(particles, contact.slip)};
-  const double travelled = apart<D>(press.surface.by, contact.found_at) + norm<D>(press.surface.velocity) * step.dt;
+  const Press<D> press = press_of(contact, dt, slip_columns(particles, contact.slip));
+  const double travelled = contact.travel + step_travel(contact, dt);
   bool touched = false;
   for (const Run& run : runs)
   {
@@ -270,11 +278,14 @@ double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
   return gap;
 }
 
-template void begin_step<2>(const Mesh<2>&, const TimeStep&, Contact<2>&);
-template void begin_step<3>(const Mesh<3>&, const TimeStep&, Contact<3>&);
+#define INSTANTIATE_STEP(D)                                                                                            \
+  template void begin_step<D>(const Mesh<D>&, const TimeStep&, Contact<D>&);                                           \
+  template void end_step<D>(const TimeStep&, const Vector<D>&, Contact<D>&);
+INSTANTIATE_STEP(2)
+INSTANTIATE_STEP(3)
 #define INSTANTIATE(G)                                                                                                 \
   template bool add_contact_forces<G, G::dim>(const Mesh<G::dim>&, const std::vector<Run>&, const Movers&,             \
-                                              std::span<const Vector<G::dim>>, const TimeStep&, Particles<G::dim>&,    \
+                                              std::span<const Vector<G::dim>>, double, Particles<G::dim>&,             \
                                               Contact<G::dim>&, std::span<Vector<G::dim>>);                            \
   template double smallest_gap<G, G::dim>(const Particles<G::dim>&, const Surface<G::dim>&);
 INSTANTIATE(PlaneStrain)

@@ -10,6 +10,8 @@ namespace mpm::contact
 {
 namespace
 {
+constexpr double endless = std::numeric_limits<double>::infinity();
+
 template <int D>
 Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
 {
@@ -47,7 +49,6 @@ std::size_t segments_of(const Polyline& line) { return line.points.size() - (lin
 
 Nearest nearest_on(const Polyline& line, const Vector<2>& x)
 {
-  constexpr double endless = std::numeric_limits<double>::infinity();
   const std::size_t n = segments_of(line);
   Nearest best;
   for (std::size_t k = 0; k < n; ++k)
@@ -122,7 +123,48 @@ Distance<2> distance_from(const Polyline& line, const Vector<2>& x)
   return {sign * length, scaled<2>(nearest.offset, sign / length)};
 }
 
+template <int D>
+double reach_of(const Plane<D>&, const Vector<D>&)
+{
+  return endless;
+}
+
+template <int D>
+double reach_of(const Ball<D>& ball, const Vector<D>& centre)
+{
+  return norm<D>(difference<D>(ball.centre, centre)); // about its own centre it stays what it is
+}
+
+template <int D>
+double reach_of(const Box<D>& box, const Vector<D>& centre)
+{
+  Vector<D> arm;
+  for (int i = 0; i < D; ++i)
+    arm[i] = std::max(std::abs(box.lower[i] - centre[i]), std::abs(box.upper[i] - centre[i]));
+  return norm<D>(arm);
+}
+
+double reach_of(const Polyline& line, const Vector<2>& centre)
+{
+  double reach = line.closed ? 0 : endless;
+  for (const Vector<2>& point : line.points)
+    reach = std::max(reach, norm<2>(difference<2>(point, centre)));
+  return reach;
+}
 } // namespace
+
+template <int D>
+double rotation_reach(const Surface<D>& surface, const Vector<D>& centre)
+{
+  const auto of = [&centre](const auto& shape)
+  {
+    if constexpr (std::is_same_v<decltype(shape), const Polyline&>)
+      return reach_of(shape, centre);
+    else
+      return reach_of<D>(shape, centre);
+  };
+  return std::visit(of, surface);
+}
 
 template <int D>
 Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
@@ -139,4 +181,6 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
 
 template Distance<2> distance<2>(const Surface<2>&, const Vector<2>&);
 template Distance<3> distance<3>(const Surface<3>&, const Vector<3>&);
+template double rotation_reach<2>(const Surface<2>&, const Vector<2>&);
+template double rotation_reach<3>(const Surface<3>&, const Vector<3>&);
 } // namespace mpm::contact

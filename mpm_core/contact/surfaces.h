@@ -52,4 +52,8 @@ struct Distance
 
 template <int D>
 Distance<D> distance(const Surface<D>& surface, const Vector<D>& x);
+
+/// How far the surface moves at most when it rotates by one radian about a point [m]; infinite where it is endless.
+template <int D>
+double rotation_reach(const Surface<D>& surface, const Vector<D>& centre);
 } // namespace mpm::contact

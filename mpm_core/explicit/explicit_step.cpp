@@ -59,7 +59,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     particles_to_nodes(mesh, exchange, model.particles, model.order.runs, field);
     sum_shared(exchange, field.nodes);
     find_start_velocity(field);
-    add_contact_forces(model, {model.time, dt}, field);
+    add_contact_forces(model, dt, field);
     // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
@@ -90,7 +90,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     sum_shared(model.exchange, field.nodes);
     find_start_velocity(field);
-    add_contact_forces(model, {model.time, dt}, field);
+    add_contact_forces(model, dt, field);
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
@@ -124,7 +124,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   double work_at_end = 0;
   for (VelocityField<G>& field : model.fields)
   {
-    add_contact_forces(model, {model.time, dt}, field);
+    add_contact_forces(model, dt, field);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
@@ -174,6 +174,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   }
   if (model.failure)
     return;
+  end_contacts(model, {model.time, dt});
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();

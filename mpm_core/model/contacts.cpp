@@ -9,8 +9,43 @@ void begin_contacts(Model<G>& model, const TimeStep& step)
     begin_step(model.mesh, step, contact);
 }
 
+namespace
+{
+/// What the soil of all ranks does to the bodies that it moves, by one sum.
+template <class G, int D = G::dim>
+void sum_reactions(Model<G>& model)
+{
+  std::vector<Contact<D>*> moved;
+  std::vector<Reaction<D>> sums;
+  for (auto& contact : model.contacts)
+    if (needs_reaction(contact.body))
+    {
+      moved.push_back(&contact);
+      sums.push_back(contact.reaction);
+    }
+  static_assert(sizeof(Reaction<D>) % sizeof(double) == 0);
+  if (moved.empty())
+    return;
+  const auto count = static_cast<int>(sums.size() * (sizeof(Reaction<D>) / sizeof(double)));
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), count, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  for (std::size_t k = 0; k < moved.size(); ++k)
+    moved[k]->of_ranks = sums[k];
+}
+} // namespace
+
 template <class G>
-void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>& field)
+void end_contacts(Model<G>& model, const TimeStep& step)
+{
+  if (model.contacts.empty())
+    return;
+  sum_reactions(model);
+  const auto gravity = gravity_at(model, step.start);
+  for (auto& contact : model.contacts)
+    end_step<G::dim>(step, gravity, contact);
+}
+
+template <class G>
+void add_contact_forces(Model<G>& model, double dt, VelocityField<G>& field)
 {
   if (model.contacts.empty())
     return;
@@ -19,7 +54,7 @@ void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>&
   forces.resize(field.nodes.size());
   bool touched = model.exchange.size > 1;
   for (auto& contact : model.contacts)
-    touched |= add_contact_forces<G, G::dim>(model.mesh, model.order.runs, movers, field.start_velocity, step,
+    touched |= add_contact_forces<G, G::dim>(model.mesh, model.order.runs, movers, field.start_velocity, dt,
                                              model.particles, contact, forces);
   if (!touched)
     return;
@@ -34,7 +69,8 @@ void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>&
 
 #define INSTANTIATE(G)                                                                                                 \
   template void begin_contacts(Model<G>&, const TimeStep&);                                                            \
-  template void add_contact_forces(Model<G>&, const TimeStep&, VelocityField<G>&);
+  template void end_contacts(Model<G>&, const TimeStep&);                                                              \
+  template void add_contact_forces(Model<G>&, double, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -10,9 +10,14 @@ namespace mpm::model
 template <class G>
 void begin_contacts(Model<G>& model, const TimeStep& step);
 
+/// Ends a step: rigid bodies move.
+/// @note Collective where the soil moves any of them
+template <class G>
+void end_contacts(Model<G>& model, const TimeStep& step);
+
 /// Adds the forces of all contacts to the tractions at the nodes of a field, over all ranks.
 /// @pre sums and start velocities of the field's nodes are there
 /// @note Collective where there are contacts
 template <class G>
-void add_contact_forces(Model<G>& model, const TimeStep& step, VelocityField<G>& field);
+void add_contact_forces(Model<G>& model, double dt, VelocityField<G>& field);
 } // namespace mpm::model

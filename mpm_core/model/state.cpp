@@ -24,6 +24,42 @@ std::string numbered(const std::string& name, std::size_t field)
   return field == 0 ? name : name + "_" + std::to_string(field);
 }
 
+/// Likewise for the entries of a vector.
+template <class V, class F>
+void for_each_entry(const std::string& name, Kind kind, V& vector, F& f)
+{
+  for (std::size_t a = 0; a < vector.size(); ++a)
+    f(name + "_" + std::to_string(a), kind, vector[a]);
+}
+
+/// The numbers of a rigid surface that no script gives.
+template <class C, class F>
+void for_each_number(const std::string& name, C& contact, F& f)
+{
+  f(name + "stiff_step", Kind::common, contact.stiff_step);
+  for_each_entry(name + "impulse", Kind::sum, contact.impulse, f);
+  const auto add_reaction = [&f](const std::string& prefix, Kind kind, auto& reaction)
+  {
+    for_each_entry(prefix + "force", kind, reaction.force, f);
+    for_each_entry(prefix + "moment", kind, reaction.moment, f);
+    f(prefix + "normal", kind, reaction.normal);
+    f(prefix + "area", kind, reaction.area);
+    f(prefix + "sticking", kind, reaction.sticking);
+    f(prefix + "mass", kind, reaction.mass);
+    f(prefix + "load", kind, reaction.load);
+    f(prefix + "energy", kind, reaction.energy);
+  };
+  add_reaction(name, Kind::sum, contact.reaction);
+  add_reaction(name + "ranks_", Kind::common, contact.of_ranks);
+  for_each_entry(name + "displacement", Kind::common, contact.body.displacement, f);
+  for_each_entry(name + "velocity", Kind::common, contact.body.velocity, f);
+  for (std::size_t a = 0; a < 3; ++a)
+    for_each_entry(name + "rotation_" + std::to_string(a), Kind::common, contact.body.rotation[a], f);
+  for_each_entry(name + "angle", Kind::common, contact.body.angle, f);
+  for_each_entry(name + "spin", Kind::common, contact.body.spin, f);
+  for_each_entry(name + "angular_momentum", Kind::common, contact.body.angular_momentum, f);
+}
+
 /// The one list of numbers: calls f(name, kind, number).
 template <class M, class F>
 void for_each_number(M& model, F&& f)
@@ -54,18 +90,7 @@ void for_each_number(M& model, F&& f)
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
-  {
-    auto& contact = model.contacts[k];
-    const std::string name = "contact_" + std::to_string(k);
-    f(name + "_stiff_step", Kind::common, contact.stiff_step);
-    for (std::size_t a = 0; a < contact.force.size(); ++a)
-    {
-      f(name + "_force_" + std::to_string(a), Kind::sum, contact.force[a]);
-      f(name + "_impulse_" + std::to_string(a), Kind::sum, contact.impulse[a]);
-    }
-    for (std::size_t a = 0; a < contact.moment.size(); ++a)
-      f(name + "_moment_" + std::to_string(a), Kind::sum, contact.moment[a]);
-  }
+    for_each_number("contact_" + std::to_string(k) + "_", model.contacts[k], f);
   f("sorts", Kind::own, model.totals.sorts);
   f("order_changes", Kind::own, model.order.out_of_order);
   f("order_cost", Kind::own, model.order.cost);

@@ -31,21 +31,68 @@ void bind_surfaces(py::module_& m, const std::string& suffix)
           }));
 }
 
-/// Over all ranks: the force and the impulse [N, N s], the moment about z in two dimensions or about the axes [N m],
-/// and the displacement [m].
+template <int N>
+using GivenHistory = std::tuple<std::vector<double>, std::vector<Vector<N>>>; // times, values
+
+template <int N>
+History<N> history_of(const GivenHistory<N>& given)
+{
+  return {std::get<0>(given), std::get<1>(given)};
+}
+
+template <int D>
+void bind_body(py::module_& m, const std::string& suffix)
+{
+  py::class_<RigidBody<D>>(m, ("RigidBody" + suffix).c_str())
+      .def(py::init(
+          [](const Vector<D>& centre, const GivenHistory<D>& velocity, const GivenHistory<3>& spin,
+             const std::array<int, D>& drive, bool rotates, double mass, const Vector<3>& inertia,
+             const GivenHistory<D>& force, double fastest, const Vector<D>& velocity_now, const Vector<3>& spin_now)
+          {
+            RigidBody<D> body{};
+            body.centre = centre;
+            body.prescribed_velocity = history_of<D>(velocity);
+            body.prescribed_spin = history_of<3>(spin);
+            for (std::size_t i = 0; i < D; ++i)
+              body.drive[i] = static_cast<Drive>(drive[i]);
+            body.rotates = rotates;
+            body.mass = mass;
+            body.inertia = inertia;
+            body.force = history_of<D>(force);
+            body.fastest = fastest;
+            body.velocity = velocity_now;
+            set_spin(spin_now, body);
+            return body;
+          }));
+}
+
+/// What the soil of all ranks does to a surface, and how it moves.
 template <class G, int D = G::dim>
-py::tuple contact_state(const Model<G>& model, std::size_t number)
+py::dict contact_state(const Model<G>& model, std::size_t number)
 {
   const Contact<D>& contact = model.contacts.at(number);
-  std::array<double, 2 * D + 3> sums;
-  std::copy_n(contact.force.begin(), D, sums.begin());
-  std::copy_n(contact.impulse.begin(), D, sums.begin() + D);
-  std::copy_n(contact.moment.begin(), 3, sums.begin() + 2 * D);
-  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
-  const auto part = [&sums](std::size_t first, std::size_t last)
-  { return std::vector<double>(sums.data() + first, sums.data() + last); };
-  return py::make_tuple(part(0, D), part(D, 2 * D), part(D == 2 ? 2 * D + 2 : 2 * D, 2 * D + 3),
-                        displacement<D>(contact.motion, contact.start, model.time));
+  struct
+  {
+    Reaction<D> reaction;
+    Vector<D> impulse;
+  } sums{contact.reaction, contact.impulse};
+  MPI_Allreduce(MPI_IN_PLACE, &sums, sizeof(sums) / sizeof(double), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  const RigidBody<D>& body = contact.body;
+  py::dict state;
+  state["force"] = sums.reaction.force;
+  state["moment"] = sums.reaction.moment;
+  state["impulse"] = sums.impulse;
+  state["normal"] = sums.reaction.normal;
+  state["area"] = sums.reaction.area;
+  state["sticking"] = sums.reaction.sticking;
+  state["energy"] = sums.reaction.energy;
+  state["displacement"] = body.displacement;
+  state["velocity"] = body.velocity;
+  state["rotation"] = body.rotation;
+  state["angle"] = body.angle;
+  state["spin"] = body.spin;
+  state["kinetic_energy"] = kinetic_energy(body);
+  return state;
 }
 
 template <class G, int D = G::dim>
@@ -54,17 +101,15 @@ void bind_contacts_of(py::module_& m)
   m.def("smallest_gap",
         [](const Model<G>& model, const Surface<D>& surface) { return smallest_gap<G>(model.particles, surface); });
   m.def("add_contact",
-        [](Model<G>& model, const Surface<D>& surface, double friction, double penalty,
-           const std::vector<double>& times, const std::vector<Vector<D>>& velocities, double start,
-           const Vector<D>& reference, const std::string& slip)
+        [](Model<G>& model, const Surface<D>& surface, double friction, double adhesion, double penalty,
+           const RigidBody<D>& body, const std::string& slip)
         {
           Contact<D> contact{};
           contact.surface = surface;
           contact.friction = friction;
+          contact.adhesion = adhesion;
           contact.penalty = penalty;
-          contact.motion = {times, velocities};
-          contact.start = start;
-          contact.reference = reference;
+          contact.body = body;
           contact.slip = slip;
           model.contacts.push_back(std::move(contact));
         });
@@ -77,6 +122,8 @@ void bind_contacts(py::module_& m)
 {
   bind_surfaces<2>(m, "2");
   bind_surfaces<3>(m, "3");
+  bind_body<2>(m, "2");
+  bind_body<3>(m, "3");
   py::class_<Polyline>(m, "Polyline2")
       .def(py::init(
           [](const std::vector<Vector<2>>& points, bool closed) {

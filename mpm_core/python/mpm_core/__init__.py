@@ -44,6 +44,7 @@ from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
 from .surfaces import Box, Disc, Plane, Polyline, Sphere
 
@@ -58,6 +59,7 @@ __all__ = [
     "DruckerPrager",
     "ElementTest",
     "EnergyWarning",
+    "FreeBody",
     "Geometry",
     "GhostPenalty",
     "Hencky",
@@ -82,6 +84,7 @@ __all__ = [
     "Reports",
     "RigidContact",
     "RunError",
+    "Servo",
     "Softening",
     "SofteningMohrCoulomb",
     "Space",

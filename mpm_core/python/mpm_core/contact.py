@@ -1,10 +1,9 @@
-"""Rigid surfaces that touch the particles of a model, with Coulomb friction; explicit scheme."""
+"""Rigid surfaces that touch the particles of a model, with friction and adhesion; explicit scheme."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -15,6 +14,7 @@ from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
 from .mesh import floats
+from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
 from .surfaces import KINDS, Surface
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class RigidContact:
-    """What a rigid surface feels and where it is, as `Model.add_contact` returns it; all is collective.
+    """What a rigid surface feels, where it is and how it moves, as `Model.add_contact` returns it; all is collective.
 
     It is a probe: ``mpm_core.probes.ProbeFile("wall.csv", wall)`` records its histories.
     """
@@ -31,55 +31,99 @@ class RigidContact:
         self.model = model
         self._number = number
 
-    def _state(self, entry: int) -> NDArray[np.float64]:
-        return np.array(_core.contact_state(self.model._core, self._number)[entry])
+    def _state(self) -> dict[str, Any]:
+        return _core.contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
+
+    def _vector(self, name: str) -> NDArray[np.float64]:
+        return np.array(self._state()[name])
+
+    def _about_axes(self, name: str) -> NDArray[np.float64]:
+        return self._vector(name)[2 if self.model.mesh.dim == 2 else 0 :]
 
     @property
     def force(self) -> NDArray[np.float64]:
         """Force of the soil on the surface in the last step [N], shape (D,); per metre or per radian in two dimensions."""
-        return self._state(0)
+        return self._vector("force")
 
     @property
     def impulse(self) -> NDArray[np.float64]:
         """Integral of ``force`` over time since the surface was added [N s], shape (D,); its difference between two times over
         their distance is the mean force, without the noise of single steps."""
-        return self._state(1)
+        return self._vector("impulse")
 
     @property
     def moment(self) -> NDArray[np.float64]:
         """Moment of these forces in the last step [N m], shape (1,) in two dimensions, counterclockwise, and (3,) in three; about
-        the surface's ``point``, ``centre``, first point, or the centre of the box, as it has moved."""
-        return self._state(2)
+        the surface's ``centre``, as it has moved."""
+        return self._about_axes("moment")
+
+    @property
+    def area(self) -> float:
+        """Area of the soil in contact in the last step [m2]; per metre or per radian in two dimensions."""
+        return float(self._state()["area"])
+
+    @property
+    def pressure(self) -> float:
+        """Mean normal pressure on that area [Pa]; 0 without contact."""
+        return _ratio(self._state(), "normal")
+
+    @property
+    def sticking_fraction(self) -> float:
+        """Fraction of that area that does not slide; 0 without contact, and on a smooth surface."""
+        return _ratio(self._state(), "sticking")
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """Displacement of the surface since it was added [m], shape (D,)."""
-        return self._state(3)
+        """Displacement of the centre since the surface was added [m], shape (D,)."""
+        return self._vector("displacement")
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Velocity of the centre in the last step [m/s], shape (D,)."""
+        return self._vector("velocity")
+
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """Integral of ``spin`` since the surface was added [rad], shape (1,) or (3,): the angle of a rotation about a fixed axis."""
+        return self._about_axes("angle")
+
+    @property
+    def spin(self) -> NDArray[np.float64]:
+        """Angular velocity in the last step [rad/s], shape (1,) in two dimensions, counterclockwise, and (3,) in three."""
+        return self._about_axes("spin")
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Matrix that rotates directions in the surface at its start to where they are now, shape (D, D)."""
+        dim = self.model.mesh.dim
+        return self._vector("rotation")[:dim, :dim]
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Of motion along free axes and of free rotation [J]; 0 for other bodies."""
+        return float(self._state()["kinetic_energy"])
+
+    @property
+    def stored_energy(self) -> float:
+        """Elastic energy of the penalty springs at the start of the last step [J]."""
+        return float(self._state()["energy"])
 
     def values(self) -> dict[str, float]:
-        """Numbers by name of column, as a probe gives them: time, force, impulse, moment, displacement."""
-        axes = "xyz"[: self.model.mesh.dim]
-        state = _core.contact_state(self.model._core, self._number)
-        columns = [("force", "N", axes), ("impulse", "N.s", axes), ("moment", "N.m", "xyz"[3 - len(state[2]) :])]
-        columns.append(("displacement", "m", axes))
-        names = [f"{name}_{axis}_{unit}" for name, unit, along in columns for axis in along]
-        return {"time_s": self.model.time, **dict(zip(names, np.concatenate(state).tolist(), strict=True))}
+        """Numbers by name of column, as a probe gives them: time, force, impulse, moment, displacement, velocity, angle, spin, area,
+        pressure and sticking fraction."""
+        axes, state = "xyz"[: self.model.mesh.dim], self._state()
+        first = 2 if len(axes) == 2 else 0
+        columns = [("force", "N"), ("impulse", "N.s"), ("displacement", "m"), ("velocity", "m/s")]
+        turns = [("moment", "N.m"), ("angle", "rad"), ("spin", "rad/s")]
+        values = {"time_s": self.model.time}
+        values |= {f"{name}_{axes[k]}_{unit}": state[name][k] for name, unit in columns for k in range(len(axes))}
+        values |= {f"{name}_{'xyz'[k]}_{unit}": state[name][k] for name, unit in turns for k in range(first, 3)}
+        fractions = {"pressure_Pa": _ratio(state, "normal"), "sticking_fraction": _ratio(state, "sticking")}
+        return values | {"area_m2": state["area"], **fractions}
 
 
-Velocity: TypeAlias = ArrayLike | tuple[Sequence[float], ArrayLike] | None
-
-
-def _motion(velocity: Velocity, dim: int) -> tuple[list[float], list[list[float]]]:
-    """Times and velocities of a translation."""
-    if velocity is None:
-        return [0.0], [[0.0] * dim]
-    if isinstance(velocity, tuple) and len(velocity) == 2 and np.ndim(velocity[0]) == 1:
-        times = floats("times of the velocity", velocity[0], (None,))
-        if len(times) == 0 or (np.diff(times) <= 0).any():
-            raise InputError(f"times of the velocity are {times.tolist()} s, expected rising ones")
-        return times.tolist(), floats("velocities", velocity[1], (len(times), dim)).tolist()
-    constant: Any = velocity
-    return [0.0], [floats("velocity", constant, (dim,)).tolist()]
+def _ratio(state: dict[str, Any], name: str) -> float:
+    return float(state[name] / state["area"]) if state["area"] > 0 else 0.0
 
 
 def smallest_gap(model: Model, surface: Surface) -> float:
@@ -97,20 +141,24 @@ def _checked(surface: Surface, dim: int) -> Any:
     return surface._checked(dim)
 
 
-def add_contact(model: Model, surface: Surface, friction: float, velocity: Velocity, penalty: float) -> RigidContact:
+def add_contact(
+    model: Model, surface: Surface, friction: float, adhesion: float, penalty: float, centre: ArrayLike | None,
+    velocity: Velocity, spin: Velocity, body: FreeBody | Servo | None,
+) -> RigidContact:  # fmt: skip
     """See `Model.add_contact`."""
 
     def entry() -> dict[str, Any]:
         dim = model.mesh.dim
-        _checked(surface, dim)
+        about = _checked(surface, dim)[1] if centre is None else floats("centre", centre, (dim,))
         positive("friction", friction, "(a coefficient)", zero=True)
+        positive("adhesion", adhesion, "Pa", zero=True)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
-        times, velocities = _motion(velocity, dim)
         shape = {field.name: _plain(getattr(surface, field.name)) for field in fields(surface)}
         return {
-            "surface": {"kind": type(surface).__name__, **shape}, "friction": float(friction), "penalty": float(penalty),
-            "times": times, "velocities": velocities, "start": model.time,
+            "surface": {"kind": type(surface).__name__, **shape}, "friction": float(friction), "adhesion": float(adhesion),
+            "penalty": float(penalty),
+            "body": describe(surface, about, velocity, spin, body, geometry=model.geometry, time=model.time),
         }  # fmt: skip
 
     new = collectively(model.comm, entry)
@@ -135,14 +183,14 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     dim, known = model.mesh.dim, len(model._contacts)
     for number, entry in list(enumerate(entries))[known:]:
         shape = dict(entry["surface"])
-        surface, reference = KINDS[shape.pop("kind")](**shape)._checked(dim)
-        slip = f"contact_slip_{number}" if entry["friction"] > 0 else ""
+        surface, _ = KINDS[shape.pop("kind")](**shape)._checked(dim)
+        slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
         if slip and slip not in {field["name"] for field in model.particles.schedule()}:
             model.add_field(slip, unit="m", meaning=f"Elastic slip on rigid surface {number}", components=dim)
+        body = rigid_body(entry["body"])
         _core.add_contact(
-            model._core, surface, entry["friction"], entry["penalty"], entry["times"], entry["velocities"], entry["start"],
-            reference.tolist(), slip,
-        )  # fmt: skip
+            model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip
+        )
     model._contacts = entries
 
 

@@ -80,12 +80,35 @@ def _is_field(value: Any) -> bool:
 def _is_contact(value: Any) -> bool:
     return (
         isinstance(value, dict)
-        and set(value) == {"surface", "friction", "penalty", "times", "velocities", "start"}
+        and set(value) == {"surface", "friction", "adhesion", "penalty", "body"}
         and isinstance(value["surface"], dict)
         and value["surface"].get("kind") in KINDS
-        and all(_is_number(value[key]) for key in ("friction", "penalty", "start"))
-        and _are(_is_number, value["times"])
-        and _are(lambda row: _are(_is_number, row), value["velocities"])
+        and all(_is_number(value[key]) for key in ("friction", "adhesion", "penalty"))
+        and _is_body(value["body"])
+    )
+
+
+_BODY_NUMBERS, _BODY_HISTORIES = ("start", "mass", "speed"), ("velocity", "spin", "force")
+
+
+def _is_body(value: Any) -> bool:
+    return (
+        isinstance(value, dict)
+        and set(value) == {*_BODY_NUMBERS, *_BODY_HISTORIES, "centre", "inertia", "drive", "rotates"}
+        and all(_is_number(value[key]) for key in _BODY_NUMBERS)
+        and all(_is_history(value[key]) for key in _BODY_HISTORIES)
+        and all(_are(_is_number, value[key]) for key in ("centre", "inertia"))
+        and _are(lambda one: one in (0, 1, 2), value["drive"])
+        and isinstance(value["rotates"], bool)
+    )
+
+
+def _is_history(value: Any) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and _are(_is_number, value[0])
+        and _are(lambda row: _are(_is_number, row), value[1])
     )
 
 

@@ -11,7 +11,7 @@ from ._core import Integration, StressUpdate
 from .body import Body
 from .checks import positive
 from .collective import collectively
-from .contact import RigidContact, Velocity, add_contact, refuse_contacts, smallest_gap
+from .contact import RigidContact, add_contact, refuse_contacts, smallest_gap
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
@@ -29,6 +29,7 @@ from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
 
@@ -96,34 +97,51 @@ class Model(Body):
     # --- rigid surfaces ------------------------------------------------------------------------------------------
 
     def add_contact(
-        self, surface: Surface, *, friction: float = 0.0, velocity: Velocity = None, penalty: float = 0.2
+        self,
+        surface: Surface,
+        *,
+        friction: float = 0.0,
+        adhesion: float = 0.0,
+        velocity: Velocity = None,
+        spin: Velocity = None,
+        body: FreeBody | Servo | None = None,
+        centre: ArrayLike | None = None,
+        penalty: float = 0.2,
     ) -> RigidContact:
         """Let the particles touch a rigid surface, which does not depend on the mesh; explicit scheme only.
 
-        The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without adhesion, and resists
-        sliding with Coulomb friction (docs/contact.md).
+        The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without tension, and resists
+        sliding with Coulomb friction and adhesion (docs/contact.md). It rests, moves as prescribed, or as a rigid body under
+        the forces on it.
 
         Args:
             surface: a `Plane`, `Box`, `Disc`, `Sphere` or `Polyline`, where it is now; outside of all particles.
             friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
-            velocity: of the surface [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
-                before and after; at rest by default.
+            adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
+                there is none where the soil does not touch the surface, and no tension.
+            velocity: of the centre [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
+                before and after; at rest by default. Along axes in which a body is free, its initial velocity.
+            spin: angular velocity about the centre [rad/s], counterclockwise in two dimensions and shape (3,) in three; or
+                (times [s], spins (n,) or (n, 3)). Of a body that rotates freely, its initial spin.
+            body: a `FreeBody`, which forces move, or a `Servo`, which keeps a load; by default all motion is prescribed.
+            centre: centre of mass of a free body; the point about which the surface rotates and moments count [m], shape
+                (D,). By default the centre of a Disc, Sphere or Box, and the first point of the other surfaces.
             penalty: stiffness beta in (0, 1], over what a mass that oscillates as fast as the time step allows would need; a
                 larger one lets particles penetrate less.
 
         Returns:
-            The surface's force, moment, impulse and displacement from here on.
+            The surface's motion and what it feels, from here on.
 
         Raises:
             InputError: an argument out of its range, a surface of another dimension, or one that overlaps the soil, with the
-                depth; a model without particles.
+                depth; a model without particles; a free body without inertia, or one that rotates in axial symmetry.
 
         Example:
             >>> ground = model.add_contact(mpm.Plane((0, 0), normal=(0, 1)), friction=0.3)
             >>> *_, report = model.explicit(until=1.0)
             >>> ground.force
         """
-        return add_contact(self, surface, friction, velocity, penalty)
+        return add_contact(self, surface, friction, adhesion, penalty, centre, velocity, spin, body)
 
     def gap(self, surface: Surface) -> float:
         """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap."""

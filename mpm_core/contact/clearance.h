@@ -1,0 +1,25 @@
+#pragma once
+/// @file
+/// Which cells are too far from a rigid surface for their particles to touch it.
+
+#include "contact/contact.h"
+
+namespace mpm::contact
+{
+/// Finds lower bounds of the gaps in all cells of this rank, for the place where the surface is now.
+template <int D>
+void find_clearance(const Mesh<D>& mesh, Contact<D>& contact);
+
+/// A point as it lies to the surface at its start.
+template <int D>
+inline Vector<D> as_at_start(const RigidBody<D>& body, const Vector<D>& x)
+{
+  Vector<D> arm;
+  for (int i = 0; i < D; ++i)
+    arm[i] = x[i] - body.displacement[i] - body.centre[i];
+  arm = rotated_back<D>(body.rotation, arm);
+  for (int i = 0; i < D; ++i)
+    arm[i] += body.centre[i];
+  return arm;
+}
+} // namespace mpm::contact
