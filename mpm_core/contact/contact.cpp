@@ -183,23 +183,25 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& 
   Reaction<D>& reaction = contact.reaction;
   if (touch.depth > -radius)
     reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(touch.arm, touch.arm));
+  const double stiffness = press.stiffness * mass;
   Vector<D> slip{};
+  for (std::size_t i = 0; press.slips && i < D; ++i)
+    slip[i] = (*press.slips)[i][p];
+  if (touch.overlap > 0)
+    reaction.energy += 0.5 * stiffness * (touch.overlap * touch.overlap);
+  reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
   if (!(touch.depth > 0))
   {
     for (std::size_t i = 0; press.slips && i < D; ++i)
       (*press.slips)[i][p] = 0;
     return std::nullopt;
   }
-  const double area = particle_area<G>(particles, p, radius), stiffness = press.stiffness * mass;
+  const double area = particle_area<G>(particles, p, radius);
   reaction.area += area;
   reaction.mass += mass;
   reaction.normal += stiffness * touch.depth;
-  reaction.energy += 0.5 * stiffness * std::max(touch.overlap, 0.0) * std::max(touch.overlap, 0.0);
   if (press.slips)
   {
-    for (std::size_t i = 0; i < D; ++i)
-      slip[i] = (*press.slips)[i][p];
-    reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
     const double longest = contact.friction * touch.depth + contact.adhesion * area / stiffness;
     reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
     for (std::size_t i = 0; i < D; ++i)

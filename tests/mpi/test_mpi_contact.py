@@ -34,6 +34,44 @@ def test_motion_and_reactions_are_the_same_on_any_partition(comm, owners_of):
     assert runs[0][2].impulse[0] > 0  # the disc was hit
 
 
+def bodies_on_a_block(comm, owners_of=bands):
+    """A spinning disc falls on a sliding block, and a servo presses a plate on it."""
+    mesh = spread_box((24, 10), (6.0, 2.5), comm, owners_of, diagonals="alternating")
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+    grid = 0.0625 * (np.indices((32, 8)).reshape(2, -1).T + 0.5) + (1.003, 1.007)
+    model.seed_points(grid, np.full(len(grid), 0.0625**2), density=1000.0)
+    model.set_gravity((4.0, -9.0))
+    model.add_contact(mpm.Plane((0.0, 1.0), (0, 1)), friction=0.2)
+    disc = model.add_contact(
+        mpm.Disc((1.6, 1.84), 0.3), friction=0.4, adhesion=50.0, spin=5.0, body=mpm.FreeBody(mass=40.0)
+    )
+    servo = mpm.Servo(force=(0.0, -300.0), speed=1.0)
+    plate = model.add_contact(mpm.Box((2.3, 1.52), (2.7, 1.7)), friction=0.3, velocity=(1.0, 0.0), body=servo)
+    return model, disc, plate
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_bodies_move_alike_on_any_partition(comm, owners_of, shared_path):
+    (model, *bodies), (alone, *references) = (
+        bodies_on_a_block(comm, owners_of),
+        bodies_on_a_block(MPI.COMM_SELF),
+    )
+    for each in (model, alone):
+        list(each.explicit(0.2, dt=1e-3))
+    model.save(shared_path / "bodies.h5")
+    other = bodies_on_a_block(MPI.COMM_SELF)[0]
+    other.restore(shared_path / "bodies.h5")
+    for each in (model, alone, other):
+        list(each.explicit(0.4, dt=1e-3))
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS))
+    for one, again, reference in zip(bodies, other.contacts[1:], references, strict=True):
+        assert reference.impulse[1] > 0  # it has touched
+        for name in ("force", "impulse", "moment", "displacement", "velocity", "angle", "spin", "rotation"):
+            value = getattr(reference, name)
+            for found in (getattr(one, name), getattr(again, name)):
+                assert found == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max()), name
+
+
 def test_an_overlap_on_one_rank_is_refused_on_all(comm):
     model, *_ = sliding_block(comm)
     with pytest.raises(mpm.InputError, match="overlaps the soil by"):

@@ -188,9 +188,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
         if slip and slip not in {field["name"] for field in model.particles.schedule()}:
             model.add_field(slip, unit="m", meaning=f"Elastic slip on rigid surface {number}", components=dim)
         body = rigid_body(entry["body"])
-        _core.add_contact(
-            model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip
-        )
+        _core.add_contact(model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip)
     model._contacts = entries
 
 

@@ -157,7 +157,9 @@ def _servo(body: Servo, dim: int) -> dict[str, Any]:
     if not any(axes):
         raise InputError("force of the Servo is zero, expected a load along some axis, or axes that are controlled")
     if (loaded & ~np.array(axes)).any():
-        raise InputError(f"force of the Servo is {force[1]} N, expected no component along axes that are not controlled")
+        raise InputError(
+            f"force of the Servo is {force[1]} N, expected no component along axes that are not controlled"
+        )
     return {"drive": [2 * int(axis) for axis in axes], "force": force, "speed": positive("speed", body.speed, "m/s")}
 
 
