@@ -1,12 +1,10 @@
 #include "contact/contact.h"
 
 #include "contact/clearance.h"
-#include "transfer/affine_field.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 namespace mpm::contact
 {
@@ -20,60 +18,6 @@ double particle_radius(const Particles<G::dim>& particles, Index p)
   else
     return 0.5 * std::sqrt(particles.volume[p]);
 }
-
-namespace
-{
-/// Area of surface that a particle covers [m2]; per metre or per radian in two dimensions.
-template <class G>
-double particle_area(const Particles<G::dim>& particles, Index p, double radius)
-{
-  if constexpr (G::dim == 3)
-    return 4 * radius * radius;
-  else
-    return 2 * radius * (G::has_hoop ? particles.position[0][p] : 1);
-}
-
-/// The part of a vector along a surface.
-template <int D>
-Vector<D> tangential(Vector<D> v, const Vector<D>& normal)
-{
-  const double along = dot<D>(v, normal);
-  for (int i = 0; i < D; ++i)
-    v[i] -= along * normal[i];
-  return v;
-}
-
-/// Friction: adds a displacement along the surface to the elastic slip and returns it to the cone.
-/// @param longest  slip at which the spring's force is the shear strength
-/// @returns whether the particle sticks
-template <int D>
-bool update_slip(const Vector<D>& normal, const Vector<D>& increment, double longest, Vector<D>& slip)
-{
-  for (int i = 0; i < D; ++i)
-    slip[i] += increment[i];
-  slip = tangential<D>(slip, normal);
-  const double length = norm<D>(slip), scale = length > longest ? longest / length : 1;
-  for (double& component : slip)
-    component *= scale;
-  return scale == 1;
-}
-
-template <int D>
-std::vector<Column>* slip_columns(Particles<D>& particles, const std::string& name)
-{
-  for (AddedField& field : particles.added)
-    if (!name.empty() && field.name == name)
-      return &field.columns;
-  return nullptr;
-}
-
-/// Path of the surface's fastest point in a step [m].
-template <int D>
-double step_travel(const Contact<D>& contact, double dt)
-{
-  return dt * (norm<D>(contact.body.velocity) + contact.reach * norm<3>(contact.body.spin));
-}
-} // namespace
 
 template <int D>
 void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact)
@@ -99,178 +43,6 @@ void end_step(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contac
   contact.travel += step_travel(contact, step.dt);
 }
 
-namespace
-{
-/// What all particles need to know in a step.
-template <int D>
-struct Press
-{
-  double dt;
-  double stiffness; ///< per mass [1/s2]
-  Matrix<3> turn;   ///< rotation of the body in the step, less the identity
-  double per_mass;  ///< translation of a free body under a force: 1/M [1/kg]
-  double per_inertia;
-  std::vector<Column>* slips;
-};
-
-template <int D>
-Press<D> press_of(const Contact<D>& contact, double dt, std::vector<Column>* slips)
-{
-  const RigidBody<D>& body = contact.body;
-  Vector<3> angle;
-  for (std::size_t k = 0; k < 3; ++k)
-    angle[k] = dt * body.spin[k];
-  Matrix<3> turn = rotation_by(angle);
-  for (std::size_t k = 0; k < 3; ++k)
-    turn[k][k] -= 1;
-  const double least = D == 2 ? body.inertia[2] : std::ranges::min(body.inertia);
-  const bool free = std::ranges::count(body.drive, Drive::free) > 0;
-  return {dt,
-          contact.penalty / (contact.stiff_step * contact.stiff_step),
-          turn,
-          free ? 1 / body.mass : 0,
-          body.rotates ? 1 / least : 0,
-          slips};
-}
-
-/// A particle at the surface.
-template <int D>
-struct Touch
-{
-  Vector<D> normal; ///< out of the body
-  Vector<D> arm;    ///< from the body's centre to the nearest point of its surface
-  Vector<D> motion; ///< of the particle in the step, relative to that point
-  double overlap;   ///< at the step's start [m]
-  double depth;     ///< at its end [m]
-};
-
-template <int D>
-Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector<D>& x, const Vector<D>& velocity,
-                  double radius)
-{
-  const RigidBody<D>& body = contact.body;
-  const auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
-  Touch<D> touch;
-  touch.normal = rotated<D>(body.rotation, normal);
-  for (int i = 0; i < D; ++i)
-    touch.arm[i] = x[i] - apart * touch.normal[i] - body.displacement[i] - body.centre[i];
-  const Vector<D> turned = rotated<D>(press.turn, touch.arm);
-  for (int i = 0; i < D; ++i)
-    touch.motion[i] = press.dt * (velocity[i] - body.velocity[i]) - turned[i];
-  touch.overlap = radius - apart;
-  touch.depth = touch.overlap - dot<D>(touch.motion, touch.normal);
-  return touch;
-}
-
-/// Adds a force on a particle to what the surface feels.
-template <int D>
-void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
-{
-  const Vector<3> moment = cross(in_space<D>(arm), in_space<D>(force));
-  for (int i = 0; i < D; ++i)
-    reaction.force[i] -= force[i];
-  for (std::size_t i = 0; i < 3; ++i)
-    reaction.moment[i] -= moment[i];
-}
-
-/// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
-template <class G, int D = G::dim>
-std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles,
-                                        Index p, Contact<D>& contact)
-{
-  const double radius = particle_radius<G>(particles, p), mass = particles.mass[p];
-  const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity, radius);
-  Reaction<D>& reaction = contact.reaction;
-  if (touch.depth > -radius)
-    reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(touch.arm, touch.arm));
-  const double stiffness = press.stiffness * mass;
-  Vector<D> slip{};
-  for (std::size_t i = 0; press.slips && i < D; ++i)
-    slip[i] = (*press.slips)[i][p];
-  if (touch.overlap > 0)
-    reaction.energy += 0.5 * stiffness * (touch.overlap * touch.overlap);
-  reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
-  if (!(touch.depth > 0))
-  {
-    for (std::size_t i = 0; press.slips && i < D; ++i)
-      (*press.slips)[i][p] = 0;
-    return std::nullopt;
-  }
-  const double area = particle_area<G>(particles, p, radius);
-  reaction.area += area;
-  reaction.mass += mass;
-  reaction.normal += stiffness * touch.depth;
-  if (press.slips)
-  {
-    const double longest = contact.friction * touch.depth + contact.adhesion * area / stiffness;
-    reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
-    for (std::size_t i = 0; i < D; ++i)
-      (*press.slips)[i][p] = slip[i];
-  }
-  Vector<D> force;
-  for (int i = 0; i < D; ++i)
-    force[i] = stiffness * (touch.depth * touch.normal[i] - slip[i]);
-  react<D>(force, touch.arm, reaction);
-  return force;
-}
-
-/// Forces on the particles of a run, by their moments.
-/// @returns whether any was in contact
-template <class G, int D = G::dim>
-bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, const Press<D>& press,
-               const Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
-{
-  const Vector<D>& centre = mesh.shapes[run.cell].centre;
-  const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
-  const AffineField<D> field = affine_field<D>(mesh, run.cell, nodal);
-  bool touched = false;
-  for (Index p = run.first; p < run.last; ++p)
-  {
-    Vector<D> xi, v;
-    for (int i = 0; i < D; ++i)
-      xi[i] = particles.position[i][p] - centre[i];
-    for (int i = 0; i < D; ++i)
-      v[i] = field.value[i] + dot<D>(field.gradient[i], xi);
-    const std::optional<Vector<D>> force = particle_force<G, D>(press, v, particles, p, contact);
-    if (!force)
-      continue;
-    touched = true;
-    for (int i = 0; i < D; ++i)
-    {
-      moments.force[i] += (*force)[i];
-      for (int j = 0; j < D; ++j)
-        moments.force_xi[i][j] += (*force)[i] * xi[j];
-    }
-  }
-  return touched;
-}
-} // namespace
-
-template <class G, int D>
-bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const Movers& movers,
-                        std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
-                        std::span<Vector<D>> forces)
-{
-  const Press<D> press = press_of(contact, dt, slip_columns(particles, contact.slip));
-  const double travelled = contact.travel + step_travel(contact, dt);
-  bool touched = false;
-  for (const Run& run : runs)
-  {
-    if (contact.clearance[static_cast<std::size_t>(run.cell)] > travelled ||
-        movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
-      continue;
-    TractionMoments<D> moments{};
-    if (!press_run<G, D>(mesh, run, velocity, press, particles, contact, moments))
-      continue;
-    touched = true;
-    for (int k = 0; k <= D; ++k)
-      for (int i = 0; i < D; ++i)
-        forces[static_cast<std::size_t>(mesh.cells[run.cell][k])][i] +=
-            at_vertex<D>(moments.force[i], moments.force_xi[i], mesh.shapes[run.cell].gradient[k]);
-  }
-  return touched;
-}
-
 template <class G, int D>
 double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
 {
@@ -286,9 +58,7 @@ double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
 INSTANTIATE_STEP(2)
 INSTANTIATE_STEP(3)
 #define INSTANTIATE(G)                                                                                                 \
-  template bool add_contact_forces<G, G::dim>(const Mesh<G::dim>&, const std::vector<Run>&, const Movers&,             \
-                                              std::span<const Vector<G::dim>>, double, Particles<G::dim>&,             \
-                                              Contact<G::dim>&, std::span<Vector<G::dim>>);                            \
+  template double particle_radius<G>(const Particles<G::dim>&, Index);                                                 \
   template double smallest_gap<G, G::dim>(const Particles<G::dim>&, const Surface<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -56,6 +56,12 @@ void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact);
 template <int D>
 void end_step(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact);
 
+/// Path of the surface's fastest point in a step [m].
+template <int D>
+inline double step_travel(const Contact<D>& contact, double dt)
+{
+  return dt * (norm<D>(contact.body.velocity) + contact.reach * norm<3>(contact.body.spin));
+}
 /// The particles that move with one velocity field.
 struct Movers
 {

@@ -140,7 +140,7 @@ double kinetic_energy(const RigidBody<D>& body)
   template bool needs_reaction(const RigidBody<D>&);                                                                   \
   template void set_spin(const Vector<3>&, RigidBody<D>&);                                                             \
   template void prescribe_motion(const TimeStep&, const Reaction<D>&, RigidBody<D>&);                                  \
-  template void move_body<D>(const TimeStep&, const Vector<D>&, const Reaction<D>&, RigidBody<D>&);                       \
+  template void move_body<D>(const TimeStep&, const Vector<D>&, const Reaction<D>&, RigidBody<D>&);                    \
   template double kinetic_energy(const RigidBody<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
