@@ -11,6 +11,8 @@ from .report import Report
 WARN_ABOVE = 0.01
 """Unexplained fraction of the energy above which there is a warning"""
 
+NOISE_ABOVE = 0.1
+"""Fraction of the energy at work in motion of the particles against their nodes above which there is a warning"""
 
 LEAST_STEPS = 32
 """Steps of a model before its energy is checked: in the first steps half a time step is a large part of it"""
@@ -32,9 +34,12 @@ class EnergyWatch:
     limit: float | None
     speaks: bool
     warned: float = WARN_ABOVE
+    noisy: bool = False
+    largest: float = 0.0  # of the energies at work so far: a body that swings back has little of it
 
     def look(self, report: Report) -> None:
-        """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold.
+        """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold; and once when motion of the
+        particles against their nodes has more than a tenth of the energy and a third of the kinetic energy.
 
         Raises:
             RunError: it has passed the limit.
@@ -48,9 +53,33 @@ class EnergyWatch:
             self.warned = 10 * fraction
             if self.speaks:
                 warnings.warn(f"{_said(report)}; {_ADVICE}", EnergyWarning, stacklevel=4)
+        self.largest = max(self.largest, report.energy_scale)
+        if not self.noisy and _is_noisy(report, self.largest):
+            self.noisy = True
+            if self.speaks:
+                warnings.warn(_noise(report, self.largest), EnergyWarning, stacklevel=4)
 
 
 _ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
+
+
+def _against_nodes(report: Report) -> float:
+    return report.kinetic_energy - report.nodal_kinetic_energy
+
+
+def _is_noisy(report: Report, energy: float) -> bool:
+    """Whether motion against the nodes has much of the energy, and more than a smooth motion has between coarse nodes."""
+    noise = _against_nodes(report)
+    return noise > NOISE_ABOVE * energy and noise > report.kinetic_energy / 3
+
+
+def _noise(report: Report, energy: float) -> str:
+    fraction = 100 * _against_nodes(report) / energy
+    return (
+        f"at t = {report.time:.6g} s {fraction:.3g} % of the energy at work is motion of the particles against their nodes, "
+        "which the noise of cell crossings excites. A body in tension or bending then sags and does not give its strain energy "
+        "back: take more particles per cell (24 in triangles; docs/integration.md)"
+    )
 
 
 def _said(report: Report) -> str:

@@ -197,3 +197,20 @@ def test_pressures_of_frictional_soil_do_not_alternate():
         run(model, 0.6, nmd=nmd, dt=0.25 * model.critical_time_step())
         rough[nmd] = np.std(averaged_over_nodes(model)) / np.std(by_id(model, "stress")[:, :2].mean(axis=1))
     assert rough[True] < 1.1 * rough[False]
+
+
+@pytest.mark.parametrize("per_cell, noisy", [(6, True), (24, False)])
+def test_a_beam_that_sags_by_the_noise_of_cell_crossings_is_named(per_cell, noisy):
+    # Cantilever of 4 x 1 m under its weight. A beam that is elastic swings down and all the way back; with six particles in a
+    # cell of 1/16 of its length it comes back by less than half.
+    cells, length = 16, 4.0
+    size = length / cells
+    body = ([0, 5], [length, 6])
+    model = mpm.Model(box([int(6 / size), int(7 / size)], [6, 7], body=body), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=1050.0, per_cell=per_cell, cell_tag=1)
+    model.fix(1)
+    model.set_gravity((0.0, -10.0))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", mpm.EnergyWarning)
+        run(model, 1.5, every=0.05, energy_limit=None)
+    assert any("against their nodes" in str(w.message) for w in caught) == noisy
