@@ -5,22 +5,43 @@ from __future__ import annotations
 from itertools import permutations, product
 
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+from numpy.typing import ArrayLike
 
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+from fenics_bridge.types import MeshTags
 
 BODY = 1
 """Cell tag of the body in a box mesh."""
 
 
-def box_mesh(comm, lengths, counts, diagonals="alternating", body=None):
+def box_mesh(
+    comm: MPI.Comm,
+    lengths: ArrayLike,
+    counts: ArrayLike,
+    diagonals: str = "alternating",
+    body: tuple[ArrayLike, ArrayLike] | None = None,
+) -> tuple[Mesh, MeshTags, MeshTags]:
     """Background mesh of a box with its low corner at the origin: squares or cubes, each cut in D! simplices (Kuhn 1960).
 
-    lengths: (D,) [m]; counts: (D,) squares or cubes along each axis
-    diagonals: "alternating" from square to square, or "one-way"
-    body: (low, high) corners of a box [m]; cells with their centre in there have the tag BODY, all by default
-    Returns (domain, cell_tags, facet_tags): facets have the tag 2 axis + 1 on the low side along an axis (counted from 0),
-    and 2 axis + 2 on the high side. Raises InputError, on all ranks, for bad dimensions. Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        lengths: lengths of the box along the axes [m], shape (D,) with D = 2 or 3.
+        counts: number of squares or cubes along each axis, shape (D,).
+        diagonals: "alternating" from square to square, or "one-way".
+        body: low and high corner of a box [m]; cells with their centre in there have the tag BODY. By default all cells have it.
+
+    Returns:
+        The mesh, the tags of its cells, and the tags of its facets: 2 axis + 1 on the low side along an axis (counted from 0),
+        and 2 axis + 2 on the high side.
+
+    Raises:
+        InputError: lengths or counts are not positive or not as many, or diagonals has another value. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     dim = len(np.atleast_1d(lengths))
     result = on_root(comm, lambda: _arrays(lengths, counts, diagonals, body))

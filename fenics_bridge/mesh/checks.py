@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
 
@@ -12,10 +13,15 @@ NEAR = 1e-6
 """Of the size of a side or face: what is nearer to it lies on it"""
 
 
-def check_cells_fit(cells, name):
+def check_cells_fit(cells: NDArray[np.integer], name: str) -> None:
     """Refuse cells that no mesh can have: a node twice in one, the same cell twice, more than two at one facet.
 
-    cells: (m, D + 1) node numbers; name stands for the mesh in the message, which gives the first such cell.
+    Args:
+        cells: node numbers of the cells, shape (m, D + 1).
+        name: name of the mesh in the message, which gives the first such cell.
+
+    Raises:
+        InputError: there is such a cell.
     """
     nodes = np.sort(cells, axis=1)
     flat = (np.diff(nodes, axis=1) == 0).any(axis=1)
@@ -31,12 +37,20 @@ def check_cells_fit(cells, name):
         raise InputError(f"{name}: cell {cell} has a facet that {counts.max()} cells share, expected at most 2")
 
 
-def check_conforming(points, cells, name):
+def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], name: str) -> None:
     """Refuse cells that do not meet node to node: the mesh is torn where a node lies within a side or face of another cell.
 
-    points: (n, D); cells: (m, D + 1). Each facet of one cell alone is a boundary. No node of the boundary may lie on such a
-    facet away from its corners, nearer than a millionth of its size, nor may two such facets overlap, as two halves of a
-    square that are cut along different diagonals do. The message gives the first such place.
+    Each facet of one cell alone is a boundary. No node of the boundary may lie on such a facet away from its corners, nearer
+    than a millionth of its size, nor may two such facets overlap, as two halves of a square that are cut along different
+    diagonals do.
+
+    Args:
+        points: coordinates of the nodes [m], shape (n, D).
+        cells: node numbers of the cells, shape (m, D + 1).
+        name: name of the mesh in the message, which gives the first such place.
+
+    Raises:
+        InputError: there is such a place.
     """
     facets = _boundary_facets(cells)
     nodes = np.unique(facets)

@@ -86,7 +86,7 @@ def _check_written_tags(path):
 
 
 def model_arrays(dim):
-    """gmsh's current model: points (n, dim), cells (m, dim + 1), cell_values (m,), facets (k, dim), facet_values (k,).
+    """The current model of gmsh: points (n, dim), cells (m, dim + 1), cell_values (m,), facets (k, dim), facet_values (k,).
 
     Cells and facets are rows of points. cell_names, facet_names: names of physical groups, with their numbers in
     cell_numbers, facet_numbers. Raises MeshError.

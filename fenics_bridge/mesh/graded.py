@@ -10,17 +10,36 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.mesh.names import label, name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import tag_values
+from fenics_bridge.types import MeshTags, OfPosition
 
 
-def graded_tags(domain, cell_tags, soil, value_of, classes=20):
+def graded_tags(
+    domain: mesh.Mesh,
+    cell_tags: MeshTags,
+    soil: int | str,
+    value_of: OfPosition,
+    classes: int = 20,
+) -> tuple[MeshTags, dict[int, float]]:
     """Sort the cells of a soil into classes by a function of position, each with a tag of its own.
 
     Classes are equally wide between the least and the largest value at the cells' centroids, so a parameter that is
     linear in the value is off by at most half a class. The soil's name then stands for all of its classes.
-    soil: name of the soil; value_of: function of positions (n, D) [m] that returns values (n,), e.g. their depths
-    classes: number of classes; those without cells get no tag
-    Returns (cell_tags, {tag: value in the middle of the class}). Collective.
-    Raises InputError, on all ranks, for a soil that is not there and for values that are not finite.
+
+    Args:
+        domain: mesh of DOLFINx.
+        cell_tags: tags of its cells.
+        soil: name or tag of the soil.
+        value_of: function of positions (n, D) [m] that returns values (n,), e.g. their depths.
+        classes: number of classes; those without cells get no tag.
+
+    Returns:
+        The new cell tags, and the value in the middle of each class by its tag.
+
+    Raises:
+        InputError: no cell has the soil's tag, classes is below 1, or a value is not finite. Raised on all ranks alike.
+
+    Note:
+        Collective.
 
     Example:
         >>> tags, depths = bridge.graded_tags(domain, cell_tags, "clay", lambda x: 3.0 - x[:, 1])

@@ -4,36 +4,60 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from fenics_bridge.errors import InputError, agree, on_root
 from fenics_bridge.mesh import gmsh_reader
 from fenics_bridge.mesh.checks import check_cells_fit, check_conforming
 from fenics_bridge.mesh.gmsh_process import Limits, read_apart
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+from fenics_bridge.types import MeshTags
 
 TIME_LIMIT = 600.0
 """[s] that gmsh may take for a file, unless given otherwise"""
 
 
-def read_mesh(path, comm, dim=2, parameters=None, *, time_limit=TIME_LIMIT, memory_limit=None, allow_commands=False):
-    """Mesh and tags from a file of gmsh; rank 0 reads, DOLFINx partitions.
+def read_mesh(
+    path: str | Path,
+    comm: MPI.Comm,
+    dim: int = 2,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    time_limit: float = TIME_LIMIT,
+    memory_limit: float | None = None,
+    allow_commands: bool = False,
+) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Read a mesh and its tags from a file of gmsh; rank 0 reads, DOLFINx partitions.
 
-    path: .msh (any version that gmsh reads) or .geo (meshed here)
-    comm: MPI communicator; dim: 2 for triangles in the plane z = 0, 3 for tetrahedra
-    parameters: for .geo, values for its `DefineConstant` names, e.g. {"cell_size": 0.1}
-    time_limit: [s] that gmsh may take; memory_limit: bytes that it may take, by default half of the machine's memory
-    allow_commands: let a .geo file run commands by `SystemCall`; it is a program, so trust it first
-    Returns (domain, cell_tags, facet_tags). Tags are gmsh's physical groups, whose names stand for them wherever a tag
-    is asked for. When the file has physical groups of dimension `dim`, only their cells belong to the mesh, as when
-    gmsh saves a mesh; otherwise all do, untagged. Nodes at one place are merged, so that soils hold together.
-    Raises InputError, on all ranks, for a file that is missing or cannot be read, another extension, a mesh without
-    cells, of another dimension, with quadrilaterals or hexahedra, with curved (second-order) elements, with cells that do
-    not meet node to node, or with tags that do not fit into 32 bits; one that runs commands, or that takes more time or
-    memory than it may.
-    Collective.
+    Tags are gmsh's physical groups, whose names stand for them wherever a tag is asked for. When the file has physical
+    groups of dimension `dim`, only their cells belong to the mesh, as when gmsh saves a mesh; otherwise all do, untagged.
+    Nodes at one place are merged, so that soils hold together.
+
+    Args:
+        path: .msh (any version that gmsh reads) or .geo (meshed here).
+        comm: the ranks that share the mesh.
+        dim: 2 for triangles in the plane z = 0, 3 for tetrahedra.
+        parameters: for .geo, values for its `DefineConstant` names, e.g. {"cell_size": 0.1}.
+        time_limit: time that gmsh may take [s].
+        memory_limit: memory that gmsh may take [bytes], by default half of the machine's memory.
+        allow_commands: let a .geo file run commands by `SystemCall`; it is a program, so trust it first.
+
+    Returns:
+        The mesh, the tags of its cells, and the tags of its facets.
+
+    Raises:
+        InputError: a file that is missing or cannot be read, another extension, a mesh without cells, of another dimension, with
+            quadrilaterals or hexahedra, with curved (second-order) elements, with cells that do not meet node to node, or with
+            tags that do not fit into 32 bits; one that runs commands, or that takes more time or memory than it may. Raised on
+            all ranks alike.
+
+    Note:
+        Collective.
     """
     _check_arguments(comm, path, dim, parameters)
     limits = Limits(time_limit, memory_limit, allow_commands)
@@ -106,8 +130,10 @@ def _constants(parameters, text, path):
 
 
 def _with_constants(path, constants, folder):
-    """A file that sets the constants and includes `path`; gmsh would keep them from one session to the next
-    if they came by its command line."""
+    """A file that sets the constants and includes `path`.
+
+    If the constants came by gmsh's command line, it would keep them from one session to the next.
+    """
     if not constants:
         return path
     wrapper = Path(folder) / "with_constants.geo"

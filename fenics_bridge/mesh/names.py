@@ -2,22 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
+from mpi4py import MPI
 
 from fenics_bridge.errors import InputError
+from fenics_bridge.types import MeshTags
+from mpm_core.mesh import Tag
 
 
-def name_tags(tags, names):
-    """Give tags of a mesh their names, in place; a name may stand for several tags. Returns the tags.
+def name_tags(tags: MeshTags, names: Mapping[str, int | Sequence[int]]) -> MeshTags:
+    """Give tags of a mesh their names, in place.
 
-    tags: cell or facet tags of DOLFINx; names: {name: tag or tags}, e.g. {"clay": 1, "fill": (2, 3)}
+    Args:
+        tags: cell or facet tags of DOLFINx.
+        names: tag by name, or several tags that the name stands for, e.g. {"clay": 1, "fill": (2, 3)}.
+
+    Returns:
+        The same tags.
     """
     tags.names = {str(name): tuple(int(t) for t in np.atleast_1d(numbers)) for name, numbers in names.items()}
     return tags
 
 
-def names_of(tags):
-    """Names of the tags as {name: tuple of tags}; empty where there are none, e.g. for tags made with DOLFINx."""
+def names_of(tags: MeshTags | None) -> dict[str, tuple[int, ...]]:
+    """Names of the tags of a mesh.
+
+    Args:
+        tags: cell or facet tags of DOLFINx, or None.
+
+    Returns:
+        Tags by name; empty where there are no names, e.g. for tags made with DOLFINx.
+    """
     return getattr(tags, "names", {})
 
 
@@ -37,10 +55,26 @@ def described(tags, known):
     return ", ".join(label(tags, number) for number in known) or "none"
 
 
-def tag_numbers(comm, tags, given, argument, entity="facet"):
-    """The tags that a number, a name, or a sequence of them stands for: tuple of int.
+def tag_numbers(
+    comm: MPI.Comm, tags: MeshTags | None, given: Tag, argument: str, entity: str = "facet"
+) -> tuple[int, ...]:
+    """The tags that a number, a name, or a sequence of them stands for.
 
-    Raises InputError, on all ranks, where one of them does not exist on any rank. Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        tags: cell or facet tags; None where there are none.
+        given: number or name of a tag, or a sequence of them.
+        argument: name of the argument, for the message.
+        entity: "cell" or "facet", for the message.
+
+    Returns:
+        The numbers of the tags, each once.
+
+    Raises:
+        InputError: one of them does not exist on any rank. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     known, names, found = known_tags(comm, tags), names_of(tags), []
     for one in given if isinstance(given, (list, tuple, set, np.ndarray)) else [given]:
@@ -53,10 +87,26 @@ def tag_numbers(comm, tags, given, argument, entity="facet"):
     return tuple(dict.fromkeys(found))
 
 
-def by_number(comm, tags, given, argument, entity="facet"):
+def by_number(
+    comm: MPI.Comm, tags: MeshTags | None, given: Mapping[Any, Any], argument: str, entity: str = "facet"
+) -> dict[Any, Any]:
     """A dictionary by tags or names as one by tags alone; None as a key stays.
 
-    Raises InputError, on all ranks, for a tag that does not exist or that is given twice. Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        tags: cell or facet tags; None where there are none.
+        given: values by number or name of a tag.
+        argument: name of the argument, for the message.
+        entity: "cell" or "facet", for the message.
+
+    Returns:
+        The values by number of a tag.
+
+    Raises:
+        InputError: a tag does not exist, or is given twice. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     result = {}
     for key, value in given.items():

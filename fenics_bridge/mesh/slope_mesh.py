@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.names import name_tags
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+from fenics_bridge.types import MeshTags
 
 SOIL, EMPTY = 1, 2
 """Cell tags of a slope mesh."""
@@ -24,21 +27,41 @@ _NAMES = (
 )
 
 
-def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="crossed", runout=2.0, headroom=None):
+def slope_mesh(
+    comm: MPI.Comm,
+    height: float = 1.0,
+    angle: float = 45.0,
+    crest: float = 1.1,
+    cell_size: float = 0.1,
+    kind: str = "crossed",
+    runout: float = 2.0,
+    headroom: float | None = None,
+) -> tuple[Mesh, MeshTags, MeshTags]:
     """Background mesh of a slope, with the soil before failure tagged.
 
     The soil has the corners (0, 0), (base, 0), (crest, height) and (0, height), base = crest + height / tan(angle).
     The background reaches from x = 0 to base + runout and from y = 0 to height + headroom.
 
-    height, crest: [m], angle: of the slope [degrees], above 0 and up to 90
-    cell_size: [m] edge of the squares, or of the triangles of an unstructured mesh
-    kind: "crossed", squares cut in four by their diagonals (angle 45 or 90; height and crest whole cells);
-        "fitted", the same with the squares stretched to fit any slope; "gmsh", unstructured
-    runout: length of the background past the toe [m]; headroom: its height above the crest [m], None for one cell.
-        All but "gmsh" round both up to whole cells.
-    Returns (domain, cell_tags, facet_tags): cells SOIL and EMPTY; facets LEFT, BASE, RIGHT, TOP on the sides of the
-    background, SLOPE and CREST on the free surface of the soil (CREST also where it is a side of the background).
-    Raises InputError, on all ranks, for dimensions that do not fit. Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        height: height of the slope [m].
+        angle: angle of the slope to the horizontal [degrees], above 0 and up to 90.
+        crest: length of the level ground behind the slope [m].
+        cell_size: edge of the squares, or of the triangles of an unstructured mesh [m].
+        kind: "crossed", squares cut in four by their diagonals (angle 45 or 90; height and crest whole cells); "fitted", the same
+            with the squares stretched to fit any slope; "gmsh", unstructured.
+        runout: length of the background past the toe [m]. All kinds but "gmsh" round it up to whole cells.
+        headroom: height of the background above the crest [m], rounded like `runout`; None for one cell.
+
+    Returns:
+        The mesh, the tags of its cells, SOIL and EMPTY, and the tags of its facets: LEFT, BASE, RIGHT, TOP on the sides of the
+        background, SLOPE and CREST on the free surface of the soil (CREST also where it is a side of the background).
+
+    Raises:
+        InputError: dimensions that are out of range or do not fit, or another kind. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     headroom = cell_size if headroom is None else headroom
 
@@ -50,8 +73,8 @@ def slope_mesh(comm, height=1.0, angle=45.0, crest=1.1, cell_size=0.1, kind="cro
         return makers[kind](*shape)
 
     result = on_root(comm, arrays)
-    domain, *tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
-    return (domain, *map(name_tags, tags, _NAMES))
+    domain, cell_tags, facet_tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
+    return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
 
 
 def _checked(height, angle, crest, cell_size, runout, headroom):

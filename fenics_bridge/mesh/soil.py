@@ -4,20 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import la
+from dolfinx.mesh import Mesh
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, tag_values
+from fenics_bridge.types import MeshTags
+from mpm_core.mesh import Tag
 
 
-def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
+def soil_mesh(
+    domain: Mesh, cell_tags: MeshTags, facet_tags: MeshTags | None = None, tag: Tag = 1
+) -> tuple[Mesh, MeshTags, MeshTags]:
     """Mesh of the cells of one tag or several, with a partition of its own, so that the work is distributed over all ranks.
 
     Soils of several tags are one body: they share the nodes of their borders. (DOLFINx's `create_submesh` keeps the
     partition and is not reliable on several ranks before 0.8.)
-    tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"]
-    Returns (domain, cell_tags, facet_tags): the cells keep their tag, the facets of the body theirs, both their names.
-    Raises InputError, on all ranks, when no cell has a tag. Collective.
+
+    Args:
+        domain: background mesh of DOLFINx.
+        cell_tags: tags of its cells.
+        facet_tags: tags of its facets; None where none is tagged.
+        tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"].
+
+    Returns:
+        The mesh of the soil, the tags of its cells and those of its facets, which are the tags that they have in the background
+        mesh, with their names.
+
+    Raises:
+        InputError: no cell has a tag. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     dim = domain.topology.dim
     numbers = tag_numbers(domain.comm, cell_tags, tag, "tag", "cell")
@@ -36,7 +54,12 @@ def soil_mesh(domain, cell_tags, facet_tags=None, tag=1):
 def _numbered_nodes(domain, nodes):
     """Numbers without gaps, over all ranks, of the nodes in use, and this rank's part of their coordinates.
 
-    nodes: local nodes in use. Returns the number of each local node (-1: not in use) and points (n, D).
+    Args:
+        domain: background mesh of DOLFINx.
+        nodes: local nodes in use.
+
+    Returns:
+        The number of each local node (-1: not in use), and the coordinates of the nodes that this rank owns, shape (n, D) [m].
     """
     index_map = domain.geometry.index_map()
     n_owned = index_map.size_local

@@ -6,30 +6,35 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.names import name_tags
+from fenics_bridge.types import MeshTags
 
 
 class MeshArrays(NamedTuple):
-    """A rank's part of a mesh of linear simplices of dimension D.
-
-    points: (n, D) float64 [m]; nodes are numbered through in order of rank
-    cells: (m, D + 1) int64 by those numbers; cell_values: (m,) int32 tags, 0 for none
-    facets: (k, D) int64 by those numbers; facet_values: (k,) int32 tags
-    cell_names, facet_names: {name: tags}, those of rank 0 hold
-    """
+    """A rank's part of a mesh of linear simplices of dimension D."""
 
     points: np.ndarray
+    """Coordinates of the nodes [m], shape (n, D), float64; nodes are numbered through in order of rank"""
     cells: np.ndarray
+    """Nodes of the cells by those numbers, shape (m, D + 1), int64"""
     cell_values: np.ndarray
+    """Tags of the cells, shape (m,), int32; 0 for none"""
     facets: np.ndarray
+    """Nodes of the tagged facets, shape (k, D), int64"""
     facet_values: np.ndarray
+    """Tags of the facets, shape (k,), int32"""
     cell_names: dict | None = None
+    """Tags of cells by name; those of rank 0 hold"""
     facet_names: dict | None = None
+    """Tags of facets by name; those of rank 0 hold"""
 
 
-def empty_arrays(dim):
+def empty_arrays(dim: int) -> MeshArrays:
     """The part of a rank without nodes and cells."""
     return MeshArrays(
         np.empty((0, dim)),
@@ -40,8 +45,8 @@ def empty_arrays(dim):
     )
 
 
-def distributed_mesh(comm, arrays, dim):
-    """(domain, cell_tags, facet_tags) from the ranks' parts, partitioned by DOLFINx.
+def distributed_mesh(comm: MPI.Comm, arrays: MeshArrays, dim: int) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Mesh, cell tags and facet tags from the ranks' parts, partitioned by DOLFINx.
 
     Cells of tag 0 and facets that are not listed stay untagged. Tags carry their names (see `name_tags`). Collective.
     """
@@ -54,24 +59,24 @@ def distributed_mesh(comm, arrays, dim):
     return domain, name_tags(cell_tags, names[0]), name_tags(facet_tags, names[1])
 
 
-def owned_cells(domain):
+def owned_cells(domain: Mesh) -> int:
     """Number of cells that this rank owns; they come before the ghosts."""
     return domain.topology.index_map(domain.topology.dim).size_local
 
 
-def cell_corners(domain):
+def cell_corners(domain: Mesh) -> NDArray[np.float64]:
     """Corners of the cells that this rank owns: (m, D + 1, D) [m]."""
     return domain.geometry.x[compat.cell_nodes(domain)[: owned_cells(domain)], : domain.geometry.dim]
 
 
-def cell_volumes(domain):
+def cell_volumes(domain: Mesh) -> NDArray[np.float64]:
     """Volumes of the cells that this rank owns: (m,) [m^D]."""
     corners = cell_corners(domain)
     return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / math.factorial(domain.geometry.dim)
 
 
-def tag_values(domain, tags, dim):
-    """Tag of every entity of dimension `dim` on this rank, ghosts too, 0 where untagged: int32."""
+def tag_values(domain: Mesh, tags: MeshTags | None, dim: int) -> NDArray[np.int32]:
+    """Tag of every entity of dimension `dim` on this rank, ghosts too, 0 where untagged."""
     index_map = domain.topology.index_map(dim)
     values = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     if tags is not None:
