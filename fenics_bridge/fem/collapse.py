@@ -3,67 +3,111 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.load_steps import advance
+from fenics_bridge.fem.load_steps import LoadStep, advance
+from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.mixed import MixedQuasiStatic
+from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.strength import reduced_strength
+from fenics_bridge.types import Laws
 
 
 @dataclass(frozen=True)
 class Collapse:
-    """The last equilibrium below collapse, and the evidence of failure above it.
-
-    value: of the load or of the factor of safety there
-    failed: whether the body was shown to fail at `failed_at`: it flows in a mechanism under a load that its stresses do not
-        carry. If not, the solver did not converge there, and `value` is a lower bound only; reason: in words
-    failed_at: smallest value above `value` at which it was shown to fail, or that was tried if it was shown at none
-    carried: fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if not shown
-    residual: largest out-of-balance force that was accepted on the way, over the forces at work [-]
-    curve: (k, 2), value and largest displacement of a node [m] at every equilibrium on the way
-    mechanism: function, displacement of the mechanism where failure was shown, otherwise increment of the last step with
-        equilibrium; scaled to a largest displacement of 1
-    steps: every LoadStep that was tried
-    """
+    """The last equilibrium below collapse, and the evidence of failure above it."""
 
     value: float
+    """Of the load or of the factor of safety at the last equilibrium"""
     failed_at: float
+    """Smallest value above `value` at which the body was shown to fail, or that was tried if it was shown at none"""
     failed: bool
+    """Whether the body was shown to fail at `failed_at`: it flows in a mechanism under a load that its stresses do not carry. If
+    not, the solver did not converge there, and `value` is a lower bound only"""
     reason: str
+    """Why there is no equilibrium at `failed_at`, in words"""
     carried: float
+    """Fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if failure was not shown"""
     residual: float
-    curve: np.ndarray
+    """Largest out-of-balance force that was accepted on the way, over the forces at work [-]"""
+    curve: NDArray[np.float64]
+    """Value and largest displacement of a node [m] at every equilibrium on the way, shape (k, 2)"""
     mechanism: fem.Function
-    steps: list
+    """Displacement of the mechanism where failure was shown, otherwise increment of the last step with equilibrium; scaled to a
+    largest displacement of 1"""
+    steps: list[LoadStep]
+    """Every load step that was tried"""
 
 
-def collapse_load(model, load_of, first_step, start=0.0, tolerance=2e-3, progress=None):
+def collapse_load(
+    model: QuasiStatic | MixedQuasiStatic,
+    load_of: Callable[[float], Load],
+    first_step: float,
+    start: float = 0.0,
+    tolerance: float = 2e-3,
+    progress: Callable[[LoadStep], Any] | None = None,
+) -> Collapse:
     """Raise a load to the last equilibrium: steps double while they converge easily; below a value that fails they bisect.
 
-    model: QuasiStatic, in equilibrium under `load_of(start)`, e.g. fresh and unloaded
-    load_of: function of a number, the load's value, that returns the Load
-    first_step: of the value; tolerance: width of the last step as a fraction of the value [-]
-    Returns a Collapse, whose `failed` says whether failure was shown. Raises InputError when not even the first steps
-    find equilibrium. Collective.
+    Args:
+        model: finite elements in equilibrium under `load_of(start)`, e.g. fresh and unloaded.
+        load_of: function of a number, the load's value, that returns the load.
+        first_step: size of the first step, in the units of the value.
+        start: value to begin with.
+        tolerance: width of the last step as a fraction of the value [-].
+        progress: function that is called with each load step, e.g. `print_step`.
+
+    Returns:
+        The result, whose `failed` says whether failure was shown.
+
+    Raises:
+        InputError: not even the first steps find equilibrium. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
 
 
 def factor_of_safety(
-    model, load, start=0.5, first_step=0.1, tolerance=2e-3, progress=None, unreduced=(), reduce=reduced_strength
-):
+    model: QuasiStatic | MixedQuasiStatic,
+    load: Load,
+    start: float = 0.5,
+    first_step: float = 0.1,
+    tolerance: float = 2e-3,
+    progress: Callable[[LoadStep], Any] | None = None,
+    unreduced: Collection[int | str] = (),
+    reduce: Callable[[Laws, float, Collection[int | str]], Laws] = reduced_strength,
+) -> Collapse:
     """Factor by which the strength can be divided before equilibrium under a load is lost.
 
-    model: QuasiStatic, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows
-    start: factor to begin with; the body must carry the load with its strength divided by it (below 1: raised)
-    first_step: of the factor; tolerance: width of the last step as a fraction of the factor [-]
-    unreduced: cell tags whose laws keep their strength
-    reduce: function (law, factor, unreduced) that returns the law, or laws by cell tag, with less strength
-    Returns a Collapse whose value is the factor, and whose `failed` says whether failure was shown above it. Raises
-    InputError when the load is not carried at the start. The model keeps the reduced law. Collective.
+    The model has the reduced laws afterwards.
+
+    Args:
+        model: finite elements, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows.
+        load: load under which the factor is found.
+        start: factor to begin with; the body must carry the load with its strength divided by it (below 1: raised).
+        first_step: first increment of the factor.
+        tolerance: width of the last step as a fraction of the factor [-].
+        progress: function that is called with each load step, e.g. `print_step`.
+        unreduced: cell tags whose laws keep their strength.
+        reduce: function of law, factor and `unreduced` that returns the law, or laws by cell tag, with less strength.
+
+    Returns:
+        The result, whose value is the factor, and whose `failed` says whether failure was shown above it.
+
+    Raises:
+        InputError: the load is not carried at the start. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     law = model.law
     model.law = reduce(law, start, unreduced)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
@@ -22,28 +26,51 @@ from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.loads import elastic_load
 from fenics_bridge.fem.stiffness import Stiffness
-from fenics_bridge.fem.supports import Constraints
+from fenics_bridge.fem.supports import Constraints, Support
+from fenics_bridge.types import MeshTags
+from mpm_core import Geometry
 
 
 class ElasticSolution:
     """Displacement and stress of an elastic body.
 
-    displacement: function (Lagrange) [m]; stress: function, polynomial in each cell (constant for degree 1),
-    components as in `mpm_core` [Pa], tension positive; geometry: a Geometry
+    Args:
+        displacement: Lagrange function [m].
+        stress: function that is polynomial in each cell (constant for degree 1), components as in `mpm_core` [Pa], tension
+            positive.
+        geometry: as for `solve_elastic`.
     """
 
-    def __init__(self, displacement, stress, geometry=None):
-        """geometry: as for `solve_elastic`."""
+    def __init__(self, displacement: fem.Function, stress: fem.Function, geometry: Geometry | None = None) -> None:
         domain = displacement.function_space.mesh
-        self.displacement, self.stress, self.geometry = displacement, stress, geometry_of(domain, geometry)
+        self.displacement = displacement
+        """Displacement [m], a Lagrange function"""
+        self.stress = stress
+        """Stress [Pa], polynomial in each cell; tension positive"""
+        self.geometry = geometry_of(domain, geometry)
+        """Plane strain, axial symmetry or a solid"""
         self._radius = radius_of(domain, self.geometry)
 
-    def stress_function(self, smooth=False):
-        """The stress of the cells or, if `smooth`, its average at the nodes as a continuous function. Collective."""
+    def stress_function(self, smooth: bool = False) -> fem.Function:
+        """The stress as a function.
+
+        Args:
+            smooth: average the stress of the cells at the nodes, which makes it continuous.
+
+        Returns:
+            The stress [Pa], polynomial in each cell, or continuous if `smooth`.
+
+        Note:
+            Collective.
+        """
         return nodal_average(self.stress, self._radius) if smooth else self.stress
 
-    def deviatoric_strain_function(self):
-        """sqrt(2/3 e : e) of the strain's deviator e [-], as a function that is constant in each cell. Collective."""
+    def deviatoric_strain_function(self) -> fem.Function:
+        """sqrt(2/3 e : e) of the strain's deviator e [-], as a function that is constant in each cell.
+
+        Note:
+            Collective.
+        """
         components = strain(self.displacement, self._radius)
         mean = (components[0] + components[1] + components[2]) / 3
         normal = sum((components[k] - mean) ** 2 for k in range(3))
@@ -51,37 +78,64 @@ class ElasticSolution:
         size = ufl.as_vector([ufl.sqrt(2 / 3 * (normal + 0.5 * shear))])
         return cell_function(self.displacement.function_space.mesh, size, 0, "deviatoric_strain")
 
-    def evaluate_at(self, points, smooth=False):
-        """Dictionary with `displacement` (n, D) [m] and `stress` (n, S) [Pa] at points, on any rank.
+    def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
+        """Values at points, whichever ranks have the points and their cells.
 
-        smooth: as for `stress_function`.
-        Raises InputError, on all ranks, naming a point outside the body. Collective.
+        Args:
+            points: positions [m], shape (n, D).
+            smooth: as for `stress_function`.
+
+        Returns:
+            `displacement` [m], shape (n, D), and `stress` [Pa], shape (n, S).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth))
 
 
 def solve_elastic(
-    domain,
-    facet_tags,
-    supports,
-    young,
-    poisson,
-    unit_weight,
-    degree=1,
-    traction=None,
-    body_force=None,
-    options_prefix="elastic_",
-    geometry=None,
-):
+    domain: Mesh,
+    facet_tags: MeshTags,
+    supports: Sequence[Support],
+    young: float,
+    poisson: float,
+    unit_weight: float,
+    degree: int = 1,
+    traction: Mapping[int | str, ArrayLike] | None = None,
+    body_force: Callable[[NDArray[np.float64]], ArrayLike] | None = None,
+    options_prefix: str = "elastic_",
+    geometry: Geometry | None = None,
+) -> ElasticSolution:
     """Small-strain equilibrium of a linear elastic body (plane strain, axisymmetric or 3D) under its weight and its supports.
 
-    supports: from `fixed`, `roller`, `prescribed`; enough of them to prevent rigid-body motion
-    young: [Pa], poisson: [-], unit_weight: [N/m3], acting against the last axis; degree: 1 or 2 of the displacement
-    traction: force per area (D,) [Pa] by facet tag, or None
-    body_force: function of positions (D, n) [m] that returns forces per volume (D, n) [N/m3], or None
-    options_prefix: of the PETSc options of the linear solver; geometry: as for `QuasiStatic`
-    Returns an ElasticSolution. Raises InputError for bad arguments, RuntimeError when the linear solver fails.
-    Collective.
+    Args:
+        domain: mesh of the body.
+        facet_tags: tags of its boundary.
+        supports: boundary conditions from `fixed`, `roller` and `prescribed`; enough of them to prevent rigid-body motion.
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        unit_weight: unit weight [N/m3], acting against the last axis.
+        degree: degree of the displacement, 1 or 2.
+        traction: force per area [Pa], shape (D,), by facet tag.
+        body_force: function of positions of shape (D, n) [m] that returns forces per volume of shape (D, n) [N/m3].
+        options_prefix: prefix of the PETSc options of the linear solver.
+        geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose nodes on the axis need a roller; by
+            default plane strain in two dimensions.
+
+    Returns:
+        Displacement and stress.
+
+    Raises:
+        InputError: an argument out of range, an unknown tag, or a geometry that does not go with the mesh. Raised on all ranks
+            alike.
+        RuntimeError: the linear solver failed.
+
+    Note:
+        Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, degree))
     geometry = geometry_of(domain, geometry)
@@ -106,12 +160,40 @@ def solve_elastic(
 
 
 def solve_nearly_incompressible(
-    domain, facet_tags, supports, young, poisson, unit_weight, traction=None, options_prefix="mixed_", geometry=None
-):
-    """The same as `solve_elastic` by Taylor-Hood elements, which do not lock as Poisson's ratio approaches 0.5.
+    domain: Mesh,
+    facet_tags: MeshTags,
+    supports: Sequence[Support],
+    young: float,
+    poisson: float,
+    unit_weight: float,
+    traction: Mapping[int | str, ArrayLike] | None = None,
+    options_prefix: str = "mixed_",
+    geometry: Geometry | None = None,
+) -> ElasticSolution:
+    """Elastic equilibrium by Taylor-Hood elements, which do not lock as Poisson's ratio approaches 0.5.
 
-    Displacement is quadratic, pressure linear; poisson: above 0. Other arguments, result and errors as for
-    `solve_elastic`. The system is indefinite: by default MUMPS solves it. Collective.
+    Displacement is quadratic, pressure linear. The system is indefinite: by default MUMPS solves it.
+
+    Args:
+        domain: mesh of the body.
+        facet_tags: tags of its boundary.
+        supports: boundary conditions from `fixed`, `roller` and `prescribed`; enough of them to prevent rigid-body motion.
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-], above 0.
+        unit_weight: unit weight [N/m3], acting against the last axis.
+        traction: force per area [Pa], shape (D,), by facet tag.
+        options_prefix: prefix of the PETSc options of the linear solver.
+        geometry: as for `solve_elastic`.
+
+    Returns:
+        Displacement and stress.
+
+    Raises:
+        InputError: as for `solve_elastic`. Raised on all ranks alike.
+        RuntimeError: the linear solver failed.
+
+    Note:
+        Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
     agree(domain.comm, None if poisson > 0 else f"poisson: got {poisson!r}, expected more than 0")

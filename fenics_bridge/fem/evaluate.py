@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
@@ -15,11 +18,20 @@ _TOLERANCE = 1e-9
 class PointSearch:
     """Points of each rank, found in the cells of a mesh wherever those are owned.
 
-    The constructor searches the cells; `values` then evaluates any number of functions. Both are collective.
-    found: (n,) bool, whether each of this rank's points lies in the mesh
+    The constructor searches the cells; `values` then evaluates any number of functions.
+
+    Args:
+        domain: mesh of DOLFINx.
+        points: positions of this rank's points [m], shape (n, D).
+
+    Raises:
+        InputError: points has another shape or a value that is not finite. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, domain, points):
+    def __init__(self, domain: Mesh, points: ArrayLike) -> None:
         self._domain = domain  # it owns the communicator
         self._comm, dim = domain.comm, domain.geometry.dim
         points = np.ascontiguousarray(points, dtype=float)
@@ -40,8 +52,18 @@ class PointSearch:
         for rows, inside in self._returned(self._inside):
             self.found[rows] |= inside
 
-    def require_all(self, argument="points"):
-        """Raise InputError, on all ranks, naming the first point that is outside the mesh."""
+    def require_all(self, argument: str = "points") -> None:
+        """Require that all points lie in the mesh.
+
+        Args:
+            argument: name of the points in the message.
+
+        Raises:
+            InputError: a point is outside the mesh; the message names the first one. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         lost = np.flatnonzero(~self.found)
         message = None
         if len(lost):
@@ -52,8 +74,18 @@ class PointSearch:
             )
         agree(self._comm, message)
 
-    def values(self, function):
-        """Values (n, components) of a function at the points; NaN at points outside the mesh."""
+    def values(self, function: fem.Function) -> NDArray[np.float64]:
+        """Values of a function at the points.
+
+        Args:
+            function: function on the mesh.
+
+        Returns:
+            Shape (n, components); NaN at points outside the mesh.
+
+        Note:
+            Collective.
+        """
         size = int(np.prod(function.ufl_shape)) if function.ufl_shape else 1
         values = np.full((len(self._inside), size), np.nan)
         if len(self._cells):
@@ -64,10 +96,19 @@ class PointSearch:
             result[rows[known]] = received[known]
         return result
 
-    def cell_sums(self, amounts):
-        """Sums over the points in each cell that this rank owns: (m,); a point outside the mesh counts nowhere.
+    def cell_sums(self, amounts: NDArray[np.float64]) -> NDArray:
+        """Sums over the points in each cell that this rank owns; a point outside the mesh counts nowhere.
 
-        (A conservative transfer: it keeps the total.) amounts: (n,), one for each of this rank's points. Collective.
+        (A conservative transfer: it keeps the total.)
+
+        Args:
+            amounts: one number for each of this rank's points, shape (n,).
+
+        Returns:
+            Shape (m,), by the owned cells.
+
+        Note:
+            Collective.
         """
         returned, rank_of = self._returned(self._inside), np.full(len(self.points), -1)
         for rank, (rows, inside) in zip(reversed(range(self._comm.size)), returned):
@@ -82,10 +123,21 @@ class PointSearch:
         return reversed(list(zip(self._sent, returned)))
 
 
-def evaluate_at(points, **functions):
-    """Values at points of several functions of one mesh: a dictionary of arrays (n, components).
+def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArray[np.float64]]:
+    """Values of several functions of one mesh at points, whichever ranks have the points and their cells.
 
-    points: (n, D) [m] on each rank. Raises InputError, on all ranks, naming a point outside the mesh. Collective.
+    Args:
+        points: positions of this rank's points [m], shape (n, D).
+        **functions: functions by the names that their values are to have.
+
+    Returns:
+        Values by name, each of shape (n, components).
+
+    Raises:
+        InputError: a point is outside the mesh; the message names it. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     domain = next(iter(functions.values())).function_space.mesh
     search = PointSearch(domain, points)

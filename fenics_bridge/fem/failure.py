@@ -20,7 +20,14 @@ def explained(fem, reason, load):
 
 
 def advice(reason, free, law, tension):
-    """Possible remedies. free: unsupported motions; law, tension: law, and whether there is tension, where the body moves most."""
+    """Possible remedies.
+
+    Args:
+        reason: why there is no equilibrium.
+        free: unsupported motions, in words.
+        law: law where the body moves most.
+        tension: whether there is tension there.
+    """
     if free:
         return f"Nothing holds the soil that is there against moving {' and '.join(free)}: give it supports"
     if "linear solver" in reason:
@@ -39,8 +46,8 @@ def advice(reason, free, law, tension):
     if "mechanism" in reason:
         return "The ground fails there: take less load, more strength or more support"
     return (
-        "Newton's method and relaxation gave up: try smaller steps, more steps of relaxation (max_steps of Solver), a tolerance as "
-        "in practice (PRACTICE), or more dilation"
+        "Newton's method and relaxation gave up: try smaller steps, more steps of relaxation (max_steps of Solver), a tolerance "
+        "as in practice (PRACTICE), or more dilation"
     )
 
 

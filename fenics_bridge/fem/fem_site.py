@@ -2,31 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.active_cells import switch_off
+from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
-from fenics_bridge.fem.stages import SiteState, StageError, StageReport
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
 
 
 class FemSite:
     """A body of finite elements that is built and excavated in stages, see `Stage` and `carry_out`.
 
-    fem: the QuasiStatic, new and unloaded, of the soils of all stages, with a law for each; at first none is placed.
-    state: SiteState, which soils are there, their weights, loads and supports; number: of the last stage
+    Args:
+        fem: finite elements, new and unloaded, of the soils of all stages, with a law for each; at first none is placed.
+        first_step: first fraction of each stage's change [-], as for `QuasiStatic.solve`.
+        tolerance: fraction of a stage's change below which steps end [-].
+        progress: function that is called with each load step, e.g. `print_step`.
+
+    Raises:
+        InputError: fem has no cell tags, or is loaded already. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, fem, first_step=0.25, tolerance=1e-3, progress=None):
-        """first_step, tolerance, progress: of each stage, as for `QuasiStatic.solve`."""
+    def __init__(
+        self,
+        fem: QuasiStatic,
+        first_step: float = 0.25,
+        tolerance: float = 1e-3,
+        progress: Callable[[LoadStep], Any] | None = None,
+    ) -> None:
         comm = fem.domain.comm
         agree(comm, None if fem.cell_tags is not None else "fem: it has no cell_tags, by which stages know soils")
         fresh = fem.load == Load() and not fem.off
         agree(comm, None if fresh else "fem: it is loaded already, expected a new one, whose soils the stages place")
-        self.fem, self.number = fem, 0
-        self._options = {"first_step": first_step, "tolerance": tolerance, "progress": progress}
+        self.fem = fem
+        """The finite elements"""
+        self.number = 0
+        """Number of the last stage, from 1 on; 0 before the first one"""
+        self._options: dict[str, Any] = {"first_step": first_step, "tolerance": tolerance, "progress": progress}
         self.state = SiteState(
             comm,
             lambda given, argument: tag_numbers(comm, fem.cell_tags, given, argument, "cell"),
@@ -34,14 +56,25 @@ class FemSite:
             name_of=lambda tag: label(fem.cell_tags, tag),
             supports=fem.supports,
         )
+        """Which soils have been placed, their weights, loads and supports"""
         switch_off(fem)
         self._every = set(known_tags(comm, fem.cell_tags))
 
-    def carry_out(self, stage):
-        """Bring the body to equilibrium after a stage's changes. Returns a StageReport. Collective.
+    def carry_out(self, stage: Stage) -> StageReport:
+        """Bring the body to equilibrium after a stage's changes.
 
-        Raises InputError, on all ranks, for a stage with an unknown soil or boundary, before anything is changed;
-        StageError where there is no equilibrium.
+        Args:
+            stage: the changes.
+
+        Returns:
+            Report of the stage.
+
+        Raises:
+            InputError: the stage has an unknown soil or boundary; nothing has been changed. Raised on all ranks alike.
+            StageError: there is no equilibrium.
+
+        Note:
+            Collective.
         """
         fem = self.fem
         state, _, _ = self.state.after(stage)
@@ -60,8 +93,12 @@ class FemSite:
         iterations = sum(step.report.iterations for step in steps)
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
 
-    def largest_displacement(self):
-        """Largest displacement of a node of the present soil, since displacements count [m]. Collective."""
+    def largest_displacement(self) -> float:
+        """Largest displacement of a node of the present soil, since displacements count [m].
+
+        Note:
+            Collective.
+        """
         size = np.linalg.norm(self.fem.displacement.x.array.reshape(-1, self.fem.domain.geometry.dim), axis=1)
         points, space = self.fem.points, self.fem.displacement.function_space
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()

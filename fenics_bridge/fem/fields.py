@@ -1,9 +1,12 @@
 """Strain and stress as vectors of components, in the order of `mpm_core`.
 
-Two dimensions: xx yy zz xy, with zz across the plane, which is the hoop direction of an axisymmetric body; three: xx yy zz xy yz xz; engineering shear; tension positive.
+Two dimensions: xx yy zz xy, with zz across the plane, which is the hoop direction of an axisymmetric body; three: xx yy zz xy yz
+xz; engineering shear; tension positive.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import ufl
@@ -78,10 +81,20 @@ def force_on(space, forces, facets):
     return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))
 
 
-def nodal_average(function, radius=None):
-    """Continuous, piecewise linear function whose nodal values average those of the cells around, by volume.
+def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
+    """Average a function at the nodes, by the volume of the cells around each of them.
 
-    (The lumped L2 projection; it smooths stresses that jump between cells.) radius: as for `strain`. Collective.
+    (The lumped L2 projection; it smooths stresses that jump between cells.)
+
+    Args:
+        function: vector function on a mesh.
+        radius: radius of an axisymmetric body, a UFL expression; None in others.
+
+    Returns:
+        Continuous, piecewise linear function.
+
+    Note:
+        Collective.
     """
     domain = function.function_space.mesh
     size = function.ufl_shape[0]

@@ -1,8 +1,8 @@
 """The geometries of a body of two dimensions: plane strain, or a half section of an axisymmetric body.
 
-In an axisymmetric body the first coordinate is the radius r from the axis and the second one runs along the axis; the components of
-stress and strain are rr, yy, theta theta, ry. Volumes, forces and energies are those of one radian: times 2 pi they are those of the
-whole body.
+In an axisymmetric body the first coordinate is the radius r from the axis and the second one runs along the axis; the components
+of stress and strain are rr, yy, theta theta, ry. Volumes, forces and energies are those of one radian: times 2 pi they are those
+of the whole body.
 """
 
 from __future__ import annotations

@@ -2,44 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError
+from fenics_bridge.types import OfPosition
+
+Surface = ArrayLike | OfPosition
+"""Height of the ground: a number [m], a polyline (k, 2) of points (x, y) [m], or a function of horizontal coordinates."""
 
 
-def k0_elastic(poisson):
-    """K0 of an elastic body without lateral strain, nu / (1 - nu)."""
+def k0_elastic(poisson: float) -> float:
+    """K0 of an elastic body without lateral strain, nu / (1 - nu).
+
+    Args:
+        poisson: Poisson's ratio [-].
+
+    Raises:
+        InputError: poisson is not in [0, 0.5).
+    """
     if not 0 <= poisson < 0.5:
         raise InputError(f"poisson: got {poisson!r}, expected at least 0 and below 0.5")
     return poisson / (1 - poisson)
 
 
-def k0_jaky(friction_angle):
-    """K0 of normally consolidated soil, 1 - sin(phi) (Jaky 1944). friction_angle: [degrees]"""
+def k0_jaky(friction_angle: float) -> float:
+    """K0 of normally consolidated soil, 1 - sin(phi) (Jaky 1944).
+
+    Args:
+        friction_angle: friction angle [degrees].
+
+    Raises:
+        InputError: friction_angle is not in [0, 90).
+    """
     if not 0 <= friction_angle < 90:
         raise InputError(f"friction_angle: got {friction_angle!r} degrees, expected at least 0 and below 90")
     return 1 - np.sin(np.radians(friction_angle))
 
 
-def k0_stress(points, surface, unit_weight, k0):
+def k0_stress(points: ArrayLike, surface: Surface, unit_weight: float, k0: float) -> NDArray[np.float64]:
     """Stress of uniform ground at rest: the weight above a point, and K0 times it on both horizontal axes.
 
-    In an axisymmetric body these are the radius and the hoop.
+    In an axisymmetric body these are the radius and the hoop. Exact for level ground; under a sloping surface it is a first
+    estimate that a solver then brings to equilibrium.
 
-    Exact for level ground; under a sloping surface it is a first estimate that a solver then brings to equilibrium.
-    points: (n, D) [m]; the last axis points up
-    surface: height of the ground, as a number [m], as a polyline (k, 2) of points (x, y) with x rising [m]
-        (beyond its ends the ground goes on level), or as a function of the horizontal coordinates (n, D - 1)
-    unit_weight: [N/m3]; k0: ratio of horizontal to vertical stress
-    Returns (n, S) [Pa], tension positive; zero above the surface.
+    Args:
+        points: positions [m], shape (n, D); the last axis points up.
+        surface: height of the ground, as a number [m], as a polyline (k, 2) of points (x, y) with x rising [m] (beyond its ends
+            the ground goes on level), or as a function of the horizontal coordinates [m], of shape (n,) in two dimensions and
+            (n, 2) in three.
+        unit_weight: unit weight of the soil [N/m3].
+        k0: ratio of horizontal to vertical stress [-].
+
+    Returns:
+        Stress [Pa], shape (n, S), tension positive; zero above the surface.
+
+    Raises:
+        InputError: points or surface of another shape, or values out of range.
     """
     return k0_layered_stress(points, surface, [(-np.inf, unit_weight, k0)])
 
 
-def k0_layered_stress(points, surface, layers):
-    """The same as `k0_stress` for ground in level layers.
+def k0_layered_stress(
+    points: ArrayLike, surface: Surface, layers: Sequence[tuple[float, float, float]]
+) -> NDArray[np.float64]:
+    """Stress of ground at rest in level layers; see `k0_stress`.
 
-    layers: (bottom [m], unit_weight [N/m3], k0) of each, from the top down; the last one should reach below all points
+    Args:
+        points: positions [m], shape (n, D); the last axis points up.
+        surface: height of the ground, as for `k0_stress`.
+        layers: bottom [m], unit weight [N/m3] and K0 of each, from the top down; the last one should reach below all points.
+
+    Returns:
+        Stress [Pa], shape (n, S), tension positive; zero above the surface.
+
+    Raises:
+        InputError: points, surface or layers of another shape, layers in another order, or values out of range.
     """
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):

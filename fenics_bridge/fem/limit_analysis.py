@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
 
@@ -14,23 +15,33 @@ from fenics_bridge.errors import InputError
 class LogSpiral:
     """Rotational mechanism through the toe of a slope: the soil above a logarithmic spiral rotates about its pole.
 
-    unit_weight: at collapse [N/m3]; pole: (2,) [m]; curve: (k, 2) [m], the slip surface from the crest to the toe;
-    coordinates as in `slope_mesh`, with the shoulder of the slope at (crest, height)
+    Coordinates are those of `slope_mesh`, with the shoulder of the slope at (crest, height).
     """
 
     unit_weight: float
-    pole: np.ndarray
-    curve: np.ndarray
+    """Unit weight at collapse [N/m3]"""
+    pole: NDArray[np.float64]
+    """Pole of the rotation [m], shape (2,)"""
+    curve: NDArray[np.float64]
+    """Slip surface from the crest to the toe [m], shape (k, 2)"""
 
 
-def log_spiral(height, angle, cohesion, friction_angle, crest=0.0):
+def log_spiral(height: float, angle: float, cohesion: float, friction_angle: float, crest: float = 0.0) -> LogSpiral:
     """Least upper bound of the collapse load over all spirals through the toe, with associated flow.
 
     Equates the work of the weight with the dissipation along the spiral (Chen 1975, Limit Analysis and Soil Plasticity,
     ch. 9). On flat slopes with little friction the best spiral dips below the level of the toe before it rises to it: the
     ground there is taken as the same soil. `curve` of the result shows its depth.
-    height, crest: [m]; angle: of the slope, friction_angle: [degrees], angle > friction_angle; cohesion: [Pa]
-    Returns a LogSpiral.
+
+    Args:
+        height: height of the slope [m].
+        angle: angle of the slope [degrees], above the friction angle.
+        cohesion: cohesion of the soil [Pa].
+        friction_angle: friction angle of the soil [degrees].
+        crest: horizontal coordinate of the shoulder [m].
+
+    Raises:
+        InputError: angles or lengths out of range.
     """
     if not 0 <= friction_angle < angle <= 90:
         raise InputError(
@@ -48,8 +59,19 @@ def log_spiral(height, angle, cohesion, friction_angle, crest=0.0):
     return LogSpiral(cohesion * dissipation / (moment * size), pole, pole + size * spiral)
 
 
-def log_spiral_safety(height, angle, cohesion, friction_angle, unit_weight):
-    """Factor of safety of a slope by the same mechanism: the strength divided by it just fails at the unit weight."""
+def log_spiral_safety(height: float, angle: float, cohesion: float, friction_angle: float, unit_weight: float) -> float:
+    """Factor of safety of a slope by the mechanism of `log_spiral`: the strength divided by it just fails at the unit weight.
+
+    Args:
+        height: height of the slope [m].
+        angle: angle of the slope [degrees].
+        cohesion: cohesion of the soil [Pa].
+        friction_angle: friction angle of the soil [degrees].
+        unit_weight: unit weight of the soil [N/m3].
+
+    Raises:
+        InputError: angles or lengths out of range.
+    """
     low, high = 1e-2, 1e2
     for _ in range(24):
         factor = math.sqrt(low * high)

@@ -4,38 +4,58 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from mpm_core.step_control import StepControl
 
 from fenics_bridge.fem.equilibration import EquilibriumReport
+from fenics_bridge.fem.loads import Load
 
 _MOST_STEPS = 1000
 
 
 class LoadStep(NamedTuple):
-    """One attempted step. value: what was changed, at the end of the step; report: its EquilibriumReport."""
+    """One attempted load step."""
 
     number: int
+    """Number of the step, from 1 on"""
     value: float
+    """What was changed, such as the load factor, at the end of the step"""
     size: float
+    """By how much it was changed"""
     report: EquilibriumReport
+    """How the equilibrium was found, or why there is none"""
 
     @property
-    def converged(self):
+    def converged(self) -> bool:
+        """Whether the step ended in equilibrium."""
         return self.report.converged
 
 
-def advance(equilibrate, start, end, first_step, tolerance, progress=None):
+def advance(
+    equilibrate: Callable[[float], EquilibriumReport],
+    start: float,
+    end: float,
+    first_step: float,
+    tolerance: float,
+    progress: Callable[[LoadStep], Any] | None = None,
+) -> list[LoadStep]:
     """Increase a value from `start` towards `end` in equilibrium, until the end is reached or no further step succeeds.
 
-    equilibrate: function of the value that returns an EquilibriumReport
-    first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without
-        equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
-    tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end
-    progress: called with each LoadStep, or None. Returns all steps; the last converged one is the last equilibrium.
+    Args:
+        equilibrate: function of the value that returns an EquilibriumReport.
+        start: value at the start, in equilibrium.
+        end: value to reach; infinite to go on up to failure.
+        first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without
+            equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
+        tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end.
+        progress: function that is called with each load step.
+
+    Returns:
+        All steps; the last converged one is the last equilibrium.
     """
     steps: list[LoadStep] = []
     value, easy, failed_at, undecided = start, 0, math.inf, False
@@ -77,8 +97,14 @@ def _below_failure(value, failed_at, carried):
     return float(np.clip(np.nan_to_num(carried, nan=1.0) * failed_at - value, 0.1 * gap, 0.5 * gap))
 
 
-def print_step(step):
-    """Progress line, from rank 0: number of the step, value, size, linear systems solved, last residual, outcome."""
+def print_step(step: LoadStep) -> None:
+    """Print a line on a load step to standard error, from rank 0.
+
+    It gives the number of the step, the value and its change, the linear systems solved, the last residual, and the outcome.
+
+    Args:
+        step: the load step.
+    """
     if MPI.COMM_WORLD.rank != 0:
         return
     report = step.report
@@ -94,10 +120,12 @@ def print_step(step):
     )
 
 
-def raise_load(model, load, first_step, tolerance, progress):
+def raise_load(
+    model: Any, load: Load, first_step: float, tolerance: float, progress: Callable[[LoadStep], Any] | None
+) -> list[LoadStep]:
     """Raise the load of a model from its present one to the given one, by `advance` over the fraction of the way.
 
-    Sets `converged` of the model to whether the load was reached. Returns a list of LoadStep. Collective.
+    Sets `converged` of the model to whether the load was reached. Collective.
     """
     start = model.load
     steps = advance(

@@ -18,21 +18,24 @@ from fenics_bridge.mesh.names import by_number, tag_numbers
 
 @dataclass(frozen=True)
 class Load:
-    """Loads on the body at the end of a stage.
+    """Loads on the body at the end of a stage."""
 
-    unit_weight: [N/m3], against the last axis; or {cell tag: unit weight}, cells of other tags having none
-    pressure: [Pa] by facet tag, a tag being a number or a name, compression positive, along the normal of the undeformed boundary
-    displacement: fraction of the displacements that the supports prescribe [-], for `prescribed` supports
-    held: fraction of the forces that were out of balance when the present stage began and are still held [-], see `Stage`
-    """
-
-    unit_weight: float | dict = 0.0
-    pressure: dict = field(default_factory=dict)
+    unit_weight: float | dict[int | str | None, float] = 0.0
+    """Unit weight [N/m3], against the last axis; or by cell tag or name, where cells of other tags have none"""
+    pressure: dict[int | str, float] = field(default_factory=dict)
+    """Pressure [Pa] by facet tag or name, compression positive, along the normal of the undeformed boundary"""
     displacement: float = 0.0
+    """Fraction of the displacements that the supports prescribe [-], for `prescribed` supports"""
     held: float = 0.0
+    """Fraction of the forces that were out of balance when the present stage began and are still held [-], see `Stage`"""
 
-    def towards(self, other, fraction):
-        """The load at a fraction (0 to 1) of the way from this one to another."""
+    def towards(self, other: Load, fraction: float) -> Load:
+        """The load at a fraction of the way from this one to another.
+
+        Args:
+            other: load at the end of the way.
+            fraction: from 0, this load, to 1, the other one [-].
+        """
 
         def between(a, b):
             return a + fraction * (b - a)

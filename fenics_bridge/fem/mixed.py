@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.equilibration import Solver, find_equilibrium
+from fenics_bridge.fem.equilibration import EquilibriumReport, Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import dilation, force_on, part_of
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, weighted
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
-from fenics_bridge.fem.load_steps import raise_load
+from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.supports import Constraints, tagged_facets
+from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
+from fenics_bridge.types import MeshTags
+from mpm_core import Geometry
 
 
 class MixedQuasiStatic:
@@ -30,49 +36,91 @@ class MixedQuasiStatic:
 
     The law gives the deviatoric stress of the deviatoric strain; the pressure p = -K div u is an unknown of its own. That
     is exact for laws whose deviatoric stress does not depend on the mean stress: elastic, or of friction angle zero.
-    load: the Load in equilibrium; points: QuadraturePoints, whose stress is the deviatoric one
-    converged: whether the last call reached its load
-    Has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
+    It has the methods of `QuasiStatic` that `collapse_load` uses, so that it finds the collapse load of both.
+
+    Args:
+        domain: mesh of the body.
+        law: LinearElastic, or MohrCoulomb with a friction angle of 0 and no tension cut-off.
+        facet_tags: tags of the boundary.
+        supports: boundary conditions from `fixed`, `roller` and `prescribed`.
+        options_prefix: prefix of the PETSc options of the linear solver.
+        solver: tolerances, as for `QuasiStatic`.
+        geometry: as for `QuasiStatic`.
+
+    Raises:
+        InputError: another law, an unknown tag, or a geometry that does not go with the mesh. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, domain, law, facet_tags, supports, options_prefix="mixed_", solver=None, geometry=None):
-        """
-        law: of `mpm_core`, LinearElastic, or MohrCoulomb with a friction angle of 0 and no tension cut-off
-        facet_tags, supports: as for `solve_elastic`; options_prefix: of the PETSc options of the linear solver
-        solver, geometry: as for `QuasiStatic`
-        Raises InputError, on all ranks, for bad arguments. Collective.
-        """
+    def __init__(
+        self,
+        domain: Mesh,
+        law: mpm.LinearElastic | mpm.MohrCoulomb,
+        facet_tags: MeshTags,
+        supports: Sequence[Support],
+        options_prefix: str = "mixed_",
+        solver: Solver | None = None,
+        geometry: Geometry | None = None,
+    ) -> None:
         agree(domain.comm, _first_mistake(law))
         self.geometry = geometry_of(domain, geometry)
+        """Plane strain, axial symmetry or a solid"""
         radius = radius_of(domain, self.geometry)
         space = compat.displacement_pressure_space(domain, 2)
-        self.domain, self.law = domain, law
+        self.domain = domain
+        """Mesh of the body"""
+        self.law = law
+        """The law in force"""
         constraints = Constraints(space.sub(0), facet_tags, supports)
         require_axis_held(space.sub(0), self.geometry, constraints)
         self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0], radius=radius)
         number = Materials(domain, law, None).number
         self.points = QuadraturePoints(domain, [law], number, 2, radius is not None)
-        self.load, self.converged = Load(), False
+        """Quadrature points, whose stress is the deviatoric one"""
+        self.load = Load()
+        """The load in equilibrium"""
+        self.converged = False
+        """Whether the last call reached its load"""
         unknowns = fem.Function(space), fem.Function(space)
         self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law, self.geometry)
         linear = LinearSolver(space, options_prefix, newton=True)
         self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
         self.solver = solver or Solver()
+        """Tolerances of the solution"""
         self._facet_tags = facet_tags
         self._displacements = space.sub(0).collapse()
 
     @property
-    def displacement(self):
+    def displacement(self) -> fem.Function:
         """Total displacement as a function [m]."""
         return part_of(self._body.solution, self._displacements, "displacement")
 
     @property
-    def increment(self):
+    def increment(self) -> fem.Function:
         """Displacement of the last step [m]."""
         return part_of(self._body.increment, self._displacements, "increment")
 
-    def equilibrate(self, load, law=None, **options):
-        """Find the equilibrium under a load, with a law, in one step; as `QuasiStatic.equilibrate`. Collective."""
+    def equilibrate(
+        self, load: Load, law: mpm.LinearElastic | mpm.MohrCoulomb | None = None, **options: Any
+    ) -> EquilibriumReport:
+        """Find the equilibrium under a load, with a law, in one step; without equilibrium nothing changes.
+
+        Args:
+            load: load at the end of the step.
+            law: law from now on; by default the one in force.
+            **options: attributes of `Solver`, in place of those of `solver`.
+
+        Returns:
+            Report of the solution.
+
+        Raises:
+            InputError: a law or load that is not possible. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
         forces = self._loads.forces(load), self._loads.forces(self.load)
@@ -82,27 +130,82 @@ class MixedQuasiStatic:
             self.load, self.law = load, law
         return report
 
-    def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
-        """Raise the load from the present one to the given one; as `QuasiStatic.solve`. Collective."""
+    def solve(
+        self,
+        load: Load,
+        first_step: float = 0.25,
+        tolerance: float = 1e-3,
+        progress: Callable[[LoadStep], Any] | None = None,
+    ) -> list[LoadStep]:
+        """Raise the load from the present one to the given one, in steps that adapt; as `QuasiStatic.solve`.
+
+        Args:
+            load: load at the end.
+            first_step: first step as a fraction of the way [-].
+            tolerance: fraction of the way below which steps end [-].
+            progress: function that is called with each load step, e.g. `print_step`.
+
+        Returns:
+            All steps. `converged` says whether the load was reached; if not, `load` is the last one in equilibrium.
+
+        Note:
+            Collective.
+        """
         return raise_load(self, load, first_step, tolerance, progress)
 
-    def reaction(self, facet_tag):
-        """Force of the body on its support at the facets of a tag: (D,) [N] ([N/m] in plane strain, [N] per radian). Collective."""
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """Force of the body on its support at the facets of a tag, summed over them.
+
+        Args:
+            facet_tag: number or name of the tag.
+
+        Returns:
+            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         facets = tagged_facets(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
         space, dofs = self._displacements
         return force_on(space, forces[dofs], facets)
 
-    def pressure_at(self, points):
-        """Pressure at points (n, D) on any rank, compression positive: (n,) [Pa]. Collective."""
+    def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Pressure at points, whichever ranks have the points and their cells; compression positive.
+
+        Args:
+            points: positions [m], shape (n, D).
+
+        Returns:
+            Pressure [Pa], shape (n,).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         pressure = self._body.solution.sub(1).collapse()
         return self._kinematics.scale * evaluate_at(points, pressure=pressure)["pressure"][:, 0]
 
-    def evaluate_at(self, points):
-        """Dictionary of `displacement` (n, D) [m] at points on any rank.
+    def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Values at points, whichever ranks have the points and their cells.
 
-        Raises InputError, on all ranks, naming a point outside the body. Collective.
+        Args:
+            points: positions [m], shape (n, D).
+
+        Returns:
+            `displacement` [m], shape (n, D).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return evaluate_at(points, displacement=self.displacement)
 

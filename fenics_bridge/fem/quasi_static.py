@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from mpm_core.parameter_fields import Field
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.active_cells import reconfigure
 from fenics_bridge.fem.averaged import AveragedKinematics
-from fenics_bridge.fem.equilibration import Solver, find_equilibrium
+from fenics_bridge.fem.equilibration import EquilibriumReport, Solver, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.failure import explained
@@ -19,55 +24,80 @@ from fenics_bridge.fem.fields import force_on, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
-from fenics_bridge.fem.load_steps import raise_load
+from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.supports import Constraints, tagged_facets
+from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
 from fenics_bridge.mesh.names import known_tags
+from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
+from mpm_core import Geometry
 
 
 class QuasiStatic:
-    """Small-strain equilibrium of a body of one or several materials, plane strain or 3D, loaded in stages.
+    """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
-    displacement: function [m], total; load: the Load in equilibrium; law: the law, or laws, in force
-    points: QuadraturePoints with stress and state; converged: whether the last call reached its load
     Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium.
+
+    Args:
+        domain: mesh of the body.
+        law: law of `mpm_core`, or laws by cell tag or name.
+        facet_tags: tags of the boundary.
+        supports: boundary conditions from `fixed`, `roller` and `prescribed`; enough of them to prevent rigid-body motion.
+        degree: degree of the displacement, 1 or 2.
+        nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1.
+        options_prefix: prefix of the PETSc options of the linear solver.
+        cell_tags: tags of the cells; needed where laws or unit weights are given by cell tag.
+        solver: tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice.
+        geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose nodes on the axis need a roller; by
+            default plane strain in two dimensions.
+
+    Raises:
+        InputError: an unknown tag, cells without a law, or another argument out of range. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
     def __init__(
         self,
-        domain,
-        law,
-        facet_tags,
-        supports,
-        degree=2,
-        nmd=False,
-        options_prefix="fem_",
-        cell_tags=None,
-        solver=None,
-        geometry=None,
-    ):
-        """
-        law: of `mpm_core`, or {cell tag: law}; facet_tags, supports: as for `solve_elastic`
-        degree: 1 or 2 of the displacement
-        nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1
-        options_prefix: of the PETSc options of the linear solver
-        cell_tags: of the domain; needed where laws or unit weights are given by cell tag
-        solver: the Solver, with tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice
-        geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose nodes on the axis need a roller
-        Raises InputError, on all ranks, for bad arguments. Collective.
-        """
+        domain: Mesh,
+        law: Laws,
+        facet_tags: MeshTags,
+        supports: Sequence[Support],
+        degree: int = 2,
+        nmd: bool = False,
+        options_prefix: str = "fem_",
+        cell_tags: MeshTags | None = None,
+        solver: Solver | None = None,
+        geometry: Geometry | None = None,
+    ) -> None:
         self.geometry = geometry_of(domain, geometry)
+        """Plane strain, axial symmetry or a solid"""
         self.radius = radius_of(domain, self.geometry)
+        """Radius of an axisymmetric body, a UFL expression; None in others"""
         agree(domain.comm, None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2")
         agree(domain.comm, f"nmd: averages strains of degree=1, got degree={degree}" if nmd and degree != 1 else None)
         space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
-        self.domain, self.law, self.facet_tags, self.degree = domain, law, facet_tags, degree
+        self.domain = domain
+        """Mesh of the body"""
+        self.law = law
+        """The law, or laws by cell tag, in force"""
+        self.facet_tags = facet_tags
+        """Tags of the boundary"""
+        self.degree = degree
+        """Degree of the displacement"""
         self.displacement = fem.Function(space, name="displacement")
+        """Total displacement [m]"""
         self.increment = fem.Function(space, name="increment")
-        self.cell_tags, self.supports, self.off = cell_tags, tuple(supports), ()
+        """Displacement of the last step [m]"""
+        self.cell_tags = cell_tags
+        """Tags of the cells"""
+        self.supports: tuple[Support, ...] = tuple(supports)
+        """The boundary conditions in force"""
+        self.off: Sequence[int] = ()
+        """Tags of the cells that are inactive"""
         self._nmd, self._options_prefix = nmd, options_prefix
         constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
@@ -75,7 +105,13 @@ class QuasiStatic:
         quadrature = max(1, 2 * (degree - 1))
         axisymmetric = self.radius is not None
         self.points = QuadraturePoints(domain, self.laws, self._materials.number, quadrature, axisymmetric)
-        self.load, self.converged, self.solver = Load(), False, solver or Solver()
+        """Quadrature points, with stress and state"""
+        self.load = Load()
+        """The load in equilibrium"""
+        self.converged = False
+        """Whether the last call reached its load"""
+        self.solver = solver or Solver()
+        """Tolerances of the solution"""
         self._assemble(constraints)
 
     def _assemble(self, constraints):
@@ -86,33 +122,51 @@ class QuasiStatic:
         linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
-    def reconfigure(self, off=(), supports=None, pore_pressure=None, stress=None, law=None):
+    def reconfigure(
+        self,
+        off: Sequence[int | str] = (),
+        supports: Sequence[Support] | None = None,
+        pore_pressure: OfPosition | None = None,
+        stress: OfPosition | None = None,
+        law: Laws | None = None,
+    ) -> None:
         """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces.
 
         For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
         active start without stress and state, or with the given stress. Afterwards `load.held` is 1, and the body is
         in equilibrium; `solve` to a load with `held` 0, as every new Load has, releases the forces in steps.
 
-        off: cell tags or names; supports: as for the constructor, None for the present ones, where they are now
-        pore_pressure: function of positions (n, D) that returns pore pressures (n,) [Pa], or None for none
-        stress: function of positions that returns stresses (n, S) [Pa] of the cells that become active
-        law: law, or laws by cell tag, from now on; where the law changes, its state is reset
-        Collective.
+        Args:
+            off: cell tags or names of the soils that are not there.
+            supports: boundary conditions, as for the constructor; None for the present ones, where they are now.
+            pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa], or None for none.
+            stress: function of positions (n, D) [m] that returns the stresses (n, S) [Pa] of the cells that become active.
+            law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
+
+        Raises:
+            InputError: an unknown tag, or values of another shape or not finite. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         reconfigure(self, off, supports, pore_pressure, stress, law)
 
     @property
-    def laws(self):
-        """The laws in force as a list, in the order in which they were given. Collective."""
+    def laws(self) -> list[Law]:
+        """The laws in force, in the order in which they were given. Collective."""
         return self._materials.laws(self.law)
 
     @property
-    def soils(self):
+    def soils(self) -> tuple[int | None, ...]:
         """The cell tags that the laws are given for, in the order of `laws`; (None,) for one law of the whole body."""
         return self._materials.tags
 
-    def law_by_tag(self):
-        """The laws in force as {cell tag: law}; where one law holds for the whole body, for each tag of its cells. Collective."""
+    def law_by_tag(self) -> dict[Any, Law]:
+        """The laws in force by cell tag; where one law holds for the whole body, it is given for each tag of its cells.
+
+        Note:
+            Collective.
+        """
         laws, tags = self.laws, self.soils
         if tags == (None,):
             tags = tuple(known_tags(self.domain.comm, self.cell_tags))
@@ -120,14 +174,24 @@ class QuasiStatic:
         return dict(zip(tags, laws))
 
     @property
-    def linear_iterations(self):
-        """Krylov iterations of each linear system so far, a list; a direct solver takes one."""
+    def linear_iterations(self) -> list[int]:
+        """Krylov iterations of each linear system so far; a direct solver takes one."""
         return self._body.solver.iterations
 
-    def set_initial_stress(self, stress, load):
-        """Start from a given stress (n, S) [Pa] at `points.coordinates()`, meant for the given load, undeformed.
+    def set_initial_stress(self, stress: ArrayLike, load: Load) -> None:
+        """Start from a given stress, meant for the given load, undeformed.
 
         Call `equilibrate(load)` afterwards, which moves the body by the out-of-balance part of the stress.
+
+        Args:
+            stress: stress [Pa] at `points.coordinates()`, shape (n, S), tension positive.
+            load: load that the stress is meant for.
+
+        Raises:
+            InputError: stress has another shape or a value that is not finite. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         shape = self.points.stress.shape
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
@@ -137,30 +201,52 @@ class QuasiStatic:
         self.displacement.x.array[:] = 0.0
         self.load = load
 
-    def set_parameter(self, name, values):
+    def set_parameter(self, name: str, values: Field | dict[int | str, float]) -> None:
         """Give the points their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
 
-        name: such as "cohesion"; values: a number, (n,) at `points.coordinates()`, a function of positions (n, D) that
-        returns (n,), e.g. `mpm_core.RandomField`, or {cell tag or name: number}
-        Where the law of a point changes, the point keeps its values. They go to the particles at the
-        hand-over. Raises InputError, on all ranks, for a parameter that varies in no law or values out of its range.
-        Collective.
+        Where the law of a point changes, the point keeps its values. They go to the particles at the hand-over.
+
+        Args:
+            name: name of the parameter, such as "cohesion".
+            values: a number, an array (n,) at `points.coordinates()`, a function of positions (n, D) [m] that returns (n,), e.g.
+                `mpm_core.RandomField`, or numbers by cell tag or name; in the unit of the parameter.
+
+        Raises:
+            InputError: a parameter that varies in no law, or values out of its range. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         set_parameter(self, name, values)
 
-    def reset_displacement(self):
+    def reset_displacement(self) -> None:
         """Reset displacements to zero; the stress stays."""
         self.displacement.x.array[:] = 0.0
         self._body.constraints.origin[:] = 0.0
         self.load = replace(self.load, displacement=0.0)
 
-    def equilibrate(self, load, law=None, duration=np.inf, **options):
-        """Find the equilibrium under a load, with a law (or laws by cell tag), in one step. Returns EquilibriumReport.
+    def equilibrate(
+        self, load: Load, law: Laws | None = None, duration: float = np.inf, **options: Any
+    ) -> EquilibriumReport:
+        """Find the equilibrium under a load, with a law or laws, in one step; without equilibrium nothing changes.
 
         Newton's method is tried first. If it does not converge, the body relaxes with a viscosity until it rests or
         flows (`relaxation`).
-        duration: of the step [s], for laws that depend on rate; by default infinitely slow
-        Without equilibrium nothing changes. options: of `Solver`, in place of those of `solver`. Collective.
+
+        Args:
+            load: load at the end of the step.
+            law: law, or laws by cell tag, from now on; by default those in force.
+            duration: duration of the step [s], for laws that depend on rate; by default infinitely slow.
+            **options: attributes of `Solver`, in place of those of `solver`.
+
+        Returns:
+            Report of the solution.
+
+        Raises:
+            InputError: a load or laws that are not possible, or an unknown tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)
@@ -175,51 +261,99 @@ class QuasiStatic:
             return report
         return replace(report, reason=explained(self, report.reason, load))
 
-    def solve(self, load, first_step=0.25, tolerance=1e-3, progress=None):
-        """Raise the load from the present one to the given one, in steps that adapt. Returns a list of LoadStep.
+    def solve(
+        self,
+        load: Load,
+        first_step: float = 0.25,
+        tolerance: float = 1e-3,
+        progress: Callable[[LoadStep], Any] | None = None,
+    ) -> list[LoadStep]:
+        """Raise the load from the present one to the given one, in steps that adapt.
 
-        first_step: fraction of the way [-]; tolerance, progress: as for `advance`, e.g. progress=print_step
-        `converged` says whether the load was reached; if not, `load` is the last one in equilibrium. Collective.
+        Two easy steps in a row double the step, a step without equilibrium halves it.
+
+        Args:
+            load: load at the end.
+            first_step: first step as a fraction of the way [-].
+            tolerance: fraction of the way below which steps end [-].
+            progress: function that is called with each load step, e.g. `print_step`.
+
+        Returns:
+            All steps. `converged` says whether the load was reached; if not, `load` is the last one in equilibrium.
+
+        Raises:
+            InputError: an unknown tag, or a load that is not finite. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
 
-    def reaction(self, facet_tag):
-        """Force of the body on its support at the facets of a tag, summed over them: (D,) [N] ([N/m] in plane strain, [N] per radian in
-        an axisymmetric body).
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """Force of the body on its support at the facets of a tag, summed over them.
 
-        Collective.
+        Args:
+            facet_tag: number or name of the tag.
+
+        Returns:
+            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         facets = tagged_facets(self.domain.comm, self.facet_tags, facet_tag, "facet_tag")
         return force_on(self.displacement.function_space, out_of_balance, facets)
 
-    def stress_function(self, smooth=False):
-        """Stress [Pa] as a function that is constant in each cell: the mean of its points.
+    def stress_function(self, smooth: bool = False) -> fem.Function:
+        """The stress as a function.
 
-        smooth: linear in each cell, through its points (degree 2), or averaged at the nodes (degree 1). Collective.
+        Args:
+            smooth: linear in each cell, through its points (degree 2), or averaged at the nodes (degree 1).
+
+        Returns:
+            Stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
+
+        Note:
+            Collective.
         """
         if smooth and self.degree == 2:
             return self.points.cell_function(self.points.stress, "stress", 1)
         mean = self.points.cell_function(self.points.stress, "stress", 0)
         return nodal_average(mean, self.radius) if smooth else mean
 
-    def state_function(self):
+    def state_function(self) -> fem.Function:
         """State variables of the law as a function that is constant in each cell."""
         return self.points.cell_function(self.points.state, "state", 0)
 
-    def deviatoric_strain_function(self):
+    def deviatoric_strain_function(self) -> fem.Function:
         """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
         return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
 
-    def material_function(self):
+    def material_function(self) -> fem.Function:
         """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
         return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)
 
-    def evaluate_at(self, points, smooth=False):
-        """Dictionary of `displacement` (n, D) [m], `stress` (n, S) [Pa], `state` (n, n_state) at points on any rank.
+    def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
+        """Values at points, whichever ranks have the points and their cells.
 
-        The cells' mean stress is admissible; the one with `smooth`, as for `stress_function`, may exceed the strength.
-        Raises InputError, on all ranks, naming a point outside the body. Collective.
+        The cells' mean stress is admissible; the smooth one may exceed the strength.
+
+        Args:
+            points: positions [m], shape (n, D).
+            smooth: as for `stress_function`.
+
+        Returns:
+            `displacement` [m], shape (n, D), `stress` [Pa], shape (n, S), and `state`, shape (n, n_state).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return evaluate_at(
             points, displacement=self.displacement, stress=self.stress_function(smooth), state=self.state_function()

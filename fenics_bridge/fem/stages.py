@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
+from mpm_core.checks import renamed
 
 from fenics_bridge.errors import InputError, agree
-from fenics_bridge.fem.k0 import surface_height
+from fenics_bridge.fem.k0 import Surface, surface_height
+from fenics_bridge.fem.supports import Support
+from fenics_bridge.types import Law, OfPosition
 from mpm_core import _core
-from mpm_core.checks import renamed
+
+if TYPE_CHECKING:
+    from fenics_bridge.fem.fem_site import FemSite
+    from fenics_bridge.transfer.particle_site import ParticleSite
 
 
 @dataclass(frozen=True)
@@ -18,33 +26,32 @@ class Stage:
     """What changes in a stage of construction; everything else stays as it is.
 
     Soils and boundaries are given by name, or by number, as they are in the mesh.
-
-    name: for messages and reports
-    fill: soils that are placed, free of stress at the moment when they are placed
-    excavate: soils that are taken away
-    law: {soil: law} in force from now on; state variables of the soil are reset, its stress stays
-    unit_weight: {soil: [N/m3]} from now on; every soil needs one when it is placed
-    pressure: {boundary: [Pa]} on what is there, compression positive, from now on; 0 takes it away
-    support: supports (`fixed`, `roller`, `prescribed`) that begin to hold, from where the nodes are now
-    release: boundaries whose supports are taken away
-    pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa], e.g. `hydrostatic(2.0)`; None
-        leaves them as they are. Stresses of laws are effective then, unit weights are those of the saturated soil, and
-        water also presses on the surface of the soil where there is pore pressure at it.
-    stress: function of positions that returns the stresses (n, S) [Pa] with which the soils of `fill` come, e.g. by K0
-    reset_displacement: displacements count from the beginning of this stage
     """
 
     name: str
-    fill: tuple = ()
-    excavate: tuple = ()
-    law: dict = field(default_factory=dict)
-    unit_weight: dict = field(default_factory=dict)
-    pressure: dict = field(default_factory=dict)
-    support: tuple = ()
-    release: tuple = ()
-    pore_pressure: Callable | None = None
-    stress: Callable | None = None
+    """For messages and reports"""
+    fill: Any = ()
+    """Soils that are placed, one or several, free of stress at the moment when they are placed"""
+    excavate: Any = ()
+    """Soils that are removed, one or several"""
+    law: dict[int | str, Law] = field(default_factory=dict)
+    """Laws by soil, in force from now on; state variables of the soil are reset, its stress stays"""
+    unit_weight: dict[int | str, float] = field(default_factory=dict)
+    """Unit weights [N/m3] by soil, from now on; every soil needs one when it is placed"""
+    pressure: dict[int | str, float] = field(default_factory=dict)
+    """Pressures [Pa] by boundary on the soil that is there, compression positive, from now on; 0 removes one"""
+    support: Any = ()
+    """Supports (`fixed`, `roller`, `prescribed`), one or several, that begin to hold, from where the nodes are now"""
+    release: Any = ()
+    """Boundaries, one or several, whose supports are removed"""
+    pore_pressure: OfPosition | None = None
+    """Function of positions (n, D) [m] that returns pore pressures (n,) [Pa], e.g. `hydrostatic(2.0)`; None leaves them as they
+    are. Stresses of laws are effective then, unit weights are those of the saturated soil, and water also presses on the surface
+    of the soil where there is pore pressure at it"""
+    stress: OfPosition | None = None
+    """Function of positions (n, D) [m] that returns the stresses (n, S) [Pa] with which the soils of `fill` come, e.g. by K0"""
     reset_displacement: bool = False
+    """Whether displacements count from the beginning of this stage"""
 
     def __post_init__(self):
         for name in ("fill", "excavate", "release", "support"):
@@ -55,48 +62,70 @@ class Stage:
 
 @dataclass(frozen=True)
 class StageReport:
-    """How a stage went.
-
-    number: from 1 on; name: of the stage; steps: steps that were tried; iterations: of Newton's method over all of them
-    largest_displacement: of a node, or of a particle, since displacements count [m]
-    """
+    """How a stage went."""
 
     number: int
+    """Number of the stage, from 1 on"""
     name: str
+    """Name of the stage"""
     steps: int
+    """Steps that were tried"""
     iterations: int
+    """Iterations of Newton's method over all of them"""
     largest_displacement: float
+    """Largest displacement of a node, or of a particle, since displacements count [m]"""
 
 
 class StageError(RuntimeError):
     """A stage has no equilibrium; the message names the stage, the fraction reached, the place and law of failure, and a remedy.
 
-    fraction: of the stage's change that is in equilibrium [-]; the model stays in that state
+    Args:
+        message: the message.
+        fraction: fraction of the stage's change that is in equilibrium [-].
     """
 
-    def __init__(self, message, fraction):
+    def __init__(self, message: str, fraction: float) -> None:
         super().__init__(message)
         self.fraction = fraction
+        """Fraction of the stage's change that is in equilibrium [-]; the model stays in that state"""
 
     share = renamed("share", "fraction")
 
 
-def hydrostatic(level, unit_weight=9.81e3):
-    """Pore pressure of water at rest below a level, zero above it, as a function of positions (n, D).
+def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
+    """Pore pressure of water at rest below a level, zero above it.
 
-    level: height [m], polyline (k, 2) of points (x, y), or function of horizontal coordinates, as in `k0_stress`
-    unit_weight: of water [N/m3]
+    Args:
+        level: height [m], polyline (k, 2) of points (x, y) [m], or function of horizontal coordinates, as for `k0_stress`.
+        unit_weight: unit weight of water [N/m3].
+
+    Returns:
+        Function of positions (n, D) [m] that returns pore pressures (n,) [Pa].
+
+    Raises:
+        InputError: unit_weight is negative or not finite.
     """
     if not (np.isfinite(unit_weight) and unit_weight >= 0):
         raise InputError(f"unit_weight: got {unit_weight!r} N/m3, expected a number from 0 on")
     return lambda x: unit_weight * np.maximum(surface_height(level, x) - x[:, -1], 0.0)
 
 
-def carry_out(site, stages):
-    """Carry out stages one after the other: a generator of StageReports, each when its stage is in equilibrium.
+def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator[StageReport]:
+    """Carry out stages one after the other.
 
-    site: `FemSite` or `ParticleSite`, whatever the stages before have made of it
-    Raises InputError, on all ranks, for a stage that asks for what is not there; StageError for one without equilibrium.
+    Args:
+        site: finite elements or particles, in the state to which earlier stages have brought them.
+        stages: the stages.
+
+    Yields:
+        Report of each stage when it is in equilibrium.
+
+    Raises:
+        InputError: a stage names a soil or boundary that does not exist. Raised on all ranks alike.
+        StageError: a stage has no equilibrium.
+
+    Note:
+        Collective.
 
     Example:
         >>> stages = [
@@ -113,24 +142,54 @@ def carry_out(site, stages):
 class SiteState:
     """What holds at a site beside stresses: which soils are there, their laws and weights, loads, supports, water.
 
-    All by the numbers of tags. `after(stage)` is the state that a stage leads to; it raises InputError, on all ranks.
-    there: soils that are there; law, unit_weight: by soil; pressure: by boundary; supports: {boundary: Support}
+    All by the numbers of tags. `after(stage)` is the state that a stage leads to.
+
+    Args:
+        comm: the ranks that share the site.
+        cells_of: function of a soil (name or number) and of the name of an argument that gives the numbers of its tags, or
+            raises.
+        facets_of: the same for boundaries.
+        name_of: function of a soil's tag that gives its name for messages.
+        supports: boundary conditions at the start.
     """
 
-    def __init__(self, comm, cells_of, facets_of, name_of, supports=()):
-        """cells_of, facets_of: functions of (name or number, argument) that give the numbers of tags, or raise.
-
-        name_of: function of a soil's tag that gives its name for messages
-        """
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        cells_of: Callable[[Any, str], Sequence[int]],
+        facets_of: Callable[[Any, str], Sequence[int]],
+        name_of: Callable[[int], str],
+        supports: Sequence[Support] = (),
+    ) -> None:
         self._comm, self._cells_of, self._facets_of, self._name_of = comm, cells_of, facets_of, name_of
         self.there: tuple[int, ...] = ()
+        """Tags of the soils that are there"""
         self.law: dict = {}
+        """Laws by soil, where stages gave them"""
         self.unit_weight: dict = {}
+        """Unit weights by soil [N/m3]"""
         self.pressure: dict = {}
-        self.supports, self.pore_pressure = tuple(supports), None
+        """Pressures by boundary [Pa]"""
+        self.supports = tuple(supports)
+        """The boundary conditions in force"""
+        self.pore_pressure: OfPosition | None = None
+        """Function of positions that returns pore pressures [Pa]"""
 
-    def after(self, stage):
-        """The state that a stage leads to, and the soils that it places and takes away, as numbers of tags. Collective."""
+    def after(self, stage: Stage) -> tuple[SiteState, tuple[int, ...], tuple[int, ...]]:
+        """The state that a stage leads to.
+
+        Args:
+            stage: the changes.
+
+        Returns:
+            The new state, and the tags of the soils that are placed and of those that are removed.
+
+        Raises:
+            InputError: the stage has an unknown soil or boundary, or a value out of range. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         new = object.__new__(SiteState)
         new.__dict__.update(self.__dict__)
         where = f"stage {stage.name!r}: "

@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError
+from fenics_bridge.types import Laws
 from mpm_core import _core
 
 
-def reduced_strength(law, factor, unreduced=()):
+def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] = ()) -> Laws:
     """The law with its strength divided by a factor: cohesion and tan(friction angle), or what stands for them.
 
-    law: one of `mpm_core`, or {cell tag: law}; unreduced: cell tags of laws that stay as they are
     - MohrCoulomb (and `tresca`): c / F and tan(phi) / F. The dilation angle stays where it can, and is limited to the new
       friction angle: associated flow stays associated.
-    - SofteningMohrCoulomb: peak and residual strength alike. - DruckerPrager: strength and slope of the cone.
+    - SofteningMohrCoulomb: peak and residual strength alike.
+    - DruckerPrager: strength and slope of the cone.
     - CamClay: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
     - ViscoplasticMohrCoulomb: the strength in the limit of slow loading; the viscosity stays.
-    - Heterogeneous: the strength of all points. - Hencky and Undrained: the law that they are made of.
+    - Heterogeneous: the strength of all points.
+    - Hencky and Undrained: the law that they are made of.
     - LinearElastic beside other laws: it has no strength to reduce and stays as it is.
     - Any other (a UMAT, a law written in Python): give `factor_of_safety` a function of law and factor.
-    Raises InputError for a factor that is not positive, and for a law whose strength is not known.
+
+    Args:
+        law: law of `mpm_core`, or laws by cell tag.
+        factor: factor F by which the strength is divided [-].
+        unreduced: cell tags of laws that stay as they are.
+
+    Returns:
+        The reduced law, or laws by cell tag.
+
+    Raises:
+        InputError: the factor is not positive, a tag has no law, no law is left to reduce, or the strength of a law is not known.
     """
     if not (np.isfinite(factor) and factor > 0):
         raise InputError(f"factor: got {factor!r}, expected a positive number")
@@ -38,12 +51,18 @@ def reduced_strength(law, factor, unreduced=()):
     return _core.reduced_strength(law, factor)
 
 
-def davis_strength(law):
+def davis_strength(law: Laws) -> Laws:
     """Mohr-Coulomb law with associated flow and the strength that Davis (1968) gives to soil of less dilation.
 
     c* = b c and tan(phi*) = b tan(phi) with b = cos(psi) cos(phi) / (1 - sin(psi) sin(phi)): collapse loads of the
     associated soil with that strength estimate, mostly from below, those of the soil itself (Tschuchnigg, Schweiger,
-    Sloan 2015, Comput. Geotech. 70, 178-189). law: MohrCoulomb, or {cell tag: law}, of which others stay as they are.
+    Sloan 2015, Comput. Geotech. 70, 178-189).
+
+    Args:
+        law: MohrCoulomb, or laws by cell tag, of which others stay as they are.
+
+    Raises:
+        InputError: law is another one.
     """
     if isinstance(law, dict):
         return {tag: davis_strength(one) if isinstance(one, mpm.MohrCoulomb) else one for tag, one in law.items()}
@@ -55,11 +74,22 @@ def davis_strength(law):
     return _mohr_coulomb(law, law.cohesion / factor, friction, friction)
 
 
-def davis_reduced_strength(law, factor, unreduced=()):
+def davis_reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] = ()) -> Laws:
     """The law with its strength divided by a factor, then by what Davis (1968) has for its flow ("Davis B").
 
     For `factor_of_safety(..., reduce=davis_reduced_strength)`: associated flow, so a factor that is quick to find and does
-    not depend on the mesh. Arguments and errors as for `reduced_strength` and `davis_strength`.
+    not depend on the mesh.
+
+    Args:
+        law: law of `mpm_core`, or laws by cell tag.
+        factor: factor by which the strength is divided [-].
+        unreduced: cell tags of laws that keep their strength; their flow, too, becomes associated by `davis_strength`.
+
+    Returns:
+        The reduced law, or laws by cell tag.
+
+    Raises:
+        InputError: as for `reduced_strength` and `davis_strength`.
     """
     return davis_strength(reduced_strength(law, factor, unreduced))
 

@@ -2,38 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.compat import facet_nodes
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.types import MeshTags
 
 
 @dataclass(frozen=True)
 class Support:
-    """Displacement components prescribed on the facets of one tag; None leaves a component free.
-
-    facet_tag: number, or name, of the tag
-    displacement: (D,) [m] or None for "all zero"
-    """
+    """Boundary condition on the facets of one tag: prescribed components of the displacement."""
 
     facet_tag: int | str
-    displacement: tuple | None = None
+    """Number or name of the tag"""
+    displacement: tuple[float | None, ...] | None = None
+    """Components of the displacement [m], shape (D,), of which None leaves one free; None stands for "all zero\""""
 
 
-def fixed(facet_tag):
-    """No displacement at all."""
+def fixed(facet_tag: int | str) -> Support:
+    """Fixed boundary: no displacement in any direction.
+
+    Args:
+        facet_tag: number or name of the tag of the facets.
+    """
     return Support(facet_tag)
 
 
-def roller(facet_tag, normal):
-    """No displacement along `normal`, which must be an axis, e.g. (1, 0); free to slide across it.
+def roller(facet_tag: int | str, normal: ArrayLike) -> Support:
+    """Roller: no displacement along the normal, free sliding across it.
 
-    (The finite elements hold components of displacements; a roller at an angle to the axes would tie several of them
+    (The finite elements prescribe components of displacements; a roller at an angle to the axes would tie several of them
     together. Particles can have one: `mpm_core.Model.roller`.)
+
+    Args:
+        facet_tag: number or name of the tag of the facets.
+        normal: axis of the normal, shape (D,), e.g. (1, 0).
+
+    Raises:
+        InputError: normal is not an axis.
     """
     normal = np.asarray(normal, dtype=float)
     along = np.flatnonzero(normal)
@@ -45,24 +59,47 @@ def roller(facet_tag, normal):
     return Support(facet_tag, tuple(0.0 if i == along[0] else None for i in range(len(normal))))
 
 
-def prescribed(facet_tag, displacement):
-    """Displacement components [m] on a part of the boundary; None leaves a component free."""
+def prescribed(facet_tag: int | str, displacement: Sequence[float | None]) -> Support:
+    """Prescribed displacement on a part of the boundary.
+
+    Args:
+        facet_tag: number or name of the tag of the facets.
+        displacement: components of the displacement [m], shape (D,); None leaves a component free.
+    """
     return Support(facet_tag, tuple(displacement))
 
 
 class Constraints:
     """The supports of a body on the degrees of freedom of a displacement space.
 
-    `dofs` (k,) int32 local, `values` (k,) [m], both unrolled over components and with ghosts; `bcs` for assembling
-    matrices. Where supports meet, the later one holds. `origin` (k,) [m]: displacement from which the values count.
+    Where supports meet, the later one holds.
+
+    Args:
+        space: space of the displacement, or that part of a mixed space.
+        facet_tags: tags of the boundary.
+        supports: the boundary conditions.
+        held: further dofs (local, blocked) that stay.
+
+    Raises:
+        InputError: an unknown tag, or displacements of another shape or not finite. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, space, facet_tags, supports, held=()):
-        """space: of the displacement, or that part of a mixed space; held: further dofs (local, blocked) that stay."""
+    def __init__(
+        self,
+        space: Any,
+        facet_tags: MeshTags,
+        supports: Sequence[Support],
+        held: Sequence[int] | NDArray[np.int32] = (),
+    ) -> None:
         domain, dim = space.mesh, space.mesh.geometry.dim
         agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
         domain.topology.create_connectivity(dim - 1, dim)
-        value_of, self.bcs = {}, []
+        value_of = {}
+        self.bcs = []
+        """Conditions for the assembly of matrices"""
         for support in supports:
             displacement = support.displacement or (0.0,) * dim
             facets = tagged_facets(domain.comm, facet_tags, support.facet_tag, "supports")
@@ -77,16 +114,34 @@ class Constraints:
             self.bcs.append(fem.dirichletbc(np.zeros(dim), np.asarray(held, dtype=np.int32), space))
             value_of.update(dict.fromkeys((dim * np.asarray(held)[:, None] + np.arange(dim)).ravel().tolist(), 0.0))
         self.dofs = np.fromiter(value_of.keys(), np.int32, len(value_of))
+        """Prescribed dofs, shape (k,), int32 local, unrolled over components and with ghosts"""
         self.values = np.fromiter(value_of.values(), float, len(value_of))
+        """Their displacements [m], shape (k,)"""
         self.origin = np.zeros(len(value_of))
+        """Displacements from which the values count [m], shape (k,)"""
 
-    def at(self, fraction):
+    def at(self, fraction: float) -> NDArray[np.float64]:
         """Displacements (k,) [m] of the dofs at a fraction of the values."""
         return self.origin + fraction * self.values
 
 
-def flat_normal(domain, facet_tags, tag):
-    """The axis, such as (1, 0), to which all facets of a tag are at right angles; None where there is none. Collective."""
+def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[float, ...] | None:
+    """The axis to which all facets of a tag are at right angles.
+
+    Args:
+        domain: mesh of DOLFINx.
+        facet_tags: tags of its facets.
+        tag: number or name of a tag.
+
+    Returns:
+        The axis, such as (1.0, 0.0); None where there is none.
+
+    Raises:
+        InputError: no facet has the tag. Raised on all ranks alike.
+
+    Note:
+        Collective.
+    """
     facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
     corners = domain.geometry.x[facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
     size = np.ptp(domain.geometry.x, axis=0).max() if len(domain.geometry.x) else 0.0

@@ -58,15 +58,15 @@ def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], na
     kind = "a side" if cells.shape[1] == 3 else "a face"
     if on is not None:
         raise InputError(
-            f"{name}: the node at {_place(points[nodes[on]])} lies within {kind} of another cell; cells must meet node to node, or "
-            "the mesh is torn there"
+            f"{name}: the node at {_place(points[nodes[on]])} lies within {kind} of another cell; cells must meet node to node, "
+            "or the mesh is torn there"
         )
     centres = points[facets].mean(axis=1)
     on = _point_on_facet(centres, None, points, facets)
     if on is not None:
         raise InputError(
-            f"{name}: {kind} of a cell overlaps that of another at {_place(centres[on])}; cells must meet node to node, or the mesh "
-            "is torn there"
+            f"{name}: {kind} of a cell overlaps that of another at {_place(centres[on])}; cells must meet node to node, or the "
+            "mesh is torn there"
         )
 
 

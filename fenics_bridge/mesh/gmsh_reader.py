@@ -81,8 +81,8 @@ def _check_written_tags(path):
         for found in re.compile(rb"(?<!\S)-?\d{10,}(?!\S)").finditer(text, max(begin, 0), max(end, 0)):
             if abs(int(found.group())) > LAST_TAG:
                 line = text.count(b"\n", 0, found.start()) + 1
-                raise MeshError(f"line {line} has the number {found.group().decode()} in ${name.decode()}, expected tags from 1 to "
-                                f"{LAST_TAG}")  # fmt: skip
+                raise MeshError(f"line {line} has the number {found.group().decode()} in ${name.decode()}, expected tags from 1 "
+                                f"to {LAST_TAG}")  # fmt: skip
 
 
 def model_arrays(dim):
@@ -133,8 +133,8 @@ def _entities(dim, only_groups=False):
     wrong = [tag for _, tag in groups if not 1 <= tag <= LAST_TAG]
     if wrong:
         raise MeshError(
-            f"a physical group of dimension {dim} has the tag {wrong[0]}, or one that gmsh turned into it; expected tags from 1 to "
-            f"{LAST_TAG}"
+            f"a physical group of dimension {dim} has the tag {wrong[0]}, or one that gmsh turned into it; expected tags from 1 "
+            f"to {LAST_TAG}"
         )
     nodes, values = [np.empty((0, dim + 1), np.int64)], [np.empty(0, np.int32)]
     for entity, tag in blocks:
