@@ -6,36 +6,51 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
 
+import mpm_core as mpm
+from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import require_same_geometry
+from fenics_bridge.fem.quasi_static import QuasiStatic
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference between particles and finite elements in one quantity, relative to the finite elements.
-
-    l2: root of the volume-weighted sum of squares, over that of the finite elements [-]
-    maximum: largest difference over the largest value of the finite elements [-]
-    here: differences at this rank's particles, (n, k), particles minus finite elements
-    """
+    """Difference between particles and finite elements in one quantity, relative to the finite elements."""
 
     l2: float
+    """Root of the volume-weighted sum of squares, over that of the finite elements [-]"""
     maximum: float
-    here: np.ndarray
+    """Largest difference over the largest value of the finite elements [-]"""
+    here: NDArray[np.float64]
+    """Differences at this rank's particles, particles minus finite elements, shape (n, k), in the unit of the quantity"""
 
 
-def compare(fem, model, smooth=False, places=None):
+def compare(
+    fem: QuasiStatic | ElasticSolution, model: mpm.Model, smooth: bool = False, places: ArrayLike | None = None
+) -> dict[str, Difference]:
     """Differences in displacement and stress at the particles' material points.
 
     A particle is compared with the finite elements at the place where it started, by which both know a material point;
     they are evaluated there (a consistent transfer: values are kept, sums need not be).
-    fem: QuasiStatic or ElasticSolution; model: `mpm_core.Model`, whose particles' displacements count from the finite
-    elements' undeformed body; smooth: as for `stress_function`
-    places: other places (n, D) [m] to evaluate the finite elements at; for particles that were handed over and so
-        never stood in the undeformed body, `model.particles.position` after the hand-over
-    Returns a dictionary of Difference, `displacement` [m] and `stress` [Pa]. Raises InputError, on all ranks, naming a
-    particle whose place is outside the finite elements' mesh, and for another geometry. Collective.
+
+    Args:
+        fem: finite elements.
+        model: particles, whose displacements count from the finite elements' undeformed body.
+        smooth: as for `QuasiStatic.stress_function`.
+        places: other places at which to evaluate the finite elements [m], shape (n, D); for particles that were handed over and
+            so never stood in the undeformed body, `model.particles.position` after the hand-over.
+
+    Returns:
+        `displacement` [m] and `stress` [Pa].
+
+    Raises:
+        InputError: the place of a particle is outside the finite elements' mesh (the message names the particle), or the
+            geometries differ. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     require_same_geometry(model, fem)
     particles = model.particles

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
+import mpm_core as mpm
 from fenics_bridge.errors import agree
+from fenics_bridge.types import OfPosition
 from mpm_core import Geometry
 
 
-def boundary_forces(model, tag, pressure):
-    """Force on each particle by a pressure on the boundary with a tag: (n, D) [N] ([N/m] in plane strain, [N] per radian).
+def boundary_forces(model: mpm.Model, tag: int, pressure: float) -> NDArray[np.float64]:
+    """Force on each particle by a pressure on the boundary with a tag.
 
     A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it.
-    pressure: [Pa], compression positive. Collective.
+
+    Args:
+        model: the particles.
+        tag: number of the tag.
+        pressure: pressure [Pa], compression positive.
+
+    Returns:
+        Shape (n, D) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+    Raises:
+        InputError: no soil lies at the boundary. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     mesh = model.mesh
     force, pressed = _surface_forces(model, mesh._core.facet_tags == tag, np.full(len(mesh.points), float(pressure)))
@@ -21,10 +37,23 @@ def boundary_forces(model, tag, pressure):
     return force
 
 
-def seepage_forces(model, pore_pressure):
-    """Force -V grad p of the pore water on each particle, p being linear in each cell: (n, D) [N] ([N/m] in plane strain, [N] per radian).
+def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.float64]:
+    """Force -V grad p of the pore water on each particle, p being linear in each cell.
 
-    As for the finite elements, water presses on the surface where it stands on it, and suction does not pull at it. Collective.
+    As for the finite elements, water presses on the surface where it stands on it, and suction does not pull at it.
+
+    Args:
+        model: the particles.
+        pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa].
+
+    Returns:
+        Shape (n, D) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+    Raises:
+        InputError: a pore pressure is not finite. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     mesh, cells = model.mesh, model.particles.cell
     p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
@@ -39,9 +68,18 @@ def seepage_forces(model, pore_pressure):
 
 
 def _surface_forces(model, chosen, pressure):
-    """Forces by a pressure at the nodes (k,) [Pa] on those chosen facets (m, D + 1) of cells beyond which there are no particles.
+    """Forces by a pressure on those chosen facets of cells beyond which there are no particles.
 
-    Returns the forces and the number of chosen facets at cells with particles, over all ranks. Collective.
+    Args:
+        model: the particles.
+        chosen: which facets of the cells, shape (m, D + 1).
+        pressure: pressure at the nodes [Pa], shape (k,).
+
+    Returns:
+        The forces, and the number of chosen facets at cells with particles, over all ranks.
+
+    Note:
+        Collective.
     """
     mesh, p, dim = model.mesh, model.particles, model.mesh.dim
     cells, position = p.cell, p.position

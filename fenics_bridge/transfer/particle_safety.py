@@ -8,15 +8,18 @@ iteration. No system of equations is solved, so that there is nothing that may n
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.fem.equilibration import EquilibriumReport
-from fenics_bridge.fem.load_steps import advance
+from fenics_bridge.fem.load_steps import LoadStep, advance
 
 FIRST_LOOK, LAST_LOOK = 6, 120
 """Times that a shear wave takes through the body, after which it is first asked whether it flows, and when a trial ends"""
@@ -27,41 +30,62 @@ GROWTH = 3.0
 
 @dataclass(frozen=True)
 class ParticleSafety:
-    """The last factor at which the particles came to rest, and the evidence of failure above it.
-
-    value: factor of safety; failed_at: smallest factor above it at which they did not rest
-    failed: whether they were shown to flow there, in motion that does not slow down; if not, `value` is a lower bound only
-    reason: in words; residual: largest out-of-balance over external force that counted as rest [-]
-    curve: (k, 2), factor and largest displacement of a particle [m] of every trial that came to rest
-    model: `mpm_core.Model` of the trial at `failed_at`, as it flows; steps: every LoadStep that was tried
-    """
+    """The last factor at which the particles came to rest, and the evidence of failure above it."""
 
     value: float
+    """Factor of safety"""
     failed_at: float
+    """Smallest factor above it at which the particles did not come to rest"""
     failed: bool
+    """Whether they were shown to flow there, in motion that does not slow down; if not, `value` is a lower bound only"""
     reason: str
+    """Why they do not rest there, in words"""
     residual: float
-    curve: np.ndarray
+    """Largest out-of-balance over external force that counted as rest [-]"""
+    curve: NDArray[np.float64]
+    """Factor and largest displacement of a particle [m] of every trial that came to rest, shape (k, 2)"""
     model: mpm.Model
-    steps: list
+    """Particles of the trial at `failed_at`, as they flow"""
+    steps: list[LoadStep]
+    """Every step of the factor that was tried"""
 
 
 def particle_safety(
-    model_of, start=0.5, first_step=0.2, tolerance=5e-3, *, damping=0.7, rest=1e-3, nmd=False, progress=None
-):
+    model_of: Callable[[float], mpm.Model],
+    start: float = 0.5,
+    first_step: float = 0.2,
+    tolerance: float = 5e-3,
+    *,
+    damping: float = 0.7,
+    rest: float = 1e-3,
+    nmd: bool = False,
+    progress: Callable[[LoadStep], Any] | None = None,
+) -> ParticleSafety:
     """Factor by which the strength of the particles can be divided before they no longer come to rest under their weight.
 
-    model_of: function of the factor that returns a new `mpm_core.Model` with its particles, supports and gravity, whose laws
-        have their strength divided by the factor, e.g. by `reduced_strength`; with initial stresses or without
-    start: factor to begin with, at which the soil must rest; first_step: of the factor; tolerance: width of the last step as a
-        fraction of the factor [-]
-    damping: local damping, in (0, 1); rest: out-of-balance over external force at which the soil counts as at rest [-]
-    nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells
-    progress: called with each LoadStep, or None
     The particles move as far as they settle: for the factor of the undeformed body Young's moduli must be large enough for
     settlements to be small against the cells. Strength, not stiffness, decides on the factor.
-    Returns a ParticleSafety. Raises InputError, on all ranks, for bad arguments and where the soil does not rest at `start`.
-    Collective.
+
+    Args:
+        model_of: function of the factor that returns a new `mpm_core.Model` with its particles, supports and gravity, whose laws
+            have their strength divided by the factor, e.g. by `reduced_strength`; with initial stresses or without.
+        start: factor to begin with, at which the soil must rest.
+        first_step: first increment of the factor.
+        tolerance: width of the last step as a fraction of the factor [-].
+        damping: local damping [-], in (0, 1).
+        rest: out-of-balance over external force at which the soil counts as at rest [-].
+        nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells.
+        progress: function that is called with each step of the factor, e.g. `print_step`.
+
+    Returns:
+        The factor and the evidence of failure above it.
+
+    Raises:
+        InputError: an argument out of range, a model without gravity, or soil that does not rest at `start`. Raised on all ranks
+            alike.
+
+    Note:
+        Collective.
     """
     _check(start=start, first_step=first_step, tolerance=tolerance, damping=damping, rest=rest)
     models, curve = {}, []

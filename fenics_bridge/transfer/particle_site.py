@@ -2,33 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree
-from fenics_bridge.fem.stages import SiteState, StageError, StageReport
+from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
+from fenics_bridge.fem.supports import Support
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
 
 
 class ParticleSite:
     """Particles that are placed and removed in stages, see `Stage` and `carry_out`; equilibrium is quasi-static.
 
-    model: `mpm_core.Model` without particles, with all laws that the stages will need; gravity acts on the last axis
-    Soils and boundaries are the tags of its mesh. A stage places particles in the cells of a soil, or removes those
-    that lie in them. state: SiteState; number: of the last stage
+    Soils and boundaries are the tags of the model's mesh. A stage places particles in the cells of a soil, or removes those
+    that lie in them.
+
+    Args:
+        model: model without particles, with all laws that the stages will need; gravity acts on the last axis.
+        materials: number of its law in the model by soil (name or number of its tag).
+        supports: boundary conditions as for `QuasiStatic`, without prescribed displacements.
+        gravity: acceleration of gravity [m/s2], by which unit weights become densities.
+        per_cell: particles per cell, as for `Model.seed`.
+        small_displacements: keep the particles at their places, as the finite elements do; otherwise they move.
+        **options: options of `Model.equilibrate` for each stage: solver, nmd, ghost, tolerance, max_steps.
+
+    Raises:
+        InputError: the model has particles, a support prescribes a displacement, or a soil or boundary does not exist. Raised on
+            all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, model, materials, supports, *, gravity=9.81, per_cell=3, small_displacements=False, **options):
-        """
-        materials: {soil: number of its law in the model}; supports: as for `QuasiStatic`, without prescribed displacements
-        gravity: [m/s2], by which unit weights become densities; per_cell: particles per cell, as for `Model.seed`
-        small_displacements: particles keep their places, as the finite elements do; otherwise they move
-        options: of `Model.equilibrate` for each stage: solver, nmd, ghost, tolerance, max_steps
-        """
+    def __init__(
+        self,
+        model: mpm.Model,
+        materials: Mapping[int | str, int],
+        supports: Sequence[Support],
+        *,
+        gravity: float = 9.81,
+        per_cell: int = 3,
+        small_displacements: bool = False,
+        **options: Any,
+    ) -> None:
         comm, mesh = model.comm, model.mesh
         agree(comm, None if comm.allreduce(len(model.particles)) == 0 else "model: it has particles, expected none yet")
-        self.model, self.number, self._per_cell, self._g = model, 0, per_cell, gravity
-        self._options = {"small_displacements": small_displacements, **options}
+        self.model = model
+        """The particles"""
+        self.number = 0
+        """Number of the last stage, from 1 on; 0 before the first one"""
+        self._per_cell, self._g = per_cell, gravity
+        self._options: dict[str, Any] = {"small_displacements": small_displacements, **options}
         names = {tags[0]: repr(name) for name, tags in mesh.names["cell"].items() if len(tags) == 1}
         self.state = SiteState(
             comm,
@@ -37,16 +65,28 @@ class ParticleSite:
             name_of=lambda tag: names.get(tag, str(tag)),
             supports=supports,
         )
+        """Which soils have been placed, their weights, loads and supports"""
         self._material = {tag: n for soil, n in materials.items() for tag in _tags(model, "cell", soil, "materials")}
         self._seeded: list[tuple[int, int, int]] = []  # first id, end of ids, soil
         model.set_gravity([0.0] * (mesh.dim - 1) + [-gravity])
         apply_supports(model, self.state.supports)
 
-    def carry_out(self, stage):
-        """Bring the particles to equilibrium after a stage's changes. Returns a StageReport. Collective.
+    def carry_out(self, stage: Stage) -> StageReport:
+        """Bring the particles to equilibrium after a stage's changes.
 
-        Raises InputError, on all ranks, for a stage with an unknown soil or boundary; StageError where there is no
-        equilibrium: the particles are then in the last equilibrium of the stage.
+        Args:
+            stage: the changes.
+
+        Returns:
+            Report of the stage.
+
+        Raises:
+            InputError: the stage has an unknown soil or boundary, or a law that the model was not made with. Raised on all ranks
+                alike.
+            StageError: there is no equilibrium; the particles are then in the last equilibrium of the stage.
+
+        Note:
+            Collective.
         """
         model = self.model
         state, fill, excavate = self.state.after(stage)
@@ -74,8 +114,21 @@ class ParticleSite:
             self.number, stage.name, report.cuts + 1, report.iterations, max(model.comm.allgather(float(moved)))
         )
 
-    def rows_of(self, soil):
-        """Whether each particle of this rank is of a soil, by name or number of its tag: (n,) bool. Collective."""
+    def rows_of(self, soil: int | str) -> NDArray[np.bool_]:
+        """Whether each particle of this rank is of a soil.
+
+        Args:
+            soil: name or number of the soil's tag.
+
+        Returns:
+            Shape (n,).
+
+        Raises:
+            InputError: no cell has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         tags, ids = _tags(self.model, "cell", soil, "soil"), self.model.particles.id
         rows = np.zeros(len(ids), dtype=bool)
         for first, end, tag in self._seeded:
@@ -136,10 +189,18 @@ class ParticleSite:
         )
 
 
-def apply_supports(model, supports):
+def apply_supports(model: mpm.Model, supports: Sequence[Support]) -> None:
     """Give particles the supports of finite elements, in place of their earlier boundary conditions.
 
-    supports: as for `QuasiStatic`. Raises InputError for a prescribed displacement and for unknown boundaries. Collective.
+    Args:
+        model: the particles.
+        supports: boundary conditions as for `QuasiStatic`.
+
+    Raises:
+        InputError: a support prescribes a displacement, or a boundary does not exist. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     for support in supports:
         if any(support.displacement or ()):
