@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.supports import tagged_facets
 from fenics_bridge.mesh.names import tag_numbers
-from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, mistake_in, value_at
+from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, WaterBoundary, mistake_in, value_at
 
 
 class _Held(NamedTuple):
@@ -44,10 +46,20 @@ class AppliedBoundary:
         self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
         self.held = []
 
-    def take(self, boundary):
-        """Check a list of conditions and find where they hold; whether they are other ones than the last time.
+    def take(self, boundary: Sequence[WaterBoundary]) -> bool:
+        """Check a list of conditions and find where they hold.
 
-        Raises InputError, on all ranks, for values out of range and unknown tags. Collective.
+        Args:
+            boundary: the conditions.
+
+        Returns:
+            Whether they are other ones than the last time.
+
+        Raises:
+            InputError: values out of range, or unknown tags. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         held = [one.condition for one in self.held]
         if len(held) == len(boundary) and all(a is b for a, b in zip(held, boundary)):
@@ -100,11 +112,21 @@ class AppliedBoundary:
                 upper[dofs] = np.minimum(upper[dofs], getattr(condition, "ponding", 0.0))
         return fixed, values, upper
 
-    def inflow(self, facet_tag, reaction):
-        """Water that enters through the facets of a tag [m3/s], per metre [m2/s] in plane flow; negative where it leaves.
+    def inflow(self, facet_tag: int | str | None, reaction: NDArray[np.float64]) -> float:
+        """Water that enters through the facets of a tag; a node where several conditions meet counts for the first of them.
 
-        facet_tag: None for all conditions together; reaction: (m,) [m3/s], inflow at the dofs beside the prescribed rates
-        A node where several conditions meet counts for the first of them. Collective; raises InputError for an unknown tag.
+        Args:
+            facet_tag: number or name of the tag; None for all conditions together.
+            reaction: inflow at the dofs beside the prescribed rates [m3/s], shape (m,).
+
+        Returns:
+            Inflow [m3/s], per metre [m2/s] in plane flow; negative where water leaves.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         comm = self._space.mesh.comm
         numbers = None if facet_tag is None else tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")

@@ -16,18 +16,22 @@ Value = float | Callable | tuple
 
 @dataclass(frozen=True)
 class Head:
-    """The total head, pressure head plus elevation, is prescribed: level [m], the elevation to which water would rise."""
+    """Boundary condition of a prescribed total head, which is pressure head plus elevation."""
 
     facet_tag: int | str
+    """Number or name of the tag"""
     level: Value
+    """Total head [m]: the elevation to which water would rise"""
 
 
 @dataclass(frozen=True)
 class Reservoir:
-    """Water stands against the boundary up to a level [m]; above it the boundary is a seepage face."""
+    """Water stands against the boundary up to a level; above it the boundary is a seepage face."""
 
     facet_tag: int | str
+    """Number or name of the tag"""
     level: Value
+    """Elevation of the water's surface [m]"""
 
 
 @dataclass(frozen=True)
@@ -35,26 +39,29 @@ class SeepageFace:
     """Water may leave, at atmospheric pressure, but not enter: p <= 0, outflow >= 0, and one of them is zero."""
 
     facet_tag: int | str
+    """Number or name of the tag"""
 
 
 @dataclass(frozen=True)
 class Flux:
-    """Water enters at a rate [m/s] normal to the boundary; negative where it leaves."""
+    """Water enters at a rate normal to the boundary."""
 
     facet_tag: int | str
+    """Number or name of the tag"""
     rate: Value
+    """Inflow [m/s]; negative where water leaves"""
 
 
 @dataclass(frozen=True)
 class Rain:
-    """Rain of a rate [m/s] on the horizontal enters until water ponds; what the soil cannot take runs off.
-
-    ponding: pressure head [m] above which water runs off
-    """
+    """Rain enters until water ponds; what the soil cannot take runs off."""
 
     facet_tag: int | str
+    """Number or name of the tag"""
     rate: Value
+    """Rate of the rain on the horizontal [m/s]"""
     ponding: float = 0.0
+    """Pressure head [m] above which water runs off"""
 
 
 WaterBoundary = Head | Reservoir | SeepageFace | Flux | Rain

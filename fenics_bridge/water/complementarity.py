@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem import petsc
 from mpm_core.petsc import defaults, direct_options
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenics_bridge.fem.fields import assembled
@@ -19,10 +23,15 @@ class BoundedProblem:
 
     F is a nonlinear form of the unknown function and one test function; `residual` is F without the fixed values and bounds,
     summed over ranks: the reactions there.
+
+    Args:
+        form: F, UFL.
+        tangents: UFL bilinear forms, the exact one first, then those to fall back on.
+        unknown: function u.
+        options_prefix: prefix of the PETSc options of the solver.
     """
 
-    def __init__(self, form, tangents, unknown, options_prefix):
-        """form: UFL; tangents: UFL bilinear forms, the exact one first, then those to fall back on; unknown: Function."""
+    def __init__(self, form: Any, tangents: Sequence[Any], unknown: fem.Function, options_prefix: str) -> None:
         self.unknown, self._space = unknown, unknown.function_space
         self._form, self._tangents = fem.form(form), [fem.form(tangent) for tangent in tangents]
         self._n = self._space.dofmap.index_map.size_local
@@ -32,11 +41,22 @@ class BoundedProblem:
         self._prefix = options_prefix
         self.iterations = 0
 
-    def solve(self, fixed, values, upper, scale):
-        """Solve from the unknown's present values. Returns why that failed, in words; nothing when it did not. Collective.
+    def solve(
+        self, fixed: NDArray[np.bool_], values: NDArray[np.float64], upper: NDArray[np.float64], scale: float
+    ) -> str | None:
+        """Solve from the unknown's present values.
 
-        fixed: (m,) bool and values: (m,), of the dofs of this rank; upper: (m,), infinite where there is no bound
-        scale: size of the entries of F below which, times `RELATIVE`, the problem is solved
+        Args:
+            fixed: which dofs of this rank are fixed, shape (m,).
+            values: their values, shape (m,).
+            upper: upper bounds of the others, shape (m,), infinite where there is none.
+            scale: size of the entries of F below which, times `RELATIVE`, the problem is solved.
+
+        Returns:
+            Why it failed, in words; None where it did not.
+
+        Note:
+            Collective.
         """
         self._fixed, self._values, self._scale = fixed[: self._n], values, scale
         start = self.unknown.x.array.copy()

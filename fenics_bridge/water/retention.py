@@ -12,6 +12,7 @@ suction, which take numbers, NumPy arrays and UFL expressions alike:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
@@ -27,14 +28,31 @@ _SMALL = 1e-9
 
 
 class _Curve:
-    """What the curves have in common; `residual` is the saturation that no suction takes out."""
+    """What the curves have in common."""
 
     residual: float
+    """Residual degree of saturation [-], which no suction takes out"""
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e = (S - residual) / (1 - residual) [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+
+        Returns:
+            The same kind of value.
+        """
         raise NotImplementedError
 
-    def saturation(self, suction):
+    def saturation(self, suction: Any) -> Any:
+        """Degree of saturation S [-], falling from 1 to the residual one.
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+
+        Returns:
+            The same kind of value.
+        """
         return self.residual + (1 - self.residual) * self.effective(suction)
 
 
@@ -46,15 +64,18 @@ class VanGenuchten(_Curve):
     suction that steps in time become short; an air-entry suction of some 200 Pa cures that: soil is saturated up to it, and
     S_e and k_r are scaled to be 1 there (Vogel, van Genuchten and Cislerova 2000).
 
-    alpha: [1/Pa] (a value in 1/m divided by the unit weight of water); n: [-], above 1; residual: [-], in [0, 1)
-    air_entry: [Pa], 0 or more
-    Raises InputError for values outside these ranges.
+    Raises:
+        InputError: a value out of its range.
     """
 
     alpha: float
+    """Inverse of a suction [1/Pa], above 0 (a value in 1/m divided by the unit weight of water)"""
     n: float
+    """Exponent [-], above 1"""
     residual: float = 0.0
+    """Residual degree of saturation [-], in [0, 1)"""
     air_entry: float = 0.0
+    """Air-entry suction [Pa], 0 or more"""
 
     def __post_init__(self):
         _check_positive("alpha", self.alpha, "1/Pa")
@@ -69,11 +90,20 @@ class VanGenuchten(_Curve):
         entry = max(self.alpha * self.air_entry, _SMALL)
         return _at_least(suction * self.alpha, entry) ** self.n, entry**self.n
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e [-] at a suction [Pa]."""
         here, at_entry = self._powers(suction)
         return ((1 + here) / (1 + at_entry)) ** (1 / self.n - 1)
 
-    def relative_permeability(self, suction):
+    def relative_permeability(self, suction: Any) -> Any:
+        """Fraction k_r of the saturated conductivity [-], falling from 1.
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+
+        Returns:
+            The same kind of value.
+        """
         m = 1 - 1 / self.n
         # 1 - S_e^(1/m) is x / (1 + x) with x = (alpha s)^n, without the loss of digits near saturation.
         here, at_entry = self._powers(suction)
@@ -86,20 +116,25 @@ class VanGenuchten(_Curve):
 class Gardner(_Curve):
     """S_e = k_r = exp(-alpha s) (Gardner 1958), for which many flows have closed forms.
 
-    alpha: [1/Pa]; residual: [-], in [0, 1). Raises InputError for values outside these ranges.
+    Raises:
+        InputError: a value out of its range.
     """
 
     alpha: float
+    """Inverse of a suction [1/Pa], above 0"""
     residual: float = 0.0
+    """Residual degree of saturation [-], in [0, 1)"""
 
     def __post_init__(self):
         _check_positive("alpha", self.alpha, "1/Pa")
         _check_residual(self.residual)
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e [-] at a suction [Pa]."""
         return _exp(-self.alpha * _at_least(suction, 0.0))
 
-    def relative_permeability(self, suction):
+    def relative_permeability(self, suction: Any) -> Any:
+        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
         return LEAST_PERMEABILITY + (1 - LEAST_PERMEABILITY) * self.effective(suction)
 
 
@@ -107,14 +142,16 @@ class Gardner(_Curve):
 class Tabulated(_Curve):
     """Measured points, joined by straight lines; beyond the last suction the last values hold.
 
-    suction: (k,) [Pa], rising, the first one 0; saturation_values: (k,) [-], falling from 1; permeability_values: (k,) [-],
-    relative, falling from 1 and above 0.
-    Raises InputError for curves that do not fall, or that do not begin saturated.
+    Raises:
+        InputError: curves of different length, that do not fall, or that do not begin saturated.
     """
 
-    suction: tuple
-    saturation_values: tuple
-    permeability_values: tuple
+    suction: tuple[float, ...]
+    """Suctions [Pa], shape (k,), rising, the first one 0"""
+    saturation_values: tuple[float, ...]
+    """Degrees of saturation [-], shape (k,), falling from 1"""
+    permeability_values: tuple[float, ...]
+    """Relative permeabilities [-], shape (k,), falling from 1 and 0 or more"""
 
     def __post_init__(self):
         lengths = {len(self.suction), len(self.saturation_values), len(self.permeability_values)}
@@ -137,33 +174,41 @@ class Tabulated(_Curve):
                 )
 
     @property
-    def residual(self):
+    def residual(self) -> float:  # type: ignore[override]
+        """Residual degree of saturation [-]: the last one."""
         return self.saturation_values[-1]
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e [-] at a suction [Pa]."""
         return (self.saturation(suction) - self.residual) / (1 - self.residual)
 
-    def saturation(self, suction):
+    def saturation(self, suction: Any) -> Any:
+        """Degree of saturation S [-] at a suction [Pa]."""
         return _joined(suction, self.suction, self.saturation_values)
 
-    def relative_permeability(self, suction):
+    def relative_permeability(self, suction: Any) -> Any:
+        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
         kept = _joined(suction, self.suction, self.permeability_values)
         return LEAST_PERMEABILITY + (1 - LEAST_PERMEABILITY) * kept
 
 
 @dataclass(frozen=True)
 class FreeSurface(_Curve):
-    """Soil that drains and lets no water through above the water table: for seepage with a free surface.
+    """Soil that drains and lets hardly any water through above the water table: for seepage with a free surface.
 
     The relative permeability falls smoothly from 1 to `dry_permeability` over the suction of a `fringe` of water, and
     saturation from 1 to `residual`.
 
-    fringe: [Pa], some tenth of a cell's height times the unit weight of water; dry_permeability, residual: [-], in (0, 1), [0, 1)
+    Raises:
+        InputError: a value out of its range.
     """
 
     fringe: float = 1e3
+    """Suction at which soil is dry [Pa], some tenth of a cell's height times the unit weight of water"""
     dry_permeability: float = 1e-3
+    """Relative permeability of dry soil [-], in (0, 1)"""
     residual: float = 0.0
+    """Residual degree of saturation [-], in [0, 1)"""
 
     def __post_init__(self):
         _check_positive("fringe", self.fringe, "Pa")
@@ -171,11 +216,13 @@ class FreeSurface(_Curve):
         if not 0 < self.dry_permeability < 1:
             raise InputError(f"dry_permeability: got {self.dry_permeability!r}, expected more than 0 and less than 1")
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e [-] at a suction [Pa]."""
         x = _at_most(_at_least(suction / self.fringe, 0.0), 1.0)
         return 1 - x * x * (3 - 2 * x)
 
-    def relative_permeability(self, suction):
+    def relative_permeability(self, suction: Any) -> Any:
+        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
         return self.dry_permeability + (1 - self.dry_permeability) * self.effective(suction)
 
 
@@ -185,7 +232,8 @@ class AlwaysSaturated(_Curve):
 
     residual = 0.0
 
-    def effective(self, suction):
+    def effective(self, suction: Any) -> Any:
+        """Effective saturation S_e = 1 [-], which is also the fraction k_r of the saturated conductivity."""
         return 1 + 0 * suction
 
     relative_permeability = effective

@@ -3,26 +3,32 @@
     d(theta)/dt + div q = 0,    q = -k_r k grad h,    h = p / gamma_w + z
 
 with the water content theta = S (n + n p / K_w + m_v (p - w)), w being the total vertical stress that standing water adds: so
-soil that cannot drain hands a change of that load on to its water (van der Kamp and Gale 1983). It is discretised by Lagrange elements and backward Euler; the water
-content is lumped and its change, not its derivative, is taken over a step, so that water is conserved whatever the step
-(Celia, Bouloutas and Zarba 1990). Seepage faces and rain are a complementarity problem: p is at most zero, outflow at least
-zero, and one of the two is zero. PETSc solves it together with the flow, so that no exit point is guessed.
+soil that cannot drain transfers a change of that load to its water (van der Kamp and Gale 1983). It is discretised by Lagrange
+elements and backward Euler; the water content is lumped and its change, not its derivative, is taken over a step, so that water
+is conserved whatever the step (Celia, Bouloutas and Zarba 1990). Seepage faces and rain are a complementarity problem: p is at
+most zero, outflow at least zero, and one of the two is zero. PETSc solves it together with the flow, so that no exit point is
+guessed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
-from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace
+from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace, WaterBoundary
 from fenics_bridge.water.complementarity import BoundedProblem
-from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, soils_by_tag
+from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
@@ -34,33 +40,58 @@ MOST_CONTINUATION_STEPS = 60
 class Seepage:
     """Flow of water through a body of soil.
 
-    pressure_head: function p / gamma_w [m], continuous; negative above the water table. It is where `solve` and `advance` begin.
-    time: of the flow [s]; iterations: of Newton's method in the last solution
-    boundary: the boundary conditions, which may be changed between steps
+    Args:
+        domain: mesh of the body.
+        soil: soil, or soils by cell tag or name.
+        facet_tags: tags of the boundary.
+        boundary: boundary conditions; where none is given the boundary is impervious. Where conditions meet at a node, a
+            prescribed head holds before the others.
+        cell_tags: tags of the cells; needed where soils are given by cell tag.
+        degree: degree of the elements, 1 or 2.
+        unit_weight: unit weight of water [N/m3].
+        water_modulus: bulk modulus of water [Pa].
+        options_prefix: prefix of the PETSc options of the solver.
+        loading: function of positions (n, D) [m] and time [s] that returns the vertical total stress (n,) [Pa, compression
+            positive] that changes in time, such as `standing_water(...)`; it acts through the compressibility of the soils.
+
+    Raises:
+        InputError: an unknown tag, cells without a soil, or another argument out of range. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, domain, soil, facet_tags, boundary, cell_tags=None, degree=1, unit_weight=WATER_WEIGHT,
-                 water_modulus=WATER_MODULUS, options_prefix="seepage_", loading=None):  # fmt: skip
-        """
-        soil: PorousSoil, or {cell tag or name: PorousSoil}; facet_tags, cell_tags: of DOLFINx
-        boundary: list of Head, Reservoir, SeepageFace, Flux and Rain; where none is given the boundary is impervious. Where
-            conditions meet at a node, a prescribed head holds before the others.
-        degree: of the elements, 1 or 2; unit_weight: of water [N/m3]; water_modulus: bulk modulus of water [Pa]
-        options_prefix: of the PETSc options of the solver
-        loading: function of positions (n, D) [m] and time [s] that returns the vertical total stress (n,) [Pa, compression
-            positive] that changes in time, such as `standing_water(...)`; it acts through the compressibility of the soils
-        Raises InputError, on all ranks. Collective.
-        """
+    def __init__(
+        self,
+        domain: Mesh,
+        soil: PorousSoil | dict[int | str, PorousSoil],
+        facet_tags: MeshTags,
+        boundary: Iterable[WaterBoundary],
+        cell_tags: MeshTags | None = None,
+        degree: int = 1,
+        unit_weight: float = WATER_WEIGHT,
+        water_modulus: float = WATER_MODULUS,
+        options_prefix: str = "seepage_",
+        loading: Callable[[NDArray[np.float64], float], ArrayLike] | None = None,
+    ) -> None:
         comm = domain.comm
         problem = None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2"
         for name, value in (("unit_weight", unit_weight), ("water_modulus", water_modulus)):
             if not (np.isfinite(value) and value > 0):
                 problem = f"{name}: got {value!r}, expected a positive number"
         agree(comm, problem)
-        self.domain, self.unit_weight, self.water_modulus, self.time = domain, unit_weight, water_modulus, 0.0
+        self.domain = domain
+        """Mesh of the body"""
+        self.unit_weight = unit_weight
+        """Unit weight of water [N/m3]"""
+        self.water_modulus = water_modulus
+        """Bulk modulus of water [Pa]"""
+        self.time = 0.0
+        """Time of the flow [s]"""
         self._dim, self._degree = domain.geometry.dim, degree
         space = compat.function_space(domain, "Lagrange", degree)
         self.pressure_head = fem.Function(space, name="pressure_head")
+        """Pressure head p / gamma_w [m], continuous, negative above the water table; `solve` and `advance` begin with it"""
         self._old = fem.Function(space)
         self._loading, self._load, self._old_load = loading, fem.Function(space), fem.Function(space)
         self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
@@ -70,9 +101,11 @@ class Seepage:
         self._applied = AppliedBoundary(space, facet_tags, self._largest)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
         self.boundary = list(boundary)
+        """The boundary conditions, which may be changed between steps"""
         self._take_boundary()
         self._set_load()
         self.iterations = 0
+        """Iterations of Newton's method in the last solution"""
         self._reaction = np.zeros(len(self._applied.height))
 
     def _take_boundary(self):
@@ -90,8 +123,16 @@ class Seepage:
 
     # --- solving -----------------------------------------------------------------------------------------------------
 
-    def solve(self):
-        """Steady flow under the boundary conditions at the present time. Raises RuntimeError where none is found. Collective."""
+    def solve(self) -> None:
+        """Find the steady flow under the boundary conditions at the present time.
+
+        Raises:
+            InputError: no boundary condition determines the pressure, or one is not possible. Raised on all ranks alike.
+            RuntimeError: no steady flow was found.
+
+        Note:
+            Collective.
+        """
         heads = any(isinstance(c, (Head, Reservoir, SeepageFace, Rain)) for c in self.boundary)
         missing = "boundary: no head, reservoir, seepage face or rain; without one the steady pressure is undetermined"
         agree(self.domain.comm, None if heads else missing)
@@ -107,8 +148,10 @@ class Seepage:
                                "finer mesh")  # fmt: skip
 
     def _sharpen(self):
-        """Steady flow by continuation: retention curves are stretched over a suction 1000 times as large, which makes the
-        problem nearly linear, and are brought back in steps as large as Newton's method takes them.
+        """Find the steady flow by continuation.
+
+        Retention curves are stretched over a suction 1000 times as large, which makes the problem nearly linear, and are
+        brought back in steps as large as Newton's method takes them. Returns why that failed; None where it did not.
         """
         start, done, step, failure = self.pressure_head.x.array.copy(), -3.0, 1.0, None
         try:
@@ -123,8 +166,21 @@ class Seepage:
         self.pressure_head.x.array[:] = start
         return f"{failure or 'the continuation was too slow'}, with retention curves stretched {10**-done:.3g} times"
 
-    def advance(self, dt):
-        """One step of dt [s] by backward Euler. Returns whether it converged; the state is as before where not. Collective."""
+    def advance(self, dt: float) -> bool:
+        """Make a step of backward Euler.
+
+        Args:
+            dt: length of the step [s].
+
+        Returns:
+            Whether it converged; where not, the state is as before.
+
+        Raises:
+            InputError: dt is not positive, or a boundary condition is not possible. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
         self._take_boundary()
         if self._transient is None:
@@ -198,22 +254,38 @@ class Seepage:
 
     # --- results -----------------------------------------------------------------------------------------------------
 
-    def inflow(self, facet_tag):
-        """Water that enters through the facets of a tag [m3/s], per metre [m2/s] in plane flow; negative where it leaves.
+    def inflow(self, facet_tag: int | str | None) -> float:
+        """Water that enters through the facets of a tag.
 
         It follows from the equilibrium of the nodes, so that the inflows of all tags balance to the tolerance of the solution.
-        A node where several conditions meet counts for the first of them. Collective; raises InputError for an unknown tag.
+        A node where several conditions meet counts for the first of them.
+
+        Args:
+            facet_tag: number or name of the tag; None for all boundary conditions together.
+
+        Returns:
+            Inflow [m3/s], per metre [m2/s] in plane flow; negative where water leaves.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return self._applied.inflow(facet_tag, self._reaction)
 
-    def stored_water(self):
-        """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
+    def stored_water(self) -> float:
+        """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure.
+
+        Note:
+            Collective.
+        """
         if self._stored is None:
             content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._soils]
             self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))
         return self.domain.comm.allreduce(fem.assemble_scalar(self._stored))
 
-    def velocity(self):
+    def velocity(self) -> fem.Function:
         """Darcy velocity q [m/s] as a function that is polynomial in each cell."""
         psi = self.pressure_head
         space = compat.function_space(self.domain, "DG", self._degree - 1, self._dim)
@@ -224,12 +296,16 @@ class Seepage:
             result.interpolate(fem.Expression(flow, compat.interpolation_points(space)), own)
         return result
 
-    def pore_pressure(self, suction=False, outside=None):
-        """The pore pressure as a function of positions (n, D) [m] that returns pressures (n,) [Pa], for stages and particles.
+    def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
+        """The pore pressure as a function of positions, for stages and particles.
 
-        suction: False for zero above the water table; True for the suction times the effective saturation there (Bishop's
-            effective stress); every rank must call the function
-        outside: function of positions for points outside the body, e.g. `hydrostatic(level)`; zero where there is none
+        Args:
+            suction: False for zero above the water table; True for the suction times the effective saturation there (Bishop's
+                effective stress).
+            outside: function of positions (n, D) [m] for points outside the body, e.g. `hydrostatic(level)`; None for zero there.
+
+        Returns:
+            Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
         """
         effective = (
             [s.retention.effective(-self.unit_weight * self.pressure_head) for s in self._soils] if suction else None

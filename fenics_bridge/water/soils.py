@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 import ufl
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh.names import by_number, label
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.types import MeshTags
 from fenics_bridge.water.retention import AlwaysSaturated
 
 WATER_WEIGHT = 9810.0
@@ -24,17 +27,18 @@ WATER_MODULUS = 2.2e9
 class PorousSoil:
     """How soil holds water and lets it through.
 
-    conductivity: saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor
-    porosity: n [-], in (0, 1); for transient flow only
-    compressibility: of the skeleton, m_v [1/Pa], the inverse of the oedometric modulus; for transient flow only
-    retention: curve of `fenics_bridge.water.retention`; without one the soil stays saturated
-    Raises InputError for values outside these ranges.
+    Raises:
+        InputError: a value out of its range.
     """
 
     conductivity: Any
+    """Saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor; positive"""
     porosity: float = 0.4
+    """Porosity n [-], in (0, 1); for transient flow only"""
     compressibility: float = 0.0
+    """Compressibility of the skeleton m_v [1/Pa], the inverse of the oedometric modulus; for transient flow only"""
     retention: Any = field(default_factory=AlwaysSaturated)
+    """Retention curve of `fenics_bridge.water.retention`; without one the soil stays saturated"""
 
     def __post_init__(self):
         k = np.asarray(self.conductivity, dtype=float)
@@ -50,20 +54,38 @@ class PorousSoil:
             raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
 
     @staticmethod
-    def tensor(conductivity, dim):
-        """Conductivity as a tensor (D, D) [m/s]."""
+    def tensor(conductivity: ArrayLike, dim: int) -> NDArray[np.float64]:
+        """Conductivity as a tensor.
+
+        Args:
+            conductivity: as the attribute [m/s].
+            dim: dimension D, where the conductivity is one number.
+
+        Returns:
+            Shape (D, D) [m/s].
+        """
         k = np.asarray(conductivity, dtype=float)
         return k if k.ndim == 2 else np.diag(np.broadcast_to(k, k.shape or (dim,)))
 
 
-def soils_by_tag(domain, soil, cell_tags):
-    """The soils, the measure over the cells of each, and these cells, ghosts too: three lists.
+def soils_by_tag(
+    domain: Mesh, soil: PorousSoil | dict[int | str, PorousSoil], cell_tags: MeshTags | None
+) -> tuple[list[PorousSoil], list[Any], list[NDArray[np.int32]]]:
+    """The soils, the measure over the cells of each, and these cells, ghosts too.
 
-    soil: PorousSoil, or {cell tag or name: PorousSoil}. Raises InputError, on all ranks, for tags that do not exist or have
-    no soil, and for conductivities of another dimension. Collective.
+    Args:
+        domain: mesh of the body.
+        soil: soil, or soils by cell tag or name.
+        cell_tags: tags of the cells.
+
+    Raises:
+        InputError: a tag does not exist or has no soil, or a conductivity is of another dimension. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     comm, dim = domain.comm, domain.geometry.dim
-    by_tag = soil if isinstance(soil, dict) else {None: soil}
+    by_tag: dict[Any, PorousSoil] = {None: soil} if not isinstance(soil, dict) else soil
     for key, one in by_tag.items():
         agree(comm, None if isinstance(one, PorousSoil) else f"soil: got {one!r} for {key!r}, expected a PorousSoil")
         shape = np.shape(one.conductivity)

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
 
 from fenics_bridge.compat import facet_nodes
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.supports import tagged_facets
-from fenics_bridge.water.boundary import Reservoir, value_at
+from fenics_bridge.types import MeshTags
+from fenics_bridge.water.boundary import Reservoir, WaterBoundary, value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 
-def standing_water(domain, facet_tags, boundary, unit_weight=WATER_WEIGHT):
+def standing_water(
+    domain: Mesh, facet_tags: MeshTags, boundary: Sequence[WaterBoundary], unit_weight: float = WATER_WEIGHT
+) -> Callable[[NDArray[np.float64], float], NDArray[np.float64]]:
     """Pressure of the reservoirs on the ground above each point, for `loading` of `Seepage`, in plane sections.
 
-    boundary: list of conditions, of which each Reservoir counts; its surface has one height at each horizontal coordinate
-    unit_weight: of water [N/m3]
-    Returns a function of positions (n, 2) [m] and a time [s] that returns pressures (n,) [Pa]; it may be called on any rank.
-    Raises InputError, on all ranks, for other than two dimensions, unknown tags and where there is no reservoir. Collective.
+    Args:
+        domain: mesh of the body.
+        facet_tags: tags of the boundary.
+        boundary: boundary conditions, of which each Reservoir counts; its surface has one height at each horizontal coordinate.
+        unit_weight: unit weight of water [N/m3].
+
+    Returns:
+        Function of positions (n, 2) [m] and a time [s] that returns pressures (n,) [Pa]; it may be called on any rank.
+
+    Raises:
+        InputError: the mesh has not two dimensions, a tag is unknown, or there is no reservoir. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     dim = domain.geometry.dim
     agree(domain.comm, None if dim == 2 else f"domain: has {dim} dimensions, expected a plane section")
@@ -39,10 +56,22 @@ def standing_water(domain, facet_tags, boundary, unit_weight=WATER_WEIGHT):
     return pressure
 
 
-def ground_line(domain, facet_tags, tag):
-    """The surface at the facets of a tag as a line: x rising and the highest y at each, (k,) [m]. Collective.
+def ground_line(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The surface at the facets of a tag as a line, in a plane section.
 
-    Raises InputError, on all ranks, for an unknown tag.
+    Args:
+        domain: mesh of the body.
+        facet_tags: tags of the boundary.
+        tag: number or name of the tag.
+
+    Returns:
+        Coordinates x, rising, and the highest y at each of them [m], both of shape (k,).
+
+    Raises:
+        InputError: no facet has the tag. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     facets = tagged_facets(domain.comm, facet_tags, tag, "boundary")
     nodes = domain.geometry.x[facet_nodes(domain, facets).ravel()][:, :2]
