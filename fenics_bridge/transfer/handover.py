@@ -22,7 +22,7 @@ class Handover:
     """Result of a hand-over; sums are over all ranks.
 
     unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
-    equilibrated_ratio: the same after the equilibration [-]; None without equilibration
+    equilibrated_ratio: the same after the equilibration [-]; None without equilibration, as with cells that rest
     returned_fraction: fraction of the particles whose stress had to be returned to the yield surface [-]
     yielded_fraction: fraction of the particles that yielded in the equilibration where the finite elements did not [-]
     """
@@ -37,7 +37,7 @@ class Handover:
     yielded_share = renamed("yielded_share", "yielded_fraction")
 
 
-def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True):
+def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True, resting=False):
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
 
     Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
@@ -61,11 +61,16 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
         equilibrium as it is; with other cells the smooth stress is far nearer to it.
     equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads, to an
         out-of-balance ratio of 5e-4
+    resting: let all cells rest (`Model.rest`) as the finite elements that they were; only what fails turns into particles.
+        They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are
     Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh or, moved,
     outside the background mesh, for laws or geometries that do not match, and for finite elements that did not converge. Collective.
     """
     particles = model.particles
     _require_usable(model, fem, move)
+    if resting:
+        agree(model.comm, "move: cells that rest are not moved, expected False with resting" if move else None)
+        model.rest()
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
     if isinstance(fem, QuasiStatic):
@@ -80,7 +85,9 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
     _displace(model, fem.displacement, search, move, count_displacement)
     before = model.out_of_balance()
     had_yielded = int(np.sum(particles.plastic_strain > 0))
-    after = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio if equilibrate else None
+    after = None
+    if equilibrate and not resting:
+        after = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
     return Handover(before, after, returned / count, yielded / count)

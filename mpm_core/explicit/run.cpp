@@ -56,10 +56,12 @@ std::string failure_text(const Model<G>& model, const Failure<D>& failure)
 
 namespace
 {
-/// @throws InputError integration that the geometry or several velocity fields do not have
+/// @throws InputError integration that the geometry, several velocity fields or resting cells do not have
 template <class G>
 void require_integration(const Model<G>& model, const ExplicitOptions& options)
 {
+  if (options.integration == Integration::dual_domain && model.particles.resting.present)
+    throw InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED with resting cells");
   if (options.integration == Integration::dual_domain && (G::has_hoop || model.fields.size() > 1))
     throw InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED in axial symmetry and with several "
                      "velocity fields");
@@ -95,6 +97,8 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   {
     if (done % control_interval == 0)
     {
+      if (run.conversion)
+        convert_failing(model, *run.conversion);
       const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
       dt = next_step(model, run, critical);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
@@ -197,6 +201,8 @@ Diagnostics diagnostics(const Model<G>& model)
   d.outflow_mass = model.totals.outflow_mass;
   d.particle_steps = static_cast<double>(model.totals.particle_steps);
   d.plastic_fraction = static_cast<double>(model.last.plastic);
+  d.resting_cells = static_cast<double>(std::ranges::count(model.order.resting, 1));
+  d.converted_cells = static_cast<double>(model.totals.converted_cells);
   std::array<double, sizeof(Diagnostics) / sizeof(double)> sums;
   std::copy_n(&d.particles, sums.size(), sums.begin());
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);

@@ -3,6 +3,7 @@
 /// Many explicit steps in a row, and what they amount to.
 
 #include "explicit/explicit_step.h"
+#include "model/resting.h"
 
 namespace mpm::explicit_scheme
 {
@@ -14,6 +15,7 @@ struct RunOptions
   double pic = 0;              ///< PIC fraction of a critical time step, in [0, 1]; takes the place of that of a step
   bool allow_unstable = false; ///< take `dt` even above the critical step
   std::int64_t max_steps = 0;  ///< return earlier, after this many steps
+  std::optional<Conversion> conversion; ///< of resting cells, at each control interval; without one they stay
 };
 
 /// Steps between two looks at the critical time step.
@@ -54,6 +56,8 @@ struct Diagnostics
   double outflow_mass;
   double particle_steps;
   double plastic_fraction; ///< of the particles, in the last step
+  double resting_cells;
+  double converted_cells;
   double unbalanced_ratio; ///< |f_ext - f_int| / |f_ext| in the last step; 0 without external force
 };
 

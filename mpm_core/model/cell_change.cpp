@@ -1,6 +1,7 @@
 #include "model/cell_change.h"
 
 #include "mesh/search.h"
+#include "model/resting.h"
 
 #include <numeric>
 
@@ -75,6 +76,31 @@ void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<c
 }
 
 template <class G>
+void note_disturbed(Model<G>& model, std::span<const Index> entered)
+{
+  for (Index p : entered)
+  {
+    const Index cell = model.particles.cell[p];
+    if (!model.order.resting.empty() && model.order.resting[static_cast<std::size_t>(cell)])
+      model.migration.disturbed.push_back(cell);
+  }
+}
+
+namespace
+{
+/// Resting cells that particles have entered become particles, too.
+template <class G>
+void convert_disturbed(Model<G>& model)
+{
+  std::vector<unsigned char> chosen(static_cast<std::size_t>(model.mesh.owned_cells), 0);
+  for (Index cell : model.migration.disturbed)
+    chosen[static_cast<std::size_t>(cell)] = 1;
+  model.migration.disturbed.clear();
+  convert_cells<G>(model, chosen);
+}
+} // namespace
+
+template <class G>
 void migrate_particles(Model<G>& model)
 {
   Migration& migration = model.migration;
@@ -95,12 +121,15 @@ void migrate_particles(Model<G>& model)
   std::vector<Index> arrivals(static_cast<std::size_t>(arrived));
   std::iota(arrivals.begin(), arrivals.end(), model.particles.size() - arrived);
   add_entered(model.mesh, model.particles, arrivals, model.field_of_law, model.fields);
+  note_disturbed(model, arrivals);
 
   // Particles out of order cut the runs of two cells. Sorting is due when they have cost as much as it does.
   CellOrder& order = model.order;
   order.out_of_order += arrived;
   order.cost += order.out_of_order;
-  if (static_cast<double>(order.cost) > sort_cost * model.particles.size())
+  if (!migration.disturbed.empty())
+    convert_disturbed(model);
+  else if (static_cast<double>(order.cost) > sort_cost * model.particles.size())
     sort_particles(model);
   else if (gone || arrived > 0)
     find_cell_runs(model, false);
@@ -110,6 +139,7 @@ void migrate_particles(Model<G>& model)
   template void follow_leaving(Model<G>&, const Run&, VelocityField<G>&);                                              \
   template void add_entered(const Mesh<G::dim>&, const Particles<G::dim>&, std::span<const Index>,                     \
                             std::span<const Index>, std::vector<VelocityField<G>>&);                                   \
+  template void note_disturbed(Model<G>&, std::span<const Index>);                                                     \
   template void migrate_particles(Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

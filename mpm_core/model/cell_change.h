@@ -25,8 +25,12 @@ template <class G, int D = G::dim>
 void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Index> entered,
                  std::span<const Index> field_of_law, std::vector<VelocityField<G>>& fields);
 
+/// Notes the resting cells that particles have entered.
+template <class G>
+void note_disturbed(Model<G>& model, std::span<const Index> entered);
+
 /// Takes outflow particles out, sends migrating ones to their ranks and adds arrivals to moments; sorts when order has
-/// been lost.
+/// been lost. Resting cells that particles have entered become particles.
 /// @note Collective
 template <class G>
 void migrate_particles(Model<G>& model);

@@ -2,6 +2,7 @@
 
 #include "materials/laws/stored_energy.h"
 #include "model/model.h"
+#include "transfer/resting.h"
 
 namespace mpm::model
 {
@@ -16,8 +17,14 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
   std::array<double, max_states> state{};
   for (std::size_t k = 0; k < particles.state.size(); ++k)
     state[k] = particles.state[k][p];
-  return {0.5 * particles.mass[p] * dot<D>(v, v),
-          particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
+  double kinetic = 0.5 * particles.mass[p] * dot<D>(v, v);
+  if (is_resting(particles, p))
+  {
+    const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, p);
+    const auto& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+    kinetic += 0.5 * relative_product<D>(gradient, gradient, moments.mass_xixi);
+  }
+  return {kinetic, particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
 }
 
 template <class G, int D>

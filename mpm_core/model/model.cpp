@@ -2,6 +2,7 @@
 
 #include "model/mapping.h"
 #include "parallel/agreement.h"
+#include "transfer/resting.h"
 
 #include <algorithm>
 #include <cmath>
@@ -94,6 +95,18 @@ void find_first_runs(Model<G>& model, VelocityField<G>& field)
 }
 } // namespace
 
+namespace
+{
+template <int D>
+void find_resting_cells(const Mesh<D>& mesh, CellOrder& order)
+{
+  order.resting.assign(static_cast<std::size_t>(mesh.owned_cells), 0);
+  for (const Run& run : order.runs)
+    if (run.resting)
+      order.resting[static_cast<std::size_t>(run.cell)] = 1;
+}
+} // namespace
+
 template <class G>
 void find_cell_runs(Model<G>& model, bool again)
 {
@@ -102,6 +115,8 @@ void find_cell_runs(Model<G>& model, bool again)
     find_runs_again(model.particles, batch_size, order.runs);
   else
     find_runs(model.particles, batch_size, order.runs);
+  if (model.particles.resting.present)
+    find_resting_cells(model.mesh, order);
   order.marks.resize(model.mesh.cells.size(), 0);
   for (VelocityField<G>& field : model.fields)
     find_first_runs(model, field);
@@ -110,8 +125,9 @@ void find_cell_runs(Model<G>& model, bool again)
 template <class G>
 Inventory taken_inventory(const Model<G>& model)
 {
-  std::array<double, 2> sums{static_cast<double>(model.particles.size() + model.totals.outflow_particles),
-                             model.totals.outflow_mass};
+  const std::int64_t particles =
+      model.particles.size() + model.totals.outflow_particles - model.totals.gained_particles;
+  std::array<double, 2> sums{static_cast<double>(particles), model.totals.outflow_mass};
   for (double mass : model.particles.mass)
     sums[1] += mass;
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
@@ -153,6 +169,43 @@ void find_least_masses(Model<G>& model)
 }
 } // namespace
 
+namespace
+{
+/// @throws InputError where a cell holds a row beside that of the resting cell
+template <int D>
+void check_resting_cells(const Particles<D>& particles, const std::vector<Run>& runs)
+{
+  for (std::size_t r = 1; r < runs.size(); ++r)
+    if (runs[r].cell == runs[r - 1].cell && (runs[r].resting || runs[r - 1].resting))
+      throw InputError("particle " + std::to_string(particles.id[runs[r].resting ? runs[r - 1].first : runs[r].first]) +
+                       " is in a cell that rests, expected such cells without particles");
+}
+
+/// The moments of all cells from their particles.
+template <class G, int D = G::dim>
+void sum_moments(Model<G>& model)
+{
+  Rules<D> rules;
+  const Particles<D>& particles = model.particles;
+  for (const Run& run : model.order.runs)
+  {
+    VelocityField<G>& field = field_of(model, run.material);
+    CellMoments<G>& moments = field.moments[run.cell];
+    const auto& shape = model.mesh.shapes[run.cell];
+    if (run.resting)
+    {
+      const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
+      moments.mass_xixi = second_moment<D>(model.mesh, run.cell, particles.mass[run.first], rule);
+      take_row<G>(particles, run.first, moments);
+    }
+    else
+      add_moments<G>(particles, run.first, run.last, shape, moments);
+    if (!field.tractions.empty())
+      add_moments(particles, run.first, run.last, shape, field.tractions[run.cell]);
+  }
+}
+} // namespace
+
 template <class G>
 void prepare(Model<G>& model)
 {
@@ -165,14 +218,8 @@ void prepare(Model<G>& model)
     clear_field(model.mesh, loaded, field);
   model.migration.owned_cells = owned_cell_numbers(model.mesh);
   sort_particles(model);
-  for (const Run& run : model.order.runs)
-  {
-    VelocityField<G>& field = field_of(model, run.material);
-    const auto& shape = model.mesh.shapes[run.cell];
-    add_moments<G>(model.particles, run.first, run.last, shape, field.moments[run.cell]);
-    if (loaded)
-      add_moments(model.particles, run.first, run.last, shape, field.tractions[run.cell]);
-  }
+  collectively(model.exchange.comm, [&] { check_resting_cells(model.particles, model.order.runs); });
+  sum_moments(model);
   find_least_masses(model);
   model.inventory = taken_inventory(model);
   model.ready = true;

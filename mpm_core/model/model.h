@@ -46,10 +46,12 @@ struct Totals
   std::int64_t sorts = 0;
   std::int64_t outflow_particles = 0;
   double outflow_mass = 0;
-  double external_work = 0; ///< of gravity and tractions
-  double internal_work = 0; ///< of stresses
-  double damping_work = 0;  ///< taken out by local damping
-  double support_work = 0;  ///< of prescribed velocities
+  std::int64_t converted_cells = 0;  ///< resting cells that have become particles
+  std::int64_t gained_particles = 0; ///< by that, beyond their own rows
+  double external_work = 0;          ///< of gravity and tractions
+  double internal_work = 0;          ///< of stresses
+  double damping_work = 0;           ///< taken out by local damping
+  double support_work = 0;           ///< of prescribed velocities
 };
 
 /// Of the last step, on this rank.
@@ -69,10 +71,11 @@ struct Inventory
 /// The order of the particles by cells.
 struct CellOrder
 {
-  std::vector<Run> runs;            ///< of the particles as they are now
-  std::vector<unsigned char> marks; ///< scratch, one per cell; all zero
-  Index out_of_order = 0;           ///< particles that changed cell since the last sort
-  std::int64_t cost = 0;            ///< their sum over the steps since
+  std::vector<Run> runs;              ///< of the particles as they are now
+  std::vector<unsigned char> marks;   ///< scratch, one per cell; all zero
+  std::vector<unsigned char> resting; ///< per owned cell: 1 where it rests; empty where no cell of the model may
+  Index out_of_order = 0;             ///< particles that changed cell since the last sort
+  std::int64_t cost = 0;              ///< their sum over the steps since
 };
 
 /// What changes cells or ranks in a step.
@@ -82,6 +85,7 @@ struct Migration
   std::vector<Index> entered;                         ///< particles that entered another cell of this rank
   std::vector<MigratingParticle> migrating;
   std::vector<Index> outflow;
+  std::vector<Index> disturbed;  ///< resting cells that a particle has entered in this step
   std::vector<Index> lost;       ///< particles that no cell known to this rank's neighbourhood holds
   std::vector<int> far_partners; ///< ranks beyond the neighbours that exchange particles after this pass
 };
@@ -152,7 +156,8 @@ inline Vector<D> gravity_at(const Model<G>& model, double time)
 
 /// Sorts the particles, finds runs and moments, and gives nodes the sums and velocities at the start; needed after
 /// anything but a step has changed the particles. Does nothing when they are up to date.
-/// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive
+/// @throws InputError a particle whose values are not finite, or whose mass or volume is not positive; one in a resting
+/// cell
 /// @note Collective
 template <class G>
 void prepare(Model<G>& model);

@@ -4,6 +4,7 @@
 #include "model/cell_change.h"
 #include "model/strain_kind.h"
 #include "transfer/affine_field.h"
+#include "transfer/resting.h"
 
 #include <algorithm>
 
@@ -107,6 +108,49 @@ void update_moments(const Particles<D>& particles, const PassOptions& options, c
   }
 }
 
+/// The same of a resting cell, whose particles have velocities v + grad v . xi.
+template <class G, int D = G::dim>
+double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& field, const Mesh<D>& mesh,
+                        const Run& run, double pic_fraction)
+{
+  const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
+  const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
+  Matrix<D> half = gradient_at<D>(particles.velocity_gradient, run.first), change;
+  double sum = 0;
+  for (int a = 0; a < D; ++a)
+  {
+    const double v = particles.velocity[a][run.first], of_centre = pic_fraction * (v - nodal.value[a]);
+    sum += particles.mass[run.first] * of_centre * (v - 0.5 * of_centre);
+    for (int b = 0; b < D; ++b)
+    {
+      change[a][b] = pic_fraction * (half[a][b] - nodal.gradient[a][b]);
+      half[a][b] -= 0.5 * change[a][b];
+    }
+  }
+  return sum + relative_product<D>(change, half, field.moments[run.cell].mass_xixi);
+}
+
+/// Moves the particles of a batch, and marks the runs that some have left.
+template <class G, int D = G::dim>
+void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
+                const BatchScratch<D>& scratch)
+{
+  auto& runs = model.order.runs;
+  for (std::size_t r = batch.first_run; options.pic_fraction > 0 && r < batch.last_run; ++r)
+    model.energy.pic_loss += batch.resting
+                                 ? pic_loss_at_rest(model.particles, field, model.mesh, runs[r], options.pic_fraction)
+                                 : pic_loss(model.mesh, model.particles, field, runs[r], options.pic_fraction);
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+  {
+    const CellMotion<D>& motion = scratch.motion[r - batch.first_run];
+    if (!batch.resting)
+      runs[r].out_of_order =
+          !move_particles<D>(model.particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
+    else if (!move_row<D>(model.particles, runs[r].first, motion))
+      note_failure<D>(model.failure, model.particles, Failure<D>::Kind::not_finite, runs[r].first, {});
+  }
+}
+
 /// Moves and strains the particles of a batch, and brings the moments of their cells to where they are then.
 /// @param from_particles  sum the moments over the particles, instead of following the motion of the cell
 template <class Kind, class G, int D = G::dim>
@@ -116,12 +160,8 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   VelocityField<G>& field = field_of(model, batch.material);
   auto& runs = model.order.runs;
   find_motions(model.mesh, field, runs, options, batch, scratch);
-  for (std::size_t r = batch.first_run; options.move && options.pic_fraction > 0 && r < batch.last_run; ++r)
-    model.energy.pic_loss += pic_loss(model.mesh, model.particles, field, runs[r], options.pic_fraction);
   if (options.move)
-    for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-      runs[r].out_of_order = !move_particles<D>(model.particles, runs[r].first, runs[r].last,
-                                                model.mesh.shapes[runs[r].cell], scratch.motion[r - batch.first_run]);
+    move_batch(model, field, options, batch, scratch);
   if (options.stress)
     update_stress<Kind>(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
@@ -132,7 +172,13 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     CellMoments<G>& moments = field.moments[run.cell];
     if (run.first_in_cell && options.stress)
       model.energy.stress_work += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
-    if (from_particles)
+    if (batch.resting)
+    {
+      take_row<G>(model.particles, run.first, moments);
+      if (options.stress)
+        model.energy.ahead += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
+    }
+    else if (from_particles)
     {
       if (run.first_in_cell)
         moments = {};
@@ -186,6 +232,7 @@ void particle_pass(Model<G>& model, const PassOptions& options)
   if (migration.entered.empty())
     return;
   add_entered(model.mesh, model.particles, migration.entered, model.field_of_law, model.fields);
+  note_disturbed(model, migration.entered);
   model.order.out_of_order += static_cast<Index>(migration.entered.size());
   migration.entered.clear();
   if (migration.migrating.empty() && migration.lost.empty())

@@ -74,6 +74,8 @@ void for_each_number(M& model, F&& f)
   f("particle_steps", Kind::sum, model.totals.particle_steps);
   f("outflow_particles", Kind::sum, model.totals.outflow_particles);
   f("outflow_mass", Kind::sum, model.totals.outflow_mass);
+  f("converted_cells", Kind::sum, model.totals.converted_cells);
+  f("gained_particles", Kind::sum, model.totals.gained_particles);
   f("external_work", Kind::sum, model.totals.external_work);
   f("internal_work", Kind::sum, model.totals.internal_work);
   f("damping_work", Kind::sum, model.totals.damping_work);

@@ -113,14 +113,19 @@ namespace
 /// Appends particles of one cell and material; they join the run before as far as it may grow.
 void append(std::vector<Run>& runs, Run piece, Index longest)
 {
-  if (!runs.empty() && runs.back().cell == piece.cell && runs.back().material == piece.material)
+  if (!runs.empty() && runs.back().cell == piece.cell && runs.back().material == piece.material &&
+      !runs.back().resting && !piece.resting)
   {
     const Index joining = std::min(piece.last - piece.first, longest - (runs.back().last - runs.back().first));
     runs.back().last += joining;
     piece.first += joining;
   }
   for (; piece.first < piece.last; piece.first += longest)
-    runs.push_back({piece.first, std::min(piece.last, piece.first + longest), piece.cell, piece.material});
+    runs.push_back({.first = piece.first,
+                    .last = std::min(piece.last, piece.first + longest),
+                    .cell = piece.cell,
+                    .material = piece.material,
+                    .resting = piece.resting});
 }
 
 template <int D>
@@ -129,10 +134,12 @@ void append_one_by_one(const Particles<D>& particles, Index first, Index last, I
   for (Index p = first; p < last;)
   {
     const Index cell = particles.cell[p], material = particles.material[p];
+    const bool resting = is_resting(particles, p);
     Index q = p + 1;
-    while (q < last && particles.cell[q] == cell && particles.material[q] == material)
+    while (!resting && q < last && particles.cell[q] == cell && particles.material[q] == material &&
+           !is_resting(particles, q))
       ++q;
-    append(runs, {p, q, cell, material}, longest);
+    append(runs, {.first = p, .last = q, .cell = cell, .material = material, .resting = resting}, longest);
     p = q;
   }
 }

@@ -17,9 +17,11 @@ struct Run
   Index material;
   bool first_in_cell = false; ///< whether it is the first one in its cell
   bool out_of_order = false;  ///< whether some of its particles are in another cell by now
+  bool resting = false;       ///< whether it is the one row of a resting cell
 };
 
-/// All columns have one entry per particle; those of optional fields may be absent.
+/// All columns have one entry per particle; those of optional fields may be absent. A resting cell has one entry, too:
+/// its centre stands for all its particles, which do not move relative to the cell (model/resting.h).
 template <int D>
 struct Particles
 {
@@ -33,6 +35,10 @@ struct Particles
   std::vector<Column> state;
   std::array<Column, D> initial_position;
   OptionalColumns<D> traction;
+  OptionalColumns<1> resting;
+  OptionalColumns<D * D> velocity_gradient;
+  OptionalColumns<D> resting_displacement;
+  OptionalColumns<D * D> displacement_gradient;
   std::vector<Index> material;
   std::vector<Index> cell;
   std::vector<AddedField> added; ///< fields that the run has declared for itself
@@ -60,6 +66,14 @@ void for_each_field(P& particles, F&& f)
   f(Field{"initial_position", "m", "Position from which displacement counts", settable}, particles.initial_position);
   f(Field{"traction", "N", "Force from a loaded boundary, t_p of (15), which moves with the particle", settable},
     particles.traction);
+  f(Field{"resting", "-", "Number of particles that a resting cell stands for; 0 in a particle"}, particles.resting);
+  f(Field{"velocity_gradient", "1/s",
+          "Gradient of the velocity in a resting cell, dv_x/dx first, then dv_x/dy; 0 in a particle", settable},
+    particles.velocity_gradient);
+  f(Field{"resting_displacement", "m", "Displacement of the centre of a resting cell since it began to rest"},
+    particles.resting_displacement);
+  f(Field{"displacement_gradient", "-", "Gradient of the displacement in a resting cell since it began to rest"},
+    particles.displacement_gradient);
   f(Field{"material", "-", "Number of the law"}, particles.material);
   f(Field{"cell", "-", "Number of the cell on this rank that holds the particle"}, particles.cell);
   for (auto& added : particles.added)
@@ -111,6 +125,13 @@ inline Vector<D> at(const std::array<Column, D>& columns, Index p)
   return v;
 }
 
+/// Whether a row is that of a resting cell.
+template <int D>
+inline bool is_resting(const Particles<D>& particles, Index p)
+{
+  return particles.resting.present && particles.resting[0][p] > 0;
+}
+
 /// Puts particle `order[p]` in place p.
 template <int D>
 void reorder(Particles<D>& particles, std::span<const Index> order);
@@ -123,8 +144,8 @@ void sort_by_cell(Particles<D>& particles, Index n_cells, Index n_materials);
 template <int D>
 void remove(Particles<D>& particles, std::span<const Index> numbers);
 
-/// The runs in which the particles lie, none longer than `longest`. Fewest when the particles are in cell order. Marks
-/// of runs are false.
+/// The runs in which the particles lie, none longer than `longest`; the row of a resting cell is one. Fewest when the
+/// particles are in cell order. Marks of order are false.
 template <int D>
 void find_runs(const Particles<D>& particles, Index longest, std::vector<Run>& runs);
 

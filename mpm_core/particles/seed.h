@@ -45,6 +45,7 @@ Index seed_points(const Mesh<D>& mesh, std::span<const double> points, std::span
 /// `traction * facet area` is shared evenly by the particles nearest to it. The force is dead: it moves with its
 /// particles and keeps its direction.
 /// @returns area [m^(D-1)] of the loaded facets on this rank
+/// @throws InputError where the cell behind such a facet rests
 template <class G>
 double load_facets(const Mesh<G::dim>& mesh, Index facet_tag, const Vector<G::dim>& traction,
                    Particles<G::dim>& particles);

@@ -5,6 +5,7 @@
 #include "model/mapping.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
+#include "model/resting.h"
 #include "parallel/partition.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
@@ -39,16 +40,17 @@ std::shared_ptr<Mesh<D>> mesh_from_arrays(const py::array& points, const py::arr
 py::dict as_dict(const Diagnostics& d)
 {
   using namespace py::literals;
-  return py::dict("particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
-                  "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
-                  "external_work"_a = d.external_work, "internal_work"_a = d.internal_work,
-                  "damping_work"_a = d.damping_work, "support_work"_a = d.support_work, "stress_work"_a = d.stress_work,
-                  "stored_energy"_a = d.stored_energy, "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss,
-                  "nodal_kinetic_energy"_a = d.nodal_kinetic_energy, "unexplained_energy"_a = d.unexplained_energy,
-                  "energy_scale"_a = d.energy_scale,
-                  "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
-                  "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
-                  "plastic_fraction"_a = d.plastic_fraction, "unbalanced_ratio"_a = d.unbalanced_ratio);
+  return py::dict(
+      "particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
+      "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
+      "external_work"_a = d.external_work, "internal_work"_a = d.internal_work, "damping_work"_a = d.damping_work,
+      "support_work"_a = d.support_work, "stress_work"_a = d.stress_work, "stored_energy"_a = d.stored_energy,
+      "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss, "nodal_kinetic_energy"_a = d.nodal_kinetic_energy,
+      "unexplained_energy"_a = d.unexplained_energy, "energy_scale"_a = d.energy_scale,
+      "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles), "outflow_mass"_a = d.outflow_mass,
+      "particle_steps"_a = d.particle_steps, "plastic_fraction"_a = d.plastic_fraction,
+      "resting_cells"_a = static_cast<std::int64_t>(d.resting_cells),
+      "converted_cells"_a = static_cast<std::int64_t>(d.converted_cells), "unbalanced_ratio"_a = d.unbalanced_ratio);
 }
 
 template <int D>
@@ -230,6 +232,21 @@ void bind_model(py::module_& m, const std::string& suffix)
              check_array<double>("position", positions, {static_cast<py::ssize_t>(model.particles.size()), D});
              place_particles<G>(model, values<double>(positions));
            })
+      .def("rest_cells",
+           [](M& model, const py::array& chosen)
+           {
+             check_array<std::uint8_t>("chosen", chosen, {static_cast<py::ssize_t>(model.mesh.owned_cells)});
+             rest_cells(model, values<std::uint8_t>(chosen));
+           })
+      .def("convert_cells",
+           [](M& model, const py::array& chosen)
+           {
+             check_array<std::uint8_t>("chosen", chosen, {static_cast<py::ssize_t>(model.mesh.owned_cells)});
+             prepare(model);
+             convert_cells(model, values<std::uint8_t>(chosen));
+           })
+      .def_property_readonly("has_resting_cells", [](const M& model) { return model.particles.resting.present; })
+      .def_property_readonly("converted_cells", [](const M& model) { return model.totals.converted_cells; })
       .def("remove_particles",
            [](M& model, const py::array& rows)
            {
@@ -300,7 +317,13 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def_readwrite("courant", &RunOptions::courant)
       .def_readwrite("pic", &RunOptions::pic)
       .def_readwrite("allow_unstable", &RunOptions::allow_unstable)
-      .def_readwrite("max_steps", &RunOptions::max_steps);
+      .def_readwrite("max_steps", &RunOptions::max_steps)
+      .def_readwrite("conversion", &RunOptions::conversion);
+  py::class_<Conversion>(m, "Conversion")
+      .def(py::init(
+          [](double plastic_strain, double displacement, int layers) {
+            return Conversion{plastic_strain, displacement, layers};
+          }));
   m.attr("control_interval") = control_interval;
   bind_mesh<2>(m, "2");
   bind_mesh<3>(m, "3");

@@ -135,6 +135,8 @@ bool is_scalar(const Field& field, const Columns& columns)
 {
   if constexpr (std::is_same_v<Columns, std::vector<Column>>)
     return columns.size() == 1 && field.name != "state";
+  else if constexpr (is_optional<Columns>)
+    return columns.columns.size() == 1;
   else
     return std::is_same_v<std::remove_cvref_t<decltype(columns_of(columns)[0])>, Columns>;
 }
@@ -153,7 +155,7 @@ py::object column(const Model<G>& model, const std::string& name, const ChosenRo
   {
     const auto all = columns_of(columns);
     if (is_scalar(field, columns))
-      copy = chosen_of(all[0], chosen);
+      copy = chosen_of(all[0], is_present(columns) ? chosen : ChosenRows{});
     else if constexpr (std::is_same_v<const Column&, decltype(all[0])>)
       copy = is_present(columns) ? rows(all, n, chosen) : rows(all, 0, {});
   };

@@ -44,6 +44,7 @@ from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
 from .surfaces import Box, Disc, Plane, Polyline, Sphere
@@ -55,6 +56,7 @@ __all__ = [
     "Box",
     "CamClay",
     "ConeMatch",
+    "Conversion",
     "Disc",
     "DruckerPrager",
     "ElementTest",

@@ -17,6 +17,7 @@ from .conditions import Conditions
 from .mesh import Mesh, Tag, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
+from .resting import RestingCells, refuse_resting
 from .space import SpaceWatch
 
 
@@ -41,7 +42,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body(Conditions):
+class Body(Conditions, RestingCells):
     """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
@@ -359,6 +360,7 @@ class Body(Conditions):
         def checked() -> NDArray[np.float64]:
             return floats("position", position, (len(self.particles), self.mesh.dim))
 
+        refuse_resting(self, "place()")
         self._core.place_particles(collectively(self.comm, checked))
 
     # --- ranks ---------------------------------------------------------------------------------------------------

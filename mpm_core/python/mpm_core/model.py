@@ -28,10 +28,15 @@ from .newton import Newton
 from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
+from .resting import Conversion, checked_conversion, refuse_resting
 from .reports import Reports
 from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
+
+
+CONVERSION = Conversion()
+"""When resting cells turn into particles, unless a run says otherwise"""
 
 
 class Model(Body):
@@ -206,6 +211,7 @@ class Model(Body):
         allow_unstable: bool = False,
         rebalance: float | None = None,
         energy_limit: float | None = 0.2,
+        conversion: Conversion | None = CONVERSION,
     ) -> Reports[Report]:
         """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
 
@@ -231,6 +237,7 @@ class Model(Body):
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
             energy_limit: `Report.unexplained_fraction`, of the energy at work, at which the run ends with an error; None for none.
                 Above 0.01 there is an `EnergyWarning`.
+            conversion: when resting cells turn into particles (see ``rest``); None where only those do that a particle enters.
 
         Raises:
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
@@ -247,6 +254,7 @@ class Model(Body):
                 checked_energy_limit(energy_limit),
             ),
         )
+        run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
         return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit")
@@ -310,6 +318,7 @@ class Model(Body):
                 particles are as after the last step that converged.
         """
         refuse_contacts(self, "the implicit scheme")
+        refuse_resting(self, "the implicit scheme")
         options, longest, times, steps, threshold, limit, wanted = collectively(
             self.comm,
             lambda: (
@@ -361,6 +370,7 @@ class Model(Body):
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
         refuse_contacts(self, "equilibrate()")
+        refuse_resting(self, "equilibrate()")
         options = collectively(
             self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
         )

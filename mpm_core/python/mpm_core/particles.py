@@ -67,6 +67,12 @@ class Particles:
         """Accumulated plastic deviatoric strain, the first state variable of every law [-], shape (n,)."""
         return self.state[:, 0]
 
+    @property
+    def is_resting(self) -> NDArray[np.bool_]:
+        """Whether each row is that of a resting cell, which stands for several particles; shape (n,). See `Model.rest`."""
+        counts = self._column("resting")
+        return counts > 0 if len(counts) else np.zeros(len(self), dtype=bool)
+
     def schedule(self) -> list[dict[str, Any]]:
         """All fields, including those that `Model.add_field` declared: ``name``, ``unit``, ``meaning``, number of
         ``components``, ``initial`` value, whether it is ``optional`` and whether it is ``settable``."""
@@ -135,12 +141,15 @@ def _add_properties() -> None:
 
     plane, solid = (core.default_particle_schedule() for core in (_core.Model2, _core.Model3))
     for field, in_space in zip(plane, solid, strict=True):
-        shapes = {1: "(n,)", 2: "(n, D)", 4: "(n, 4) or (n, 6)", 0: "(n, number of state variables)"}
         assert in_space["name"] == field["name"]
+        in_both = field["components"], in_space["components"]
+        shapes = {(1, 1): "(n,)", (2, 3): "(n, D)", (4, 6): "(n, 4) or (n, 6)", (4, 9): "(n, 4) or (n, 9)"}
         setattr(
             Particles,
             field["name"],
-            property(getter(field["name"]), doc=field_text(field, shapes[field["components"]])),
+            property(
+                getter(field["name"]), doc=field_text(field, shapes.get(in_both, "(n, number of state variables)"))
+            ),
         )
 
 

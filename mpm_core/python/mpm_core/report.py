@@ -51,6 +51,10 @@ class Report:
     and now"""
     plastic_fraction: float
     """Fraction of the particles that yielded in the last step"""
+    resting_cells: int
+    """Cells that rest; each counts as one of the particles above"""
+    converted_cells: int
+    """Resting cells that have turned into particles since the model was made"""
     unbalanced_ratio: float
     """Out-of-balance over external force, Euclidean norms over the nodes; over reactions where there is no external force"""
     outflow_particles: int

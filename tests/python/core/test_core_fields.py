@@ -71,6 +71,7 @@ def test_an_added_field_is_written_to_frames(tmp_path):
 def test_each_field_of_the_schedule_is_an_attribute_with_its_meaning(dim):
     model = moving(dim)
     model.traction(1, [1.0] * dim)
+    model.rest(where=lambda x: x[:, 0] > 0.4)
     for field in model.particles.schedule():
         values = getattr(model.particles, field["name"])
         assert values.shape in ((len(model.particles),), (len(model.particles), field["components"]))

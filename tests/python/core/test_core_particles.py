@@ -7,14 +7,18 @@ from core_cases import DIMS, box
 import mpm_core as mpm
 
 LAW = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=20.0)
-ATTRIBUTES = [name for name, value in vars(mpm.Particles).items() if isinstance(value, property)]
+ATTRIBUTES = [
+    name for name, value in vars(mpm.Particles).items() if isinstance(value, property) and name != "is_resting"
+]
 
 
-def seeded(dim):
-    """Particles whose fields all differ, with a loaded side."""
+def seeded(dim, rests=False):
+    """Particles whose fields all differ, with a loaded side, and on the other resting cells on request."""
     model = mpm.Model(box([3] * dim), LAW)
     model.seed(density=1500.0, per_cell=4)
     model.traction(2, (1e3, 2e3, 3e3)[:dim])
+    if rests:
+        model.rest(where=lambda x: x[:, 0] < 0.5)
     rng = np.random.default_rng(5)
     for name in ("velocity", "stress", "deviatoric_strain", "state", "initial_position"):
         model.particles.set(name, rng.random(getattr(model.particles, name).shape))
@@ -24,7 +28,7 @@ def seeded(dim):
 @pytest.mark.parametrize("dim", DIMS)
 @pytest.mark.parametrize("name", ATTRIBUTES)
 def test_some_particles_have_the_rows_of_all(dim, name):
-    particles = seeded(dim).particles
+    particles = seeded(dim, rests=True).particles
     n, every = len(particles), getattr(particles, name)
     assert len(every) == n
     mask = np.random.default_rng(1).random(n) < 0.3
@@ -37,9 +41,19 @@ def test_some_particles_have_the_rows_of_all(dim, name):
     np.testing.assert_array_equal(getattr(particles[np.repeat(mask, 2)[::2]], name), every[mask])
 
 
+def test_rows_of_resting_cells_are_told_from_particles():
+    model = seeded(2, rests=True)
+    every = model.particles.is_resting
+    assert 0 < every.sum() == model.resting_cells.sum() < len(every)
+    np.testing.assert_array_equal(model.particles[[2, 0]].is_resting, every[[2, 0]])
+    plain = mpm.Model(box([2, 2]), LAW)
+    plain.seed(density=1500.0)
+    assert not plain.particles.is_resting.any() and len(plain.particles[[1, 3]].is_resting) == 2
+
+
 @pytest.mark.parametrize("dim", DIMS)
 def test_copies_in_single_precision_have_the_values_of_the_attributes(dim):
-    particles = seeded(dim).particles
+    particles = seeded(dim, rests=True).particles
     copies = particles.single(*ATTRIBUTES)
     assert set(copies) == set(ATTRIBUTES)
     for name, copy in copies.items():
