@@ -9,12 +9,20 @@ from __future__ import annotations
 
 import inspect
 import os
+from typing import Any
 
 import dolfinx
 import numpy as np
 import ufl
 from dolfinx import cpp, fem, geometry, graph, io, la, mesh
 from dolfinx.mesh import GhostMode
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+try:  # newer versions
+    from dolfinx.mesh import MeshTags
+except ImportError:  # 0.5
+    from dolfinx.mesh import MeshTagsMetaClass as MeshTags
 
 try:  # 0.7 and later
     import basix.ufl as basix_ufl
@@ -24,12 +32,17 @@ except ModuleNotFoundError:  # 0.5
 SHAPE = {2: "triangle", 3: "tetrahedron"}
 
 
-def create_mesh(comm, points, cells, dim):
+def create_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.int64], dim: int) -> mesh.Mesh:
     """Mesh of linear simplices, with a new partition, each rank keeping the neighbours of its cells as ghosts.
 
-    points: (n, dim) this rank's part of the nodes [m]; nodes are numbered through in order of rank
-    cells: (m, dim + 1) int64, this rank's part of the cells, by those numbers
-    Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        points: this rank's part of the nodes [m], shape (n, dim); nodes are numbered through in order of rank.
+        cells: this rank's part of the cells, by those numbers, shape (m, dim + 1).
+        dim: 2 for triangles, 3 for tetrahedra.
+
+    Note:
+        Collective.
     """
     # PT-SCOTCH 7 takes all cores of the machine for each rank, and its threads cut a mesh differently each time.
     os.environ.setdefault("SCOTCH_PTHREAD_NUMBER", "1")
@@ -50,12 +63,19 @@ def _partitioner():
         return mesh.create_cell_partitioner(GhostMode.shared_facet, 2)
 
 
-def tags_from_nodes(domain, dim, entities, values):
+def tags_from_nodes(domain: mesh.Mesh, dim: int, entities: NDArray[np.int64], values: NDArray[np.int32]) -> MeshTags:
     """Mesh tags on the entities of dimension `dim` that have the given nodes, wherever these entities live.
 
-    entities: (k, dim + 1) int64, node numbers as they were given to `create_mesh`, on any rank
-    values: (k,) int32
-    Collective. Ghost entities receive their tag too.
+    Ghost entities receive their tag too.
+
+    Args:
+        domain: mesh of DOLFINx.
+        dim: dimension of the entities.
+        entities: node numbers of the entities as they were given to `create_mesh`, on any rank, shape (k, dim + 1).
+        values: their tags, shape (k,).
+
+    Note:
+        Collective.
     """
     entities = np.ascontiguousarray(entities, dtype=np.int64).reshape(-1, dim + 1)
     values = np.ascontiguousarray(values, dtype=np.int32)
@@ -72,14 +92,14 @@ def tags_from_nodes(domain, dim, entities, values):
     return mesh.meshtags(domain, dim, tags.indices, tags.values)  # an object of Python, to which names can be given
 
 
-def cell_nodes(domain):
-    """Geometry nodes of each cell on this rank, ghosts last: (m, D + 1) int32."""
+def cell_nodes(domain: mesh.Mesh) -> NDArray[np.int32]:
+    """Geometry nodes of each cell on this rank, ghosts last: (m, D + 1)."""
     nodes = domain.geometry.dofmap
     return nodes if isinstance(nodes, np.ndarray) else nodes.array.reshape(-1, domain.topology.dim + 1)
 
 
-def facet_nodes(domain, facets):
-    """Geometry nodes of the given facets: (k, D) int32."""
+def facet_nodes(domain: mesh.Mesh, facets: ArrayLike) -> NDArray[np.int32]:
+    """Geometry nodes of the given facets: (k, D)."""
     dim = domain.topology.dim
     domain.topology.create_connectivity(dim - 1, dim)
     domain.topology.create_connectivity(dim, dim - 1)
@@ -94,19 +114,19 @@ def facet_nodes(domain, facets):
     return np.asarray(nodes, dtype=np.int32).reshape(-1, dim)
 
 
-def add_shared(vector):
+def add_shared(vector: Any) -> None:
     """Sum a vector's ghost entries into their owners, then give the owners' sums to the ghosts. Collective."""
     mode = la.InsertMode.add if hasattr(la, "InsertMode") else la.ScatterMode.add
     vector.scatter_reverse(mode)
     vector.scatter_forward()
 
 
-def forward(vector):
+def forward(vector: Any) -> None:
     """Give the owners' values to the ghosts. Collective."""
     vector.scatter_forward()
 
 
-def function_space(domain, family, degree, size=None):
+def function_space(domain: mesh.Mesh, family: str, degree: int, size: int | None = None) -> Any:
     """Lagrange space, continuous ("Lagrange") or not ("DG"), with `size` components per node (None: scalar)."""
     if hasattr(fem, "functionspace"):
         element = (family, degree) if size is None else (family, degree, (size,))
@@ -116,7 +136,7 @@ def function_space(domain, family, degree, size=None):
     return fem.VectorFunctionSpace(domain, (family, degree), dim=size)
 
 
-def displacement_pressure_space(domain, degree):
+def displacement_pressure_space(domain: mesh.Mesh, degree: int) -> Any:
     """Displacement, continuous and of degree 1 or 2, with pressure, continuous and linear; degree 2 is Taylor and Hood's."""
     dim = domain.geometry.dim
     if basix_ufl is not None:
@@ -128,7 +148,7 @@ def displacement_pressure_space(domain, degree):
     return fem.FunctionSpace(domain, ufl.MixedElement(parts))
 
 
-def quadrature_space(domain, degree, size):
+def quadrature_space(domain: mesh.Mesh, degree: int, size: int) -> Any:
     """Space whose values live at the points of the quadrature rule of the given degree, `size` of them per point."""
     if basix_ufl is not None:
         cell = domain.basix_cell()
@@ -138,8 +158,8 @@ def quadrature_space(domain, degree, size):
     return fem.FunctionSpace(domain, element)
 
 
-def quadrature_points(domain, degree):
-    """Points of that rule in the reference cell: (q, D)."""
+def quadrature_points(domain: mesh.Mesh, degree: int) -> NDArray[np.float64]:
+    """Points of the quadrature rule of the given degree in the reference cell: (q, D)."""
     if basix_ufl is not None:
         import basix
 
@@ -149,14 +169,14 @@ def quadrature_points(domain, degree):
     return create_quadrature(domain.topology.cell_name(), degree, "default")[0]
 
 
-def interpolation_points(space):
+def interpolation_points(space: Any) -> NDArray[np.float64]:
     """Points of the reference cell at which a space interpolates: (q, D)."""
     points = space.element.interpolation_points
     return points() if callable(points) else points
 
 
-def cell_dofs(space):
-    """Blocked degrees of freedom of each cell on this rank, ghosts last: (m, k) int32."""
+def cell_dofs(space: Any) -> NDArray[np.int32]:
+    """Blocked degrees of freedom of each cell on this rank, ghosts last: (m, k)."""
     dofs = space.dofmap.list
     if isinstance(dofs, np.ndarray):
         return dofs
@@ -164,7 +184,7 @@ def cell_dofs(space):
     return dofs.array.reshape(n_cells, -1) if n_cells else dofs.array.reshape(0, 1)
 
 
-def expression_values(expression, domain, cells):
+def expression_values(expression: Any, domain: mesh.Mesh, cells: ArrayLike) -> NDArray[np.float64]:
     """Values of a compiled expression in the given cells: (number of cells, points times components)."""
     cells = np.asarray(cells, dtype=np.int32)
     if "mesh" in inspect.signature(expression.eval).parameters:
@@ -172,10 +192,19 @@ def expression_values(expression, domain, cells):
     return expression.eval(cells)
 
 
-def candidate_cells(domain, cells, points, padding):
-    """Cells whose bounding boxes contain the points: (offsets (n + 1,), cells) as in a compressed row format.
+def candidate_cells(
+    domain: mesh.Mesh, cells: NDArray[np.integer], points: NDArray[np.float64], padding: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Cells whose bounding boxes contain the points.
 
-    points: (n, 3) [m]; padding: by how much the boxes are widened [m]
+    Args:
+        domain: mesh of DOLFINx.
+        cells: cells to look at.
+        points: positions [m], shape (n, 3).
+        padding: by how much the boxes are widened [m].
+
+    Returns:
+        Offsets (n + 1,) and cells as in a compressed row format.
     """
     dim = domain.topology.dim
     cells = np.asarray(cells, dtype=np.int32)
@@ -188,6 +217,6 @@ def candidate_cells(domain, cells, points, padding):
     return found.offsets, found.array
 
 
-def version():
+def version() -> str:
     """Version of the installed DOLFINx, for reports."""
     return dolfinx.__version__

@@ -2,24 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
+from mpi4py import MPI
+
 from mpm_core import InputError
+
+T = TypeVar("T")
 
 __all__ = ["InputError", "agree", "on_root"]
 
 
-def agree(comm, message):
-    """Raise `InputError` on all ranks if any rank gives a message; None means no error.
+def agree(comm: MPI.Comm, message: str | None) -> None:
+    """Raise an error on all ranks if there is one on any.
 
-    The message of the lowest rank that gives one is raised. Collective: call it before communication that would
-    hang or crash if one rank had left.
+    Call it before communication that would hang or crash if one rank had left.
+
+    Args:
+        comm: the ranks.
+        message: what is wrong on this rank; None means no error.
+
+    Raises:
+        InputError: with the message of the lowest rank that gives one.
+
+    Note:
+        Collective.
     """
     first = next((text for text in comm.allgather(message) if text is not None), None)
     if first is not None:
         raise InputError(first)
 
 
-def on_root(comm, task):
-    """Result of `task()` on rank 0 and None elsewhere; its `InputError` reaches every rank. Collective."""
+def on_root(comm: MPI.Comm, task: Callable[[], T]) -> T | None:
+    """Carry out a task on rank 0; its `InputError` reaches every rank.
+
+    Args:
+        comm: the ranks.
+        task: function without arguments.
+
+    Returns:
+        The result on rank 0, None elsewhere.
+
+    Note:
+        Collective.
+    """
     result, message = None, None
     if comm.rank == 0:
         try:

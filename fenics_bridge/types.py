@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-try:
-    from dolfinx.mesh import MeshTags
-except ImportError:  # 0.5
-    from dolfinx.mesh import MeshTagsMetaClass as MeshTags
+from fenics_bridge.compat import MeshTags
 
 __all__ = ["Law", "Laws", "MeshTags", "OfPosition"]
 

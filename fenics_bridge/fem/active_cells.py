@@ -125,8 +125,8 @@ def _nodal_pressure(domain, pore_pressure):
 def _seepage_forces(space, p, there, radius):
     """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
 
-    By Gauss' theorem: the integral of p div v over what is there, less that of p n v over its surface. Suction does not pull at
-    the surface, so that its part of the second integral is taken out again.
+    By Gauss' theorem: the integral of p div v over the active cells, less that of p n v over their surface. Suction does not pull
+    at the surface, so that its part of the second integral is taken out again.
     """
     test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(space.mesh), ufl.min_value(p, 0.0)
     outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels

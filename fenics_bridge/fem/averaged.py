@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from dolfinx import la
+from dolfinx import fem, la
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenics_bridge import compat
@@ -20,10 +23,17 @@ class AveragedKinematics:
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
     transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is. (Particles
     do the same in small displacements, and average strains only in motion; see the theory.)
+
+    Args:
+        increment: displacement function of degree 1 whose strain is taken.
+        points: the quadrature points.
+        constraints: the boundary conditions.
+        geometry: plane strain, axial symmetry or a solid.
     """
 
-    def __init__(self, increment, points, constraints, geometry=None):
-        """As for `Kinematics`; the displacement must be of degree 1."""
+    def __init__(
+        self, increment: fem.Function, points: Any, constraints: Any, geometry: Geometry | None = None
+    ) -> None:
         self._increment, self._points, self._constraints = increment, points, constraints
         self._space, comm = increment.function_space, increment.function_space.mesh.comm
         dim, rows = increment.function_space.mesh.geometry.dim, points.n
@@ -55,14 +65,14 @@ class AveragedKinematics:
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
         self._held = self._held_dofs()
 
-    def strain_increment(self):
+    def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""
         u, strain = self._strain.createVecs()
         u.array[:] = self._increment.x.array[: self._n_dofs]
         self._strain.mult(u, strain)
         return np.array(strain.array_r).reshape(self._points.n, self._points.size)
 
-    def internal_forces(self, stress):
+    def internal_forces(self, stress: NDArray[np.float64]) -> Any:
         """Nodal forces of a stress (n, S) as a vector (`dolfinx.la`), ghosts up to date. Collective."""
         forces, weighted = self._strain.createVecs()
         weighted.array[:] = (self._volumes[:, None] * stress).ravel()
@@ -71,7 +81,7 @@ class AveragedKinematics:
         compat.forward(self._forces)
         return self._forces
 
-    def stiffness(self):
+    def stiffness(self) -> PETSc.Mat:
         """Matrix of the cells' present tangent, without the rows and columns of the supports. Collective."""
         weighted = self._volumes[:, None, None] * self._points.tangent
         self._tangent.setValuesCSR(*_rows(self._columns, weighted.reshape(-1, self._points.size)))
@@ -83,9 +93,11 @@ class AveragedKinematics:
         return matrix
 
     def _cells(self, axisymmetric):
-        """Global nodes (m, D + 1), gradients of shape functions (m, D + 1, D) [1/m], volumes (m,) of owned cells.
+        """Nodes, gradients of shape functions, volumes and radii of the owned cells.
 
-        And the radii (m,) of their centroids in an axisymmetric body, where volumes are those of one radian; else None.
+        Returns:
+            Global nodes (m, D + 1), gradients (m, D + 1, D) [1/m], volumes (m,), those of one radian in an axisymmetric body, and
+            the radii (m,) of the centroids in such a body, else None.
         """
         dim = self._space.mesh.geometry.dim
         local = compat.cell_dofs(self._space)[self._points.cells]

@@ -145,8 +145,8 @@ def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArr
     return {name: search.values(function) for name, function in functions.items()}
 
 
-def local_cells(domain, points):
-    """Owned cell that contains each point, -1 if there is none on this rank: (n,) int32.
+def local_cells(domain: Mesh, points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Owned cell that contains each point, -1 if there is none on this rank: (n,).
 
     A point on the border of several cells goes to the one in which it lies deepest.
     """

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem, la
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.geometry import weighted
@@ -19,10 +21,12 @@ N_STRESS = {2: 4, 3: 6}
 """Number of components by dimension."""
 
 
-def strain(u, radius=None):
+def strain(u: Any, radius: Any = None) -> Any:
     """Strain components of a displacement as a UFL vector.
 
-    radius: of an axisymmetric body, a UFL expression; zz is then the hoop strain u_r / r
+    Args:
+        u: displacement, UFL.
+        radius: radius of an axisymmetric body, a UFL expression; zz is then the hoop strain u_r / r.
     """
     e = ufl.sym(ufl.grad(u))
     if u.ufl_shape[0] == 2:
@@ -30,13 +34,18 @@ def strain(u, radius=None):
     return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
 
 
-def dilation(u, radius=None):
-    """Change of volume of a displacement, the trace of its strain, as a UFL expression; radius: as for `strain`."""
+def dilation(u: Any, radius: Any = None) -> Any:
+    """Change of volume of a displacement, the trace of its strain, as a UFL expression.
+
+    Args:
+        u: displacement, UFL.
+        radius: as for `strain`.
+    """
     return ufl.div(u) if radius is None else ufl.div(u) + u[0] / radius
 
 
-def strain_up_to_axis(u, radius=None):
-    """The same strain where the axis belongs to the points: there the hoop strain is du_r/dr, the limit of u_r / r."""
+def strain_up_to_axis(u: Any, radius: Any = None) -> Any:
+    """Strain components where the axis belongs to the points: there the hoop strain is du_r/dr, the limit of u_r / r."""
     components = strain(u, radius)
     if radius is None:
         return components
@@ -44,7 +53,7 @@ def strain_up_to_axis(u, radius=None):
     return ufl.as_vector([components[0], components[1], hoop, components[3]])
 
 
-def elastic_stress(strain_components, young, poisson):
+def elastic_stress(strain_components: Any, young: Any, poisson: Any) -> Any:
     """Stress components of an isotropic elastic body as a UFL vector; plane strain keeps its stress zz."""
     shear = young / (2 * (1 + poisson))
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
@@ -54,7 +63,7 @@ def elastic_stress(strain_components, young, poisson):
     return ufl.as_vector(normal + [shear * e[i] for i in range(3, e.ufl_shape[0])])
 
 
-def cell_function(domain, expression, degree, name):
+def cell_function(domain: Mesh, expression: Any, degree: int, name: str) -> fem.Function:
     """Function that is polynomial in each cell, from a UFL vector expression evaluated there."""
     space = compat.function_space(domain, "DG", degree, expression.ufl_shape[0])
     function = fem.Function(space, name=name)
@@ -62,10 +71,13 @@ def cell_function(domain, expression, degree, name):
     return function
 
 
-def part_of(function, collapsed, name):
+def part_of(function: fem.Function, collapsed: tuple[Any, Any], name: str) -> fem.Function:
     """A part of a function on a mixed space as a function of its own.
 
-    collapsed: (space, dofs) of the part, as `sub(i).collapse()` of the mixed space returns them
+    Args:
+        function: function on the mixed space.
+        collapsed: space and dofs of the part, as `sub(i).collapse()` of the mixed space returns them.
+        name: name of the new function.
     """
     space, dofs = collapsed
     part = fem.Function(space, name=name)
@@ -73,7 +85,7 @@ def part_of(function, collapsed, name):
     return part
 
 
-def force_on(space, forces, facets):
+def force_on(space: Any, forces: NDArray[np.float64], facets: NDArray[np.int32]) -> NDArray[np.float64]:
     """Sum of nodal forces (local dofs of a displacement space) over the nodes of facets: (D,). Collective."""
     dim = space.mesh.geometry.dim
     nodes = fem.locate_dofs_topological(space, dim - 1, facets)
@@ -108,7 +120,7 @@ def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
     return average
 
 
-def assembled(form, space, into=None):
+def assembled(form: Any, space: Any, into: Any = None) -> Any:
     """Linear form as a vector (`dolfinx.la`), summed over ranks, ghost entries up to date. Collective."""
     vector = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs) if into is None else into
     vector.array[:] = 0.0

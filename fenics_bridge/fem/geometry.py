@@ -7,20 +7,32 @@ of the whole body.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
 from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
 from mpm_core import Geometry
 
 
-def geometry_of(domain, given=None):
-    """The geometry of a mesh: the one that is given, or that of its dimension. Collective.
+def geometry_of(domain: Mesh, given: Geometry | None = None) -> Geometry:
+    """The geometry of a mesh: the one that is given, or that of its dimension.
 
-    Raises InputError, on all ranks, for one that does not go with the dimension, or radii below zero.
+    Args:
+        domain: mesh of the body.
+        given: geometry; None for plane strain in two dimensions and a solid in three.
+
+    Raises:
+        InputError: the geometry does not go with the dimension, or radii are below zero. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     dim = domain.geometry.dim
     usual = Geometry.PLANE_STRAIN if dim == 2 else Geometry.SOLID
@@ -34,33 +46,42 @@ def geometry_of(domain, given=None):
     return geometry
 
 
-def radius_of(domain, geometry):
+def radius_of(domain: Mesh, geometry: Geometry | None) -> Any:
     """The radius as a UFL expression in an axisymmetric body; None in others."""
     return ufl.SpatialCoordinate(domain)[0] if geometry == Geometry.AXISYMMETRIC else None
 
 
-def weighted(integrand, radius):
+def weighted(integrand: Any, radius: Any) -> Any:
     """An integrand over a mesh, multiplied by the radius in axisymmetric bodies."""
     return integrand if radius is None else radius * integrand
 
 
-def body_volumes(domain, geometry):
+def body_volumes(domain: Mesh, geometry: Geometry | None) -> NDArray[np.float64]:
     """Volumes of the cells that this rank owns (m,): [m^D], or of one radian, the integral of r dA, in an axisymmetric body."""
     volumes = cell_volumes(domain)
     return volumes * cell_corners(domain)[:, :, 0].mean(axis=1) if geometry == Geometry.AXISYMMETRIC else volumes
 
 
-def require_same_geometry(model, fem):
+def require_same_geometry(model: Any, fem: Any) -> None:
     """Raise InputError, on all ranks, unless particles and finite elements have the same geometry. Collective."""
     same = model.geometry == fem.geometry
     problem = f"fem: its geometry is {fem.geometry.name}, that of the particles is {model.geometry.name}"
     agree(model.comm, None if same else problem)
 
 
-def require_axis_held(space, geometry, constraints):
-    """Raise InputError, on all ranks, unless nodes on the axis are fixed along the radius. Collective.
+def require_axis_held(space: Any, geometry: Geometry, constraints: Any) -> None:
+    """Require that nodes on the axis of an axisymmetric body are fixed along the radius.
 
-    space: of the displacement, or that part of a mixed space
+    Args:
+        space: space of the displacement, or that part of a mixed space.
+        geometry: plane strain, axial symmetry or a solid.
+        constraints: the boundary conditions.
+
+    Raises:
+        InputError: a node on the axis may move along the radius. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     if geometry != Geometry.AXISYMMETRIC:
         return

@@ -110,7 +110,7 @@ def _checked_layers(layers):
     return bottoms, unit_weights, ratios
 
 
-def surface_height(surface, points):
+def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`."""
     if callable(surface):
         height = surface(points[:, 0] if points.shape[1] == 2 else points[:, :-1])

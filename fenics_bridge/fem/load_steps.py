@@ -90,8 +90,11 @@ def advance(
 def _below_failure(value, failed_at, carried):
     """Size of the step after a failure: half of the way, or less where the mechanism carries less than that.
 
-    carried: fraction of the load that the stresses carry in the mechanism [-]; times the load an estimate of the collapse
-    load, mostly from above
+    Args:
+        value: last value in equilibrium.
+        failed_at: value at which the body failed.
+        carried: fraction of the load that the stresses carry in the mechanism [-]; times the load an estimate of the collapse
+            load, mostly from above.
     """
     gap = failed_at - value
     return float(np.clip(np.nan_to_num(carried, nan=1.0) * failed_at - value, 0.1 * gap, 0.5 * gap))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.mesh.names import by_number, tag_numbers
+from fenics_bridge.types import MeshTags
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ class Load:
         )
 
 
-def require_finite(comm, load):
+def require_finite(comm: MPI.Comm, load: Load) -> None:
     """Raise InputError on all ranks if a load has a value that is not finite on any. Collective."""
     problem = None
     for name in ("unit_weight", "pressure", "displacement", "held"):
@@ -72,28 +77,49 @@ def _weight_by_tag(unit_weight):
 class LoadVectors:
     """Nodal forces of loads on a displacement space; each kind of load is assembled once.
 
-    constant, held: forces that always act, and those of which the load's fraction `held` acts; arrays like `forces`, or 0
+    Args:
+        space: space of the unknowns.
+        facet_tags: tags of the boundary.
+        cell_tags: tags of the cells; None where no load is given by cell tag.
+        test: test function of the displacement, where it is only a part of the space.
+        active: function that is 1 in cells that are there and 0 in those that are not; the others neither weigh nor are pressed.
+        radius: radius of an axisymmetric body, a UFL expression; forces are then those of one radian.
     """
 
-    def __init__(self, space, facet_tags, cell_tags=None, test=None, active=None, radius=None):
-        """test: test function of the displacement, where it is only a part of the space.
-
-        active: function, 1 in cells that are there and 0 in those that are not; the others neither weigh nor are pressed
-        radius: of an axisymmetric body, a UFL expression; forces are then those of one radian
-        """
+    def __init__(
+        self,
+        space: Any,
+        facet_tags: MeshTags,
+        cell_tags: MeshTags | None = None,
+        test: Any = None,
+        active: fem.Function | None = None,
+        radius: Any = None,
+    ) -> None:
         self._active: Any = active
         self._radius = radius
         self.constant: Any = 0.0
+        """Forces that always act, an array like `forces`, or 0"""
         self.held: Any = 0.0
+        """Forces of which the fraction `Load.held` acts, an array like `forces`, or 0"""
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
         self._weight = {None: self._unit_weight(ufl.dx)}
-        self._pressure = {}
+        self._pressure: dict[int, NDArray[np.float64]] = {}
 
-    def forces(self, load):
-        """External forces, ghosts up to date: array over local unrolled dofs [N] ([N/m] in plane strain, [N] per radian).
+    def forces(self, load: Load) -> NDArray[np.float64]:
+        """External forces of a load, ghosts up to date.
 
-        Collective; raises InputError, on all ranks, for a tag that does not exist or a value that is not finite.
+        Args:
+            load: the load.
+
+        Returns:
+            Array over local unrolled dofs [N] ([N/m] in plane strain, [N] per radian).
+
+        Raises:
+            InputError: a tag does not exist, or a value is not finite. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         require_finite(self._space.mesh.comm, load)
         load = self.resolved(load)
@@ -106,8 +132,18 @@ class LoadVectors:
             forces = forces + pressure * self._unit_pressure(tag)
         return forces + self.constant + load.held * self.held
 
-    def resolved(self, load):
-        """The load with numbers for the names of tags. Raises InputError, on all ranks, for unknown ones. Collective."""
+    def resolved(self, load: Load) -> Load:
+        """The load with numbers for the names of tags.
+
+        Args:
+            load: the load.
+
+        Raises:
+            InputError: a tag does not exist. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         comm, weight = self._space.mesh.comm, load.unit_weight
         if isinstance(weight, dict):
             weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
@@ -143,12 +179,31 @@ class LoadVectors:
         return self._pressure[tag]
 
 
-def elastic_load(test, domain, facet_tags, unit_weight, traction, body_force=None, radius=None):
+def elastic_load(
+    test: Any,
+    domain: Mesh,
+    facet_tags: MeshTags,
+    unit_weight: float,
+    traction: Mapping[int | str, ArrayLike],
+    body_force: Callable[[NDArray[np.float64]], ArrayLike] | None = None,
+    radius: Any = None,
+) -> Any:
     """Work of weight, tractions and a body force on a test displacement, as a UFL form.
 
-    unit_weight: [N/m3], against the last axis; traction: (D,) [Pa] by facet tag; body_force: as for `solve_elastic`
-    radius: of an axisymmetric body, a UFL expression; the work is then that of one radian
-    Collective; raises InputError, on all ranks, for a facet tag that does not exist.
+    Args:
+        test: test displacement.
+        domain: mesh of the body.
+        facet_tags: tags of the boundary.
+        unit_weight: unit weight [N/m3], against the last axis.
+        traction: force per area [Pa], shape (D,), by facet tag.
+        body_force: as for `solve_elastic`.
+        radius: radius of an axisymmetric body, a UFL expression; the work is then that of one radian.
+
+    Raises:
+        InputError: a facet tag does not exist. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
     work = weighted(ufl.inner(fem.Constant(domain, np.array(down)), test), radius) * ufl.dx

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import numpy as np
+from dolfinx.mesh import Mesh
 
 from fenics_bridge.errors import agree
 from fenics_bridge.mesh.names import by_number, described, label
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.types import Law, Laws, MeshTags
 
 
 class Materials:
     """One law for the whole body, or one for each cell tag.
 
-    tags: of the laws, in their order; (None,) for a law of the whole body
-    number: (m,) int32, position in `tags` of the law of each owned cell
+    Args:
+        domain: mesh of the body.
+        law: law of `mpm_core`, or laws by cell tag or name.
+        cell_tags: tags of the cells; None where there is one law.
+
+    Raises:
+        InputError: a tag has no law, or a law is given for an unknown tag. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, domain, law, cell_tags):
-        """law: of `mpm_core`, or {cell tag or name: law}. Raises InputError, on all ranks, for other tags. Collective."""
+    def __init__(self, domain: Mesh, law: Laws, cell_tags: MeshTags | None) -> None:
         self._comm, self._cell_tags, n_cells = domain.comm, cell_tags, owned_cells(domain)
         self.tags: tuple = (None,)
+        """Tags of the laws, in their order; (None,) for a law of the whole body"""
         if not isinstance(law, dict):
             self.number = np.zeros(n_cells, dtype=np.int32)
             return
@@ -38,8 +48,18 @@ class Materials:
         for number, tag in enumerate(self.tags):
             self.number[values == tag] = number
 
-    def laws(self, law):
-        """The laws in their order; law: as above. Raises InputError, on all ranks, for other tags. Collective."""
+    def laws(self, law: Laws) -> list[Law]:
+        """The laws in their order.
+
+        Args:
+            law: law, or laws by cell tag or name, for the same tags as at the start.
+
+        Raises:
+            InputError: laws for other tags. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         named = isinstance(law, dict) and self.tags != (None,)
         given = by_number(self._comm, self._cell_tags, law, "law", "cell") if named else {None: law}
         tags = described(self._cell_tags, self.tags)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from mpm_core.parameter_fields import parameter_values
 
@@ -10,7 +12,7 @@ from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
 
-def set_parameter(model, name, values):
+def set_parameter(model: Any, name: str, values: Any) -> None:
     """Apply `QuasiStatic.set_parameter`."""
     domain, points, laws = model.domain, model.points, model.laws
     tags, of_point = {}, None

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dolfinx import fem
 from dolfinx.fem import petsc
+from petsc4py import PETSc
 
 
 class Stiffness:
-    """A bilinear form on a space and itself as a PETSc matrix, the supports' rows and columns taken out."""
+    """A bilinear form on a space and itself as a PETSc matrix, without the rows and columns of the supports.
 
-    def __init__(self, form, constraints):
-        """form: UFL; constraints: Constraints. Collective."""
+    Args:
+        form: UFL form.
+        constraints: the boundary conditions.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(self, form: Any, constraints: Any) -> None:
         self._form, self._constraints = fem.form(form), constraints
         self._matrix = petsc.create_matrix(self._form)
 
-    def assembled(self):
+    def assembled(self) -> PETSc.Mat:
         """The matrix with the form's present coefficients; the same object each time. Collective."""
         self._matrix.zeroEntries()
         petsc.assemble_matrix(self._matrix, self._form, bcs=self._constraints.bcs)

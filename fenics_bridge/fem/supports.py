@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.compat import facet_nodes
@@ -150,7 +151,7 @@ def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[flo
     return tuple(float(k == along[0]) for k in range(domain.geometry.dim)) if len(along) == 1 else None
 
 
-def tagged_facets(comm, facet_tags, tag, argument):
+def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: int | str, argument: str) -> NDArray[np.int32]:
     """Facets of this rank with a tag, given as a number or name. Raises InputError, on all ranks, for none. Collective."""
     return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
 
