@@ -33,7 +33,9 @@ def run(script: Path, words: list[str], ranks: int | None) -> int:
     """Run a study; returns its exit code.
 
     Args:
-        ranks: None to replace this process by the study, as under mpirun.
+        script: the study.
+        words: its arguments.
+        ranks: number of ranks; None to replace this process by the study, as under mpirun.
     """
     command = [sys.executable, str(script), *words]
     if ranks is None:

@@ -35,8 +35,14 @@ def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
 
 
 def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
-    """Description in a checkpoint, read without a model: ``time`` [s], ``steps``, ``ranks``, ``materials``, ``notes`` and the
-    other entries that docs/checkpoints.md lists.
+    """Description in a checkpoint, read without a model.
+
+    Args:
+        path: the file.
+        comm: the ranks that read it.
+
+    Returns:
+        ``time`` [s], ``steps``, ``ranks``, ``materials``, ``notes`` and the other entries that docs/checkpoints.md lists.
 
     Raises:
         RunError: on all ranks, with path and reason, as `Model.restore`.

@@ -47,14 +47,18 @@ class RigidContact:
 
     @property
     def impulse(self) -> NDArray[np.float64]:
-        """Integral of ``force`` over time since the surface was added [N s], shape (D,); its difference between two times over
-        their distance is the mean force, without the noise of single steps."""
+        """Integral of ``force`` over time since the surface was added [N s], shape (D,).
+
+        Its difference between two times over their distance is the mean force, without the noise of single steps.
+        """
         return self._vector("impulse")
 
     @property
     def moment(self) -> NDArray[np.float64]:
-        """Moment of these forces in the last step [N m], shape (1,) in two dimensions, counterclockwise, and (3,) in three; about
-        the surface's ``centre``, as it has moved."""
+        """Moment of these forces in the last step [N m] about the surface's ``centre``, as it has moved.
+
+        Shape (1,) in two dimensions, counterclockwise, and (3,) in three.
+        """
         return self._about_axes("moment")
 
     @property
@@ -109,8 +113,10 @@ class RigidContact:
         return float(self._state()["energy"])
 
     def values(self) -> dict[str, float]:
-        """Numbers by name of column, as a probe gives them: time, force, impulse, moment, displacement, velocity, angle, spin, area,
-        pressure and sticking fraction."""
+        """Numbers by name of column, as a probe gives them.
+
+        They are time, force, impulse, moment, displacement, velocity, angle, spin, area, pressure and sticking fraction.
+        """
         axes, state = "xyz"[: self.model.mesh.dim], self._state()
         first = 2 if len(axes) == 2 else 0
         columns = [("force", "N"), ("impulse", "N.s"), ("displacement", "m"), ("velocity", "m/s")]

@@ -38,8 +38,13 @@ class EnergyWatch:
     largest: float = 0.0  # of the energies at work so far: a body that swings back has little of it
 
     def look(self, report: Report) -> None:
-        """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold; and once when motion of the
-        particles against their nodes has more than a tenth of the energy and a third of the kinetic energy.
+        """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold.
+
+        Warn once, too, when motion of the particles relative to their nodes has more than a tenth of the energy and a third of
+        the kinetic energy.
+
+        Args:
+            report: the state of the run.
 
         Raises:
             RunError: it has passed the limit.

@@ -53,8 +53,9 @@ def matched_drucker_prager(
     Args:
         young: Young's modulus [Pa].
         poisson: Poisson's ratio [-].
-        cohesion: [Pa].
-        friction_angle, dilation_angle: [degrees].
+        cohesion: cohesion of the soil [Pa].
+        friction_angle: friction angle of the soil [degrees].
+        dilation_angle: dilation angle of the soil [degrees].
         match: OUTER: same strength in triaxial compression; INNER: in triaxial extension; PLANE_STRAIN: same collapse load
             in plane strain, exact with associated flow.
         tension_cutoff: largest mean stress [Pa]; by default the apex.

@@ -222,5 +222,6 @@ def cell_sizes(volumes: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
 
     Args:
         volumes: volumes of the cells [m2 or m3].
+        dim: dimension D of the mesh, 2 or 3.
     """
     return _core.cell_sizes(volumes, dim)

@@ -45,6 +45,7 @@ def parameter_values(
     """Values at points, shape (n,); NaN at points that none are given for.
 
     Args:
+        name: name of the parameter, for messages.
         given: as for `Model.set_parameter`.
         position: [m], shape (n, D).
         of_cell: tag of each point's cell, shape (n,); used where values are given by tag.
@@ -68,7 +69,9 @@ def differences_of(
     """A copy of the states of points with the values of a parameter in them.
 
     Args:
-        values: shape (n,); points where they are NaN keep theirs.
+        name: name of the parameter.
+        values: values of the parameter, shape (n,); points where they are NaN keep theirs.
+        laws: the laws, by number.
         material: number of each point's law, shape (n,).
         state: shape (n, number of states).
 

@@ -74,8 +74,12 @@ class Particles:
         return counts > 0 if len(counts) else np.zeros(len(self), dtype=bool)
 
     def schedule(self) -> list[dict[str, Any]]:
-        """All fields, including those that `Model.add_field` declared: ``name``, ``unit``, ``meaning``, number of
-        ``components``, ``initial`` value, whether it is ``optional`` and whether it is ``settable``."""
+        """All fields, including those that `Model.add_field` declared.
+
+        Returns:
+            For each field: ``name``, ``unit``, ``meaning``, number of ``components``, ``initial`` value, whether it is ``optional``
+            and whether it is ``settable``.
+        """
         return self._core.particle_schedule()
 
     def __getattr__(self, name: str) -> NDArray[Any]:

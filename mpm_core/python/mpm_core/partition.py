@@ -88,6 +88,7 @@ def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
     depends only on which cells it owns, and in which order.
 
     Args:
+        mesh: the mesh as it is distributed now.
         ranks: new owner of each cell that this rank owns now.
         order: place of the cell among those of its new owner: the lower number comes first.
 

@@ -102,8 +102,9 @@ def defaults(prefix: str, values: dict[str, Any]) -> Iterator[None]:
 
 
 def new_solver(comm: MPI.Comm, prefix: str) -> PETSc.KSP:
-    """A solver of linear systems that takes options of a prefix. One that has failed must not be used again: MUMPS cannot,
-    and a system gathered on one rank keeps its failure. Collective.
+    """A solver of linear systems that takes options of a prefix.
+
+    One that has failed must not be used again: MUMPS cannot, and a system gathered on one rank keeps its failure. Collective.
     """
     ksp = PETSc.KSP().create(comm)
     ksp.setOptionsPrefix(prefix)

@@ -62,13 +62,17 @@ def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
 
 
 def nearest_particle(model: Model, place: ArrayLike) -> int:
-    """Number of the particle that started nearest to a point; the highest number of several at the same distance. Collective.
+    """Number of the particle that started nearest to a point; the highest number of several at the same distance.
 
     Args:
-        place: [m], shape (D,).
+        model: the model, seeded.
+        place: the point [m], shape (D,).
 
     Raises:
         InputError: a point of another shape, or a model without particles.
+
+    Note:
+        Collective.
     """
     point = collectively(model.comm, lambda: floats("place", place, (model.mesh.dim,)))
     distance = np.linalg.norm(model.particles.initial_position - point, axis=1)

@@ -13,6 +13,7 @@ def exchanged(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, N
     """Send each row to a rank; returns the rows that came, by rising rank and in the order of that rank, and their ranks.
 
     Args:
+        comm: the ranks that take part.
         ranks: where each row goes, shape (n,).
         rows: shape (n, k), of int64 or float64.
 
@@ -33,6 +34,7 @@ def requested(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable
     """Send each rank its requests, a row each; returns its replies, a row each, in the order of the requests.
 
     Args:
+        comm: the ranks that take part.
         ranks: ranks that the requests go to, shape (n,).
         requests: shape (n, k).
         reply: function that returns a row for each row of requests.
@@ -51,6 +53,7 @@ def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> t
     """Find items by their global numbers; rank (number mod size) keeps the directory.
 
     Args:
+        comm: the ranks that take part.
         numbers: global numbers of this rank's items, shape (n,). An item of several ranks is found on the lowest of them.
         rows: local rows of these items, shape (n,).
         wanted: global numbers of the items to find, shape (m,).

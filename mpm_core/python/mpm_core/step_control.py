@@ -1,5 +1,7 @@
-"""Length of steps that are shortened when they fail and grow again when they converge easily: implicit steps, load steps of finite
-elements, and steps of their consolidation."""
+"""Length of steps that are shortened when they fail and grow again when they converge easily.
+
+Implicit steps use it, load steps of finite elements, and steps of their consolidation.
+"""
 
 from __future__ import annotations
 
