@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from dolfinx import fem
 from mpm_core.petsc import (
     ALONE_LIMIT,
     DIRECT_LIMIT,
@@ -33,13 +36,15 @@ class LinearSolver:
     The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
     `ALONE_LIMIT`, and GMRES with algebraic multigrid above; PETSc options with `options_prefix` change it, for instance
     -elastic_ksp_type cg -elastic_pc_type gamg.
-    iterations: Krylov iterations of the solutions so far, a list
+
+    Args:
+        space: space of the unknowns.
+        options_prefix: prefix of the PETSc options.
+        newton: whether systems are those of Newton's iterations: an iterative solver need not solve the first ones well, and a
+            tangent that is singular, as where all soil around a node has failed in tension, gets a part of the first matrix.
     """
 
-    def __init__(self, space, options_prefix, newton=False):
-        """newton: systems are those of Newton's iterations: an iterative solver need not solve the first ones well, and
-        a tangent that is singular, as where all soil around a node has failed in tension, gets a part of the first matrix.
-        """
+    def __init__(self, space: Any, options_prefix: str, newton: bool = False) -> None:
         self._comm, index_map = space.mesh.comm, space.dofmap.index_map
         dim, bs = space.mesh.geometry.dim, space.dofmap.index_map_bs
         self._n_owned = index_map.size_local * bs
@@ -57,12 +62,22 @@ class LinearSolver:
             points = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
             self._rigid = rigid_body_motions(points, self._comm)
         self._ksp = new_solver(self._comm, options_prefix)
-        self.iterations = []
+        self.iterations: list[int] = []
+        """Krylov iterations of each solution so far"""
 
-    def solve(self, matrix, residual, increment):
-        """Write matrix^-1 residual to `increment`. Returns the reason of a failure in words, or an empty text.
+    def solve(self, matrix: PETSc.Mat, residual: Any, increment: fem.Function) -> str:
+        """Solve a linear system.
 
-        residual: vector (`dolfinx.la`); increment: function on the same space. The matrix may be changed. Collective.
+        Args:
+            matrix: matrix of the system; it may be changed.
+            residual: right-hand side, a vector (`dolfinx.la`).
+            increment: function on the same space, to which the solution is written.
+
+        Returns:
+            The reason of a failure in words, or an empty text.
+
+        Note:
+            Collective.
         """
         solution, right = matrix.createVecs()
         right.array[:] = residual.array[: self._n_owned]

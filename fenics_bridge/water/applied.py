@@ -14,37 +14,46 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.supports import tagged_facets
 from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, WaterBoundary, mistake_in, value_at
 
 
 class _Held(NamedTuple):
-    """A boundary condition where it holds.
-
-    tags: numbers of its facets; dofs: of this rank; rate: prescribed inflow over the unit [-] as a constant, None where there
-    is none; density, ds: of that inflow over the facets, UFL; total: compiled form of its integral
-    """
+    """A boundary condition where it holds."""
 
     condition: Any
+    """The condition"""
     tags: tuple
+    """Numbers of its facets"""
     dofs: np.ndarray
+    """Its dofs on this rank"""
     rate: Any = None
+    """Prescribed inflow over the unit [-] as a constant; None where there is none"""
     density: Any = None
+    """That inflow per area, UFL"""
     ds: Any = None
+    """Measure over the facets"""
     total: Any = None
+    """Compiled form of the integral of the inflow"""
 
 
 class AppliedBoundary:
     """The boundary conditions of the water on a scalar space; where conditions meet at a node, a prescribed head holds first.
 
-    height: (m,) [m] of the dofs of this rank, ghosts included; held: the conditions where they hold
+    Args:
+        space: space of the pressure.
+        facet_tags: tags of the boundary.
+        unit: unit of prescribed inflows in forms [m/s].
+        radius: radius of an axisymmetric body, a UFL expression.
     """
 
-    def __init__(self, space, facet_tags, unit, radius=None):
-        """unit: of prescribed inflows in forms [m/s]; radius: of an axisymmetric body, a UFL expression."""
+    def __init__(self, space: Any, facet_tags: MeshTags, unit: float, radius: Any = None) -> None:
         self._space, self._facet_tags, self.unit, self._radius = space, facet_tags, unit, radius
         self._dim = space.mesh.geometry.dim
         self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
-        self.held = []
+        """Elevation of the dofs of this rank [m], ghosts included, shape (m,)"""
+        self.held: list[_Held] = []
+        """The conditions where they hold"""
 
     def take(self, boundary: Sequence[WaterBoundary]) -> bool:
         """Check a list of conditions and find where they hold.
@@ -86,17 +95,17 @@ class AppliedBoundary:
         ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)(tags)
         return _Held(condition, tags, dofs, rate, density, ds, fem.form(density * ds))
 
-    def inflow_form(self, test):
+    def inflow_form(self, test: Any) -> Any:
         """Prescribed inflows over their unit against a test function, as a UFL form; 0 where there are none."""
         return sum(held.density * test * held.ds for held in self.held if held.rate is not None)
 
-    def set_time(self, time):
+    def set_time(self, time: float) -> None:
         """Give the prescribed inflows their values at a time [s]."""
         for held in self.held:
             if held.rate is not None:
                 held.rate.value = value_at(held.condition.rate, time) / self.unit
 
-    def bounds(self, time):
+    def bounds(self, time: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
         """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at a time [s]."""
         n = len(self.height)
         fixed, values, upper = np.zeros(n, dtype=bool), np.zeros(n), np.full(n, np.inf)

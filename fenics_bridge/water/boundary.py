@@ -67,7 +67,7 @@ class Rain:
 WaterBoundary = Head | Reservoir | SeepageFace | Flux | Rain
 
 
-def value_at(value, time):
+def value_at(value: Value, time: float) -> float:
     """A number, function or table of a boundary condition at a time [s]."""
     if callable(value):
         return float(value(time))
@@ -77,7 +77,7 @@ def value_at(value, time):
     return float(value)
 
 
-def mistake_in(condition):
+def mistake_in(condition: WaterBoundary) -> str | None:
     """What is wrong with the values of a boundary condition; None for nothing."""
     for name in ("level", "rate", "ponding"):
         value = getattr(condition, name, 0.0)

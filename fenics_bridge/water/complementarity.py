@@ -70,7 +70,7 @@ class BoundedProblem:
         self.unknown.x.array[:] = start
         return failure
 
-    def residual(self):
+    def residual(self) -> NDArray[np.float64]:
         """F of the unknown as it is, (m,) on the dofs of this rank, ghosts included. Collective."""
         return assembled(self._form, self._space, into=self._vector).array
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpm_core.newton import EASY_ITERATIONS, newton
+from numpy.typing import NDArray
 
-from fenics_bridge.fem.equilibrium import EquilibriumStep
+from fenics_bridge.fem.equilibration import Solver
+from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
+from fenics_bridge.types import Law
 
 MOST_SETS = 30
 """Guesses of where a pressure is at its upper bound, in a step."""
@@ -18,37 +23,56 @@ SLACK = 1e-9
 
 @dataclass(frozen=True)
 class ConsolidationReport:
-    """How a step of consolidation went.
-
-    time: at its end [s]; dt: its length [s]; iterations: of Newton's method, in all
-    residuals: before each of its last iterations and at the end, the larger of out-of-balance forces over forces at work, and
-        of out-of-balance water over the water that is exchanged [-]
-    water_error: change of the stored water less what entered [m3], [m2] in plane flow
-    reason: why the step was not made; empty where it was, and otherwise everything is as it was before
-    """
+    """How a step of consolidation went."""
 
     time: float
+    """Time at the end of the step [s]"""
     dt: float
+    """Length of the step [s]"""
     iterations: int
+    """Iterations of Newton's method, in all"""
     residuals: list[float]
+    """Before each of the last iterations and at the end: the larger of out-of-balance forces over forces at work, and of
+    out-of-balance water over the water that is exchanged [-]"""
     water_error: float = 0.0
+    """Change of the stored water less what entered [m3], [m2] in plane flow"""
     reason: str = ""
+    """Why the step was not made; empty where it was, and otherwise everything is as it was before"""
 
     @property
-    def converged(self):
+    def converged(self) -> bool:
+        """Whether the step was made."""
         return not self.reason
 
     @property
-    def easy(self):
+    def easy(self) -> bool:
         """Whether Newton's method converged in a few iterations."""
         return self.converged and self.iterations <= EASY_ITERATIONS
 
 
 class CoupledStep(EquilibriumStep):
-    """A step of displacement and pressure, whose out-of-balance forces and volumes of water have each their own measure."""
+    """A step of displacement and pressure, whose out-of-balance forces and volumes of water have each their own measure.
 
-    def __init__(self, body, laws, external, before, displacement, parts, gravity_flow):
-        """parts: owned dofs of displacement and pressure; gravity_flow: (m,) what the weight of water makes flow in the step."""
+    Args:
+        body: the body.
+        laws: laws in the order of the body's points.
+        external: nodal forces of the load at the end of the step.
+        before: nodal forces of the load at its start.
+        displacement: fraction of the displacements that the supports prescribe.
+        parts: owned dofs of displacement and of pressure.
+        gravity_flow: what the weight of water makes flow in the step, shape (m,).
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        laws: list[Law],
+        external: Any,
+        before: Any,
+        displacement: float,
+        parts: Sequence[NDArray[np.integer]],
+        gravity_flow: NDArray[np.float64],
+    ) -> None:
         super().__init__(body, laws, external, before, displacement)
         self._parts, self._gravity_flow = parts, gravity_flow
         stress = body.points.stress
@@ -70,14 +94,32 @@ class CoupledStep(EquilibriumStep):
         return max(norm / scale if scale > 0 else 0.0 for norm, scale in zip(norms, self.scale))
 
 
-def solve_step(step, constraints, bounds, active, state_of, solver):
+def solve_step(
+    step: Callable[[], CoupledStep],
+    constraints: Any,
+    bounds: tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]],
+    active: NDArray[np.bool_],
+    state_of: Callable[[], tuple[NDArray[np.float64], NDArray[np.float64]]],
+    solver: Solver,
+) -> tuple[Any, NDArray[np.bool_], int, str]:
     """Solve a step where pressures p <= upper are bounded: inflow is nil below the bound and at most nil at it.
 
-    step: function that returns a new CoupledStep; constraints: CoupledConstraints; solver: Solver
-    bounds: (fixed, values, upper), each (m,): which pressures are prescribed, these, and upper bounds of the others
-    active: (m,) bool, pressures that are taken to be at their bound; state_of: function that returns pressures and inflows (m,)
     Guesses which pressures are at their bound until the guess is right (primal-dual active set method, Hintermueller, Ito and
-    Kunisch 2002). Returns (NewtonReport, active, iterations, why it failed). Collective.
+    Kunisch 2002).
+
+    Args:
+        step: function that returns a new step.
+        constraints: the CoupledConstraints of the step.
+        bounds: which pressures are prescribed, their values, and upper bounds of the others, each of shape (m,).
+        active: pressures that are taken to be at their bound, shape (m,).
+        state_of: function that returns pressures and inflows, each of shape (m,).
+        solver: tolerances.
+
+    Returns:
+        Report of Newton's method, the pressures at their bound, iterations in all, and why it failed (empty if it did not).
+
+    Note:
+        Collective.
     """
     comm, (fixed, values, upper) = constraints.comm, bounds
     bounded, iterations = np.isfinite(upper) & ~fixed, 0

@@ -8,54 +8,75 @@ over a step; times minus the unit of pressure it makes the system symmetric wher
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from enum import Enum
+from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.mesh.tagged import cell_corners, owned_cells
+from fenics_bridge.types import Law
 from fenics_bridge.water.boundary import Reservoir, value_at
+from fenics_bridge.water.soils import PorousSoil
 
 
 class Element(Enum):
-    """Elements of displacement and pore pressure; the pressure is linear in both.
-
-    TAYLOR_HOOD: quadratic displacement
-    STABILISED: linear displacement, stabilised by a polynomial pressure projection; some four times fewer unknowns in two
-        dimensions, ten times in three
-    """
+    """Elements of displacement and pore pressure; the pressure is linear in both."""
 
     TAYLOR_HOOD = 2
+    """Quadratic displacement"""
     STABILISED = 1
+    """Linear displacement, stabilised by a polynomial pressure projection; some four times fewer unknowns in two dimensions, ten
+    times in three"""
 
 
 class WaterTerms:
     """The forms by which pore water enters a step, in the unknowns of a mixed space: u and p over a unit [Pa].
 
-    dt: length of the step [s], a constant of the forms; projection: function of the pressure projection (D * D,) [m2/Pa], see
-    `PressureProjection`; content: form of the volume of stored water
+    Args:
+        solution: displacement and pressure at the start of the step.
+        increment: their change in the step.
+        soils: soils, as of `soils_by_tag`.
+        measures: measures over their cells, likewise.
+        weights: unit weight [N/m3] and bulk modulus [Pa] of water.
+        unit: unit of pressure [Pa].
+        radius: radius of an axisymmetric body, a UFL expression.
+        degree: degree of the quadrature.
     """
 
-    def __init__(self, solution, increment, soils, measures, weights, unit, radius, degree):
-        """soils, measures: of `soils_by_tag`; weights: unit weight [N/m3] and bulk modulus [Pa] of water; unit: [Pa]
-        radius: of an axisymmetric body, a UFL expression; degree: of the quadrature
-        """
+    def __init__(
+        self,
+        solution: fem.Function,
+        increment: fem.Function,
+        soils: Sequence[PorousSoil],
+        measures: Sequence[Any],
+        weights: tuple[float, float],
+        unit: float,
+        radius: Any,
+        degree: int,
+    ) -> None:
         domain = solution.function_space.mesh
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
         self._soils, (self._gamma, self._modulus) = soils, weights
         rule = {"quadrature_degree": degree}
         self._measures = [dx(metadata=rule) for dx in measures]
         self.dt = fem.Constant(domain, 1.0)
+        """Length of the step [s], a constant of the forms"""
         self.projection = fem.Function(compat.function_space(domain, "DG", 0, self._dim**2))
+        """Function of the pressure projection (D * D,) [m2/Pa], see `PressureProjection`"""
         self._u, self._p = ufl.split(solution)
         self._du, self._dp = ufl.split(increment)
         self.content = fem.form(self._sum(lambda s: s.porosity + self._volume(self._u) + self._storage(s) * self._p))
+        """Form of the volume of stored water"""
 
-    def forms(self, applied):
+    def forms(self, applied: Any) -> Callable[[Any, Any], tuple[Any, Any]]:
         """Further internal forces and their tangent as a function of test and trial functions, for `Kinematics`."""
 
         def further(test, trial):
@@ -75,7 +96,7 @@ class WaterTerms:
 
         return further
 
-    def gravity_flow(self, space):
+    def gravity_flow(self, space: Any) -> NDArray[np.float64]:
         """What the weight of the water makes flow in 1 s, as part of the internal forces: (m,). Collective."""
         q = ufl.TestFunctions(space)[1]
         return self._unit * assembled(fem.form(self._flow(self._up(), q)), space).array
@@ -101,7 +122,7 @@ class WaterTerms:
         return self._unit * soil.porosity / self._modulus
 
 
-def pressure_is_free(space, constraints, radius):
+def pressure_is_free(space: Any, constraints: Any, radius: Any) -> bool:
     """Whether a uniform change of pressure does no work on the displacements that supports leave free. Collective."""
     v = ufl.TestFunctions(space)[0]
     work = assembled(fem.form(weighted(dilation(v, radius), radius) * ufl.dx), space).array.copy()
@@ -124,10 +145,25 @@ class PressureProjection:
     M the oedometric modulus, S = n / K_w, h the longest edge, is the least factor with which layers of simplices cut from cubes
     have, in uniaxial strain, no positive off-diagonal entry in the system of the pressures, so that these obey a maximum
     principle. But the nodes of a layer do not all move alike, which leaves 1 to 3 %; m is `MARGIN`.
+
+    Args:
+        domain: mesh of the body.
+        points: the quadrature points.
+        laws: the laws, by number.
+        soils: soils, as of `soils_by_tag`.
+        cells: cells of each of them.
+        weights: unit weight [N/m3] and bulk modulus [Pa] of water.
     """
 
-    def __init__(self, domain, points, laws, soils, cells, weights):
-        """points: QuadraturePoints; cells: of each soil; the other arguments as for `WaterTerms`."""
+    def __init__(
+        self,
+        domain: Mesh,
+        points: Any,
+        laws: Sequence[Law],
+        soils: Sequence[PorousSoil],
+        cells: Sequence[NDArray[np.int32]],
+        weights: tuple[float, float],
+    ) -> None:
         (gamma, modulus), corners, n = weights, cell_corners(domain), owned_cells(domain)
         dim = corners.shape[2]
         longest = np.sum((corners[:, :, None] - corners[:, None]) ** 2, axis=3).max(axis=(1, 2))
@@ -142,7 +178,7 @@ class PressureProjection:
         self._moments = MARGIN * (dim + 1) * moments.reshape(n, -1)
         self._undrained, self._per_second = 1.5 * flexibility, 6 * mobility / longest
 
-    def write(self, function, dt):
+    def write(self, function: fem.Function, dt: float) -> None:
         """Write tau T of a step of dt [s] to a function that is constant in each cell. Collective."""
         values = np.maximum(0.0, self._undrained - self._per_second * dt)[:, None] * self._moments
         rows = compat.cell_dofs(function.function_space)[: len(values), 0]
@@ -154,22 +190,31 @@ class CoupledConstraints:
     """Supports and prescribed pressures, as `Constraints` has them; `hold` says where pressures are prescribed.
 
     Pressures, as the unknowns of the mixed space, are over the unit of pressure.
+
+    Args:
+        supports: Constraints on the mixed space's displacement.
+        space: the mixed space.
+        pressure_dofs: dofs of that space for those of the pressure.
     """
 
-    def __init__(self, supports, space, pressure_dofs):
-        """supports: Constraints on the mixed space's displacement; pressure_dofs: of that space, for those of the pressure."""
+    def __init__(self, supports: Any, space: Any, pressure_dofs: NDArray[np.integer]) -> None:
         self._supports, self._space, self._pressure_dofs = supports, space, pressure_dofs
         self.comm = space.mesh.comm
         self.hold(np.zeros(len(pressure_dofs), dtype=bool), np.zeros(len(pressure_dofs)))
 
-    def hold(self, held, pressures):
-        """held: (m,) bool of the pressure's dofs; pressures: (m,) [-] that they have where they are held."""
+    def hold(self, held: NDArray[np.bool_], pressures: NDArray[np.float64]) -> None:
+        """Prescribe pressures.
+
+        Args:
+            held: which of the pressure's dofs are prescribed, shape (m,).
+            pressures: pressures over their unit that they then have [-], shape (m,).
+        """
         dofs = self._pressure_dofs[held].astype(np.int32)
         self._pressures = pressures[held]
         self.dofs = np.concatenate([self._supports.dofs, dofs])
         self.bcs = [*self._supports.bcs, fem.dirichletbc(np.float64(0.0), dofs, self._space.sub(1))]
 
-    def at(self, share):
+    def at(self, share: float) -> NDArray[np.float64]:
         """Values of the dofs at a fraction of the displacements that the supports prescribe."""
         return np.concatenate([self._supports.at(share), self._pressures])
 
@@ -189,7 +234,7 @@ class ReservoirLoads:
                 form = fem.form(-weighted(pressure * ufl.inner(normal, v), radius) * ds(held.tags))
                 self._parts.append((held.condition, level, form))
 
-    def forces(self, time):
+    def forces(self, time: float) -> Any:
         """Nodal forces at a time [s], ghosts up to date: array over the local dofs, or 0 where there is none. Collective."""
         total = 0.0
         for condition, level, form in self._parts:
