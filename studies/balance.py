@@ -2,7 +2,8 @@
 
 DOLFINx partitions the background mesh by cells. Soil fills only some of them, so that ranks have unequal numbers of particles
 from the start, which change as the slope slides; each step waits for the rank with most particles. The slope slides twice: with
-the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds the threshold.
+the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds the
+threshold.
 """
 
 from __future__ import annotations
@@ -117,7 +118,8 @@ def main(arguments: list[str] | None = None) -> int:
         page = Page(movies=[Movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
                     captions={"imbalance": "Load imbalance: maximum over mean number of particles per rank"})  # fmt: skip
         print(f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
-              f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions; results in {folder}")  # fmt: skip
+              f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions; "
+              f"results in {folder}")  # fmt: skip
     write_summary(folder, a, results, comm, page, pictures)
     return 0
 

@@ -15,9 +15,9 @@ from common.files import OutputError
 from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
+from common.water_site import DAY
 from common.water_slides import add_slide_options
 from common.water_slope_runs import water_slope_study
-from common.water_site import DAY
 from common.water_slopes import add_water_slope_options, safety, steady_safety
 
 import fenics_bridge as bridge

@@ -26,7 +26,7 @@ from common.movie import Movie, particle_frame
 from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, paper_style, save_particles
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, paper_style, save_particles
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results

@@ -139,8 +139,11 @@ def drawn(a: Namespace, found: CollapseRuns, folder: Path) -> Pictures:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
-        return site_study(a, lambda site, model, progress: bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress),
-                          "factor_of_safety", "Factor of safety [-]",
+
+        def factor(site, model, progress):
+            return bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress)
+
+        return site_study(a, factor, "factor_of_safety", "Factor of safety [-]",
                           lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {})  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)

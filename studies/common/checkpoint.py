@@ -42,8 +42,9 @@ def check_restart(parser: argparse.ArgumentParser, options: Options, may_change:
     changed = changes(options.notes, options.parameters())
     for name, (before, now) in changed.items():
         check(parser, name in may_change,
-              lambda name=name, before=before, now=now: f"--{name} is {now}, but the run of checkpoint {options.restart} has {before}; "
-              f"leave it out to continue with that, or start a new run. A restart may change: {', '.join(sorted(may_change))}")  # fmt: skip
+              lambda name=name, before=before, now=now: f"--{name} is {now}, but the run of checkpoint {options.restart} has "
+              f"{before}; leave it out to continue with that, or start a new run. A restart may change: "
+              f"{', '.join(sorted(may_change))}")  # fmt: skip
     options.restarts = [*options.notes["restarts"], restart_row(options.notes, changed, MPI.COMM_WORLD.size)]
 
 

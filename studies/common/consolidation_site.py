@@ -4,7 +4,7 @@
 
     [soils.clay]                       # a physical group: conductivity and porosity, and
     unit_weight = 17e3                 # N/m3, saturated
-    material = "mohr-coulomb"          # of effective stresses, and the parameters of the law, named as the options of the study slope
+    material = "mohr-coulomb"          # of effective stresses, and the parameters of the law, named as options of the study slope
 
     [supports]                         # as for sites of stages
     [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]

@@ -17,7 +17,10 @@ from mpi4py import MPI
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU, signal.SIGHUP)
 AGAIN = 3.0
-"""Seconds after which a second signal is one of its own: a scheduler signals the ranks, mpirun and its shell, and each hands on"""
+"""Seconds after which a second signal is one of its own.
+
+A scheduler signals the ranks, mpirun and its shell, and each passes it on.
+"""
 
 
 class Interrupt:

@@ -45,8 +45,8 @@ class Movie:
         title: stands above the panel.
         scene: mesh behind the particles.
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
-            (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,) when rows change their order
-            or number from frame to frame. On ranks other than the first each is None.
+            (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,)
+            when rows change their order or number from frame to frame. On ranks other than the first each is None.
         quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
     """
 

@@ -79,7 +79,8 @@ def check_frames(model: mpm.Model, options: argparse.Namespace, folder: Path) ->
     for where, (bytes_needed, there) in comm.bcast(needed).items():
         if bytes_needed > there:
             raise mpm.InputError(
-                f"--frames is {frames}: {particles} particles would take {bytes_needed:.3g} bytes of {where}, but there are {there:.3g}"
+                f"--frames is {frames}: {particles} particles would take {bytes_needed:.3g} bytes of {where}, but there "
+                f"are {there:.3g}"
             )
 
 

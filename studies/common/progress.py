@@ -38,7 +38,10 @@ class Progress:
         self._bar = None
         self._last = ""
         if self._shown and sys.stderr.isatty():
-            form = f"{{desc}}: {{percentage:3.0f}}% |{{bar}}| {{n:.4g}}/{{total:.4g}} {unit} [{{elapsed}} < {{remaining}}{{postfix}}]"
+            form = (
+                f"{{desc}}: {{percentage:3.0f}}% |{{bar}}| {{n:.4g}}/{{total:.4g}} {unit} "
+                "[{elapsed} < {remaining}{postfix}]"
+            )
             self._bar = tqdm(total=until, desc=title, bar_format=form, file=sys.stderr, dynamic_ncols=True, leave=True)
 
     def show(self, time: float, steps: int, **quantities: str) -> None:

@@ -31,9 +31,11 @@ UNITS = {
 }  # fmt: skip
 """Of a quantity, by the end of its name."""
 SPECIAL = {
-    "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"), "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
+    "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"),
+    "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
     "runout_m": ("Run-out", "m"), "kinetic_energy_J_per_m": ("Kinetic energy of the particles", "J/m"),
-    "nodal_kinetic_energy_J_per_m": ("Kinetic energy of the nodes", "J/m"), "plastic_fraction": ("Fraction of particles that yield", "-"),
+    "nodal_kinetic_energy_J_per_m": ("Kinetic energy of the nodes", "J/m"),
+    "plastic_fraction": ("Fraction of particles that yield", "-"),
     "unbalanced_ratio": ("Out-of-balance ratio", "-"),
 }  # fmt: skip
 

@@ -38,9 +38,10 @@ _locks: dict[Path, TextIO] = {}
 def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: bool = False) -> Path:
     """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it.
 
-    Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that holds a run, ``results/NAME-2`` and so on. A
-    folder named by ``--output`` that holds results is refused, unless ``--overwrite`` says that they may go. A run that goes
-    on from a checkpoint writes to the run's folder, where the checkpoint lies, unless ``--output`` names another.
+    Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that
+    holds a run, ``results/NAME-2`` and so on. A folder named by ``--output`` that holds results is refused, unless
+    ``--overwrite`` says that they may be deleted. A run that goes on from a checkpoint writes to the run's folder, where the
+    checkpoint lies, unless ``--output`` names another.
 
     Args:
         options: of the study, as parsed and checked.
@@ -141,7 +142,7 @@ def _opened(options: Options, adds: bool) -> Path:
 
 
 def _home() -> Path:
-    """Where the results of all studies lie: as ``TALUS_RESULTS`` says, otherwise in the source tree, or where there is none here."""
+    """Where the results of all studies lie: as ``TALUS_RESULTS`` says, otherwise in the source tree, or else here."""
     if "TALUS_RESULTS" in os.environ:
         return Path(os.environ["TALUS_RESULTS"])
     return (ROOT if IN_SOURCES else Path.cwd()) / "results"
@@ -187,7 +188,10 @@ def _locked(folder: Path, keeps: bool, overwrite: bool) -> str | None:
     if earlier and not keeps:
         if not overwrite:
             lock.close()
-            return f"{folder} holds the results of an earlier run; replace them by --overwrite, or choose another folder by --output"
+            return (
+                f"{folder} holds the results of an earlier run; replace them by --overwrite, or choose another folder by "
+                "--output"
+            )
         if not known:
             lock.close()
             return f"{folder} holds results of a version that did not note which files are its own; {BY_HAND}"

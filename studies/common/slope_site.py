@@ -47,7 +47,10 @@ class SlopeSite:
         return water.Seepage(domain, self.porous, facet_tags, boundary, cell_tags=cell_tags, loading=self.standing())
 
     def standing(self) -> Callable | None:
-        """Pressure of the water on the ground by positions and time, as of `standing_water`; None without a reservoir. Collective."""
+        """Pressure of the water on the ground by positions and time, as of `standing_water`; None without a reservoir.
+
+        Collective.
+        """
         domain, _, facet_tags = self.body
         any_there = any(isinstance(condition, water.Reservoir) for condition in self.boundary)
         return water.standing_water(domain, facet_tags, self.boundary) if any_there else None

@@ -124,7 +124,8 @@ def stage_pictures(
     before = pictures[first - 1].strain if first else 0.0
     rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
     curves = {name: [1e3 * row[key] for row in rows] for key, name in
-              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"), ("sideways_m", "largest sideways"))}  # fmt: skip
+              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"),
+               ("sideways_m", "largest sideways"))}  # fmt: skip
     names = [row["stage"] for row in rows]
     return {
         "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),

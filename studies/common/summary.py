@@ -17,7 +17,7 @@ from .figures import Pictures, draw_pictures
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
-from .results import IN_SOURCES, ROOT, release_reserved_space, note_what_was_written
+from .results import IN_SOURCES, ROOT, note_what_was_written, release_reserved_space
 
 
 def versions() -> dict[str, str]:

@@ -24,7 +24,6 @@ from typing import Any
 
 from mpi4py import MPI
 
-import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
 

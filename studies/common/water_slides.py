@@ -1,4 +1,7 @@
-"""The slide of a slope that its water brings to failure: particles take over from finite elements, under the pore pressures of failure."""
+"""The slide of a slope that its water brings to failure.
+
+Particles take over from finite elements, under the pore pressures of failure.
+"""
 
 from __future__ import annotations
 
@@ -80,10 +83,10 @@ def slide_of(
 def handed_over(
     a: Namespace, slope: SlopeSite, instant: Instant
 ) -> tuple[mpm.Model, bridge.Handover, Callable[[], None]]:
-    """Particles at an instant of failure: in equilibrium with a strength with which the slope stands, then with their own. Collective.
+    """Particles at an instant of failure: in equilibrium with a strength with which the slope stands, then with their own.
 
-    Pore pressures stay in space as they are at this instant, without suction, while the soil moves through them; the function
-    that is returned too lets them act on the particles where these are now.
+    Collective. Pore pressures stay in space as they are at this instant, without suction, while the soil moves through them; the
+    function that is returned too lets them act on the particles where these are now.
     """
     site = slope.site
 

@@ -45,8 +45,8 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
     add_count(p, "--factor-times", 6, "times, evenly over --days, at which the factor of safety is found, beside the beginning, "
               "the corners of the site's tables and three times before each of them")  # fmt: skip
     add_number(p, "--start", 0.3, "-", "first factor that is tried; the slope must stand with it", above=0)
-    add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives to soil of less "
-               "dilation; otherwise with the flow that the site gives")  # fmt: skip
+    add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives to soil of "
+               "less dilation; otherwise with the flow that the site gives")  # fmt: skip
     add_switch(p, "--suction", suction, "suction times effective saturation adds to effective stress (Bishop)")
 
 
@@ -54,7 +54,8 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
 class Instant:
     """The slope at one time.
 
-    time: [s]; safety: its factor; pore_pressure: function of positions, in reservoirs too; picture: of the flow, on the first rank
+    time: [s]; safety: its factor; pore_pressure: function of positions, in reservoirs too
+    picture: of the flow, on the first rank
     """
 
     time: float

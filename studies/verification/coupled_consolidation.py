@@ -47,9 +47,10 @@ class Body:
         self.law = mpm.LinearElastic(young=YOUNG, poisson=poisson)
         self.period = length**2 / (MOBILITY * self.law.p_wave_modulus)
         soil = water.PorousSoil(MOBILITY * WEIGHT)
-        self.model = water.Consolidation(domain, self.law, soil, facet_tags, supports, 
+        self.model = water.Consolidation(domain, self.law, soil, facet_tags, supports,
                                          [water.Head(tag, 0.0) for tag in drained], load=load,
-                                         element=element, geometry=geometry, unit_weight=WEIGHT, water_modulus=np.inf)  # fmt: skip
+                                         element=element, geometry=geometry, unit_weight=WEIGHT,
+                                         water_modulus=np.inf)  # fmt: skip
 
     def follow(self, factor, first=1e-4, growth=1.1):
         """Go to a time factor, with steps that grow with the time."""
@@ -158,7 +159,8 @@ def strip_checks(element, size, tolerance):
     for depth in (0.5, 1.0, 2.0):
         _, p = body.at((0.0, -depth))
         checks.append(Check(f"strip, pressure at once {depth:g} m below its middle over the load, {name}",
-                            strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance, scale=1.0))  # fmt: skip
+                            strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance,
+                            scale=1.0))  # fmt: skip
     at_once = dip(body)
     body.model.boundary = [water.Head("surface", 0.0), water.Head("footing", 0.0)]
     body.model.advance(1e8 * body.period)

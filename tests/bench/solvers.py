@@ -4,8 +4,9 @@ number of tetrahedra and over the distance to collapse. Runs on as many ranks as
     python3 tests/bench/solvers.py --cells 10 22
     mpirun -n 2 python3 tests/bench/solvers.py --cells 47 --loads 5 16 20
 
-The slope is 1 m high and wide and inclined at 45 degrees, with the base and the far side fixed, cohesion 1 kPa and friction angle 25
-degrees; a side of 1 m has the given number of cubes, each cut in six tetrahedra. Under plane strain the slope collapses at 22.9 kN/m3.
+The slope is 1 m high and wide and inclined at 45 degrees, with the base and the far side fixed, cohesion 1 kPa and friction angle
+25 degrees; a side of 1 m has the given number of cubes, each cut in six tetrahedra. Under plane strain the slope collapses at
+22.9 kN/m3.
 """
 
 from __future__ import annotations
@@ -122,8 +123,8 @@ def rows(kind: type, cells: int, soil: Any, nmd: bool, loads: list[float]) -> li
         })  # fmt: skip
         if comm.rank == 0:
             r = found[-1]
-            print(f"{r['kind']:15}{' NMD' if nmd else '':4} ranks {r['ranks']}  {r['tetrahedra']:8} tetrahedra  {load:5.1f} kN/m3  Newton "
-                  f"{newton:2}  Krylov {r['krylov_mean']:5.1f} (most {r['krylov_most']:3})  {cpu:7.1f} s per rank, "
+            print(f"{r['kind']:15}{' NMD' if nmd else '':4} ranks {r['ranks']}  {r['tetrahedra']:8} tetrahedra  {load:5.1f} "
+                  f"kN/m3  Newton {newton:2}  Krylov {r['krylov_mean']:5.1f} (most {r['krylov_most']:3})  {cpu:7.1f} s per rank, "
                   f"{r['wall_seconds']:7.1f} s on the clock  {peak:6.0f} MB  {reason}", flush=True)  # fmt: skip
         if reason:
             break

@@ -93,7 +93,8 @@ def test_a_drawdown_and_its_slide(shared_path):
             text.replace("= 4e3", "= 2e3").replace("= 27.0", "= 15.0")
         )  # linear elements on large cells are too stiff
     MPI.COMM_WORLD.barrier()
-    options = "--cell-size 3 --elements P1 --days 3 --factor-times 1 --slide --time 0.3 --frames 2 --particles-per-cell 3 --no-film"
+    options = "--cell-size 3 --elements P1 --days 3 --factor-times 1 --slide --time 0.3 --frames 2 --no-film"
+    options += " --particles-per-cell 3"
     summary = summary_of(drawdown, shared_path / "results", "--site", str(path), *options.split())
     slow, fast = (limit["factor_of_safety"] for limit in summary["limits"])
     assert fast < summary["lowest_factor_of_safety"] < slow

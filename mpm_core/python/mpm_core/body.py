@@ -56,8 +56,8 @@ class Body(Conditions, RestingCells):
         if not isinstance(mesh, Mesh):
             kind = f"{type(mesh).__module__}.{type(mesh).__name__}"
             raise InputError(
-                f"mesh is a {kind}, expected an mpm_core.Mesh; fenics_bridge.background_mesh(domain, cell_tags, facet_tags) makes "
-                "one of a mesh of DOLFINx"
+                f"mesh is a {kind}, expected an mpm_core.Mesh; fenics_bridge.background_mesh(domain, cell_tags, facet_tags) "
+                "makes one of a mesh of DOLFINx"
             )
         super().__init__()
         self.mesh = mesh

@@ -88,7 +88,10 @@ class RigidContact:
 
     @property
     def angle(self) -> NDArray[np.float64]:
-        """Integral of ``spin`` since the surface was added [rad], shape (1,) or (3,): the angle of a rotation about a fixed axis."""
+        """Integral of ``spin`` since the surface was added [rad], shape (1,) or (3,).
+
+        It is the angle of a rotation about a fixed axis.
+        """
         return self._about_axes("angle")
 
     @property

@@ -28,7 +28,8 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
             continue
         if not is_right(there.get(name)):
             raise RunError(
-                f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, expected {expected}"
+                f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, "
+                f"expected {expected}"
             )
     last = len(there["supports"])
     if not all(name.lstrip("-").isdigit() and _is_count(k) and k < last for name, k in there["prescribed"].items()):

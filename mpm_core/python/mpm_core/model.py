@@ -28,12 +28,11 @@ from .newton import Newton
 from .partition import rebalance_threshold
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
-from .resting import Conversion, checked_conversion, refuse_resting
 from .reports import Reports
+from .resting import Conversion, checked_conversion, refuse_resting
 from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
-
 
 CONVERSION = Conversion()
 """When resting cells turn into particles, unless a run says otherwise"""
@@ -226,8 +225,9 @@ class Model(Body):
             dt: time step [s]; by default ``courant`` times the critical one, which is updated as the soil changes.
             courant: alpha_c of (17), in (0, 1].
             damping: local damping alpha, in [0, 1).
-            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time step,
-                in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
+            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
+                step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
+                the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation), and mean stresses for the nodal forces by the
                 transpose, so that both do the same work.
             integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
@@ -235,8 +235,8 @@ class Model(Body):
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
-            energy_limit: `Report.unexplained_fraction`, of the energy at work, at which the run ends with an error; None for none.
-                Above 0.01 there is an `EnergyWarning`.
+            energy_limit: `Report.unexplained_fraction`, of the energy at work, at which the run ends with an error; None for
+                none. Above 0.01 there is an `EnergyWarning`.
             conversion: when resting cells turn into particles (see ``rest``); None where only those do that a particle enters.
 
         Raises:
@@ -297,8 +297,9 @@ class Model(Body):
             quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
             damping: local damping alpha, in [0, 1). What it does to elastic oscillations that the step does not resolve
                 acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
-            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time step,
-                in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on the step.
+            pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
+                step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
+                the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.

@@ -5,9 +5,9 @@ its own in the folder ``PATH``, ``000012.h5`` and so on, with a dataset for each
 names it when it is whole, and it never changes again. The folder of a mesh also has ``mesh.h5``, its points and cells.
 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
-and six components are a symmetric tensor, ``xx yy zz xy`` (of particles in axial symmetry ``xx yy hoop xy``) or ``xx yy zz xy yz xz``, and become one dataset for each
-component, ``NAME_xx`` and so on; other numbers of components are kept as they are. Names consist of letters, digits,
-``_`` and ``-``.
+and six components are a symmetric tensor, ``xx yy zz xy`` (of particles in axial symmetry ``xx yy hoop xy``) or
+``xx yy zz xy yz xz``, and become one dataset for each component, ``NAME_xx`` and so on; other numbers of components are kept
+as they are. Names consist of letters, digits, ``_`` and ``-``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._core import Hencky, Heterogeneous, InputError, Undrained
 from .mesh import Tag, floats
 
-Field = Union[float, ArrayLike, Callable[[NDArray[np.float64]], ArrayLike], Mapping[Tag, float]]
+Field = float | ArrayLike | Callable[[NDArray[np.float64]], ArrayLike] | Mapping[Tag, float]
 """Values of a parameter as they may be given, see `Model.set_parameter`"""
 
 

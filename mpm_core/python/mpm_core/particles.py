@@ -77,8 +77,8 @@ class Particles:
         """All fields, including those that `Model.add_field` declared.
 
         Returns:
-            For each field: ``name``, ``unit``, ``meaning``, number of ``components``, ``initial`` value, whether it is ``optional``
-            and whether it is ``settable``.
+            For each field: ``name``, ``unit``, ``meaning``, number of ``components``, ``initial`` value, whether it is
+            ``optional`` and whether it is ``settable``.
         """
         return self._core.particle_schedule()
 

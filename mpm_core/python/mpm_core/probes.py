@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import os
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -85,7 +85,9 @@ def nearest_particle(model: Model, place: ArrayLike) -> int:
 
 
 class ParticleProbe:
-    """Follows the particles that started nearest to some points (see `nearest_particle`): position, displacement, velocity, stress.
+    """Follows the particles that started nearest to some points (see `nearest_particle`).
+
+    It records their position, displacement, velocity and stress.
 
     Args:
         model: the model, seeded.

@@ -32,9 +32,9 @@ class Reports(Generic[R]):
 
     def last(self) -> R | None:
         """Run to the end. Returns the last report; None when the time was reached before."""
-        report = None
-        for report in self:
-            pass
+        report: R | None = None
+        for each in self:
+            report = each
         return report
 
     def __del__(self) -> None:

@@ -134,8 +134,8 @@ def _inertia(body: FreeBody, surface: Surface, centre: NDArray[np.float64], mass
         own = surface._checked(dim)[1]
         if not isinstance(surface, Disc | Sphere | Box) or not np.array_equal(centre, own):
             raise InputError(
-                f"inertia is not given, expected it for a {type(surface).__name__} that rotates freely about {centre.tolist()} m; "
-                "it follows from the mass for a Disc, Sphere or Box about its own centre"
+                f"inertia is not given, expected it for a {type(surface).__name__} that rotates freely about {centre.tolist()} "
+                "m; it follows from the mass for a Disc, Sphere or Box about its own centre"
             )
         if not isinstance(surface, Box):
             return np.full(1 if dim == 2 else 3, (0.5 if dim == 2 else 0.4) * mass * surface.radius**2)

@@ -40,7 +40,8 @@ class RowFile:
     def __init__(
         self, path: str | os.PathLike[str], columns: Sequence[str], comm: MPI.Comm, *, keep_before: float | None = None
     ) -> None:
-        self.path, self._comm, self._file = os.fspath(path), comm, None  # type: str, MPI.Comm, Any
+        self.path, self._comm = os.fspath(path), comm
+        self._file: Any = None
         self.kept: list[list[str]] = []
         """Rows that were kept, as texts; on the first rank"""
         collectively(comm, self._on_first(lambda: self._begin(list(columns), keep_before)))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from axisymmetric_cases import (
     AXIS,
     AXISYMMETRIC,
@@ -14,7 +13,7 @@ from axisymmetric_cases import (
     cylinder_fem,
     cylinder_mesh,
     cylinder_particles,
-)  # fmt: skip
+)
 from bridge_cases import excess_of_strength
 from dolfinx import fem
 from mpi4py import MPI

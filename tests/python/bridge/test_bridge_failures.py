@@ -44,7 +44,8 @@ def test_a_failure_names_load_place_law_and_what_to_try(law, supports, load, out
     assert report.outcome == outcome and re.search(advice, report.reason)
     weight, place = (
         re.search(pattern, report.reason)
-        for pattern in (r"under (?:unit weight|pressure) (\S+) (?:N/m3|Pa)", r"near \((\S+), (\S+)\) m, which follows the law MohrCoulomb")
+        for pattern in (r"under (?:unit weight|pressure) (\S+) (?:N/m3|Pa)",
+                        r"near \((\S+), (\S+)\) m, which follows the law MohrCoulomb")
     )  # fmt: skip
     assert 0 < abs(float(weight[1])) <= 80e3
     x, y = map(float, place.groups())

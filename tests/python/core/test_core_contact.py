@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.probes import ProbeFile
 
 import mpm_core as mpm
-from mpm_core.probes import ProbeFile
 
 G = 9.81
 pytestmark = pytest.mark.filterwarnings("error:nothing holds the particles")  # a surface does

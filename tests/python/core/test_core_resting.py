@@ -76,7 +76,17 @@ def test_rest_and_conversion_give_back_the_particles(dim):
         np.testing.assert_allclose(by_id(at_rest, name), values, rtol=1e-12, atol=1e-13 * abs(values).max(initial=1))
 
 
-@pytest.mark.parametrize("options", [{}, {"nmd": True}, {"integration": mpm.Integration.MIXED}, {"pic": 0.01}, {"stress_update": mpm.StressUpdate.FIRST}], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"nmd": True},
+        {"integration": mpm.Integration.MIXED},
+        {"pic": 0.01},
+        {"stress_update": mpm.StressUpdate.FIRST},
+    ],
+    ids=str,
+)
 def test_converted_cells_go_on_as_particles(options):
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=150.0, friction_angle=20.0)
     model = shaken(2, law)
@@ -309,11 +319,17 @@ def test_cells_that_cannot_rest_are_refused(model, before, message):
 @pytest.mark.parametrize(
     "use, message",
     [
-        (lambda model: list(model.implicit(1.0, dt=0.1)), "the implicit scheme does not know resting cells, of which the model has 8"),
+        (
+            lambda model: list(model.implicit(1.0, dt=0.1)),
+            "the implicit scheme does not know resting cells, of which the model has 8",
+        ),
         (lambda model: model.equilibrate(), r"equilibrate\(\) does not know resting cells"),
         (moved, r"place\(\) does not know resting cells"),
         (lambda model: model.traction(1, (1.0, 0.0)), "facets of cells that rest"),
-        (lambda model: list(model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)), "integration DUAL_DOMAIN does not know"),
+        (
+            lambda model: list(model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)),
+            "integration DUAL_DOMAIN does not know",
+        ),
         (lambda model: list(model.explicit(1.0, conversion=0.1)), "conversion is 0.1, expected a Conversion or None"),
         (lambda model: model.rest(where=[True]), r"where has shape \(1,\) and dtype bool, expected \(8,\) of bool"),
         (lambda model: model.seed_points([[0.3, 0.2]], [0.01], density=1.0) and model.report(), "is in a cell that rests"),

@@ -67,8 +67,14 @@ def test_nodes_and_checkpoints_know_the_fields(tmp_path):
 
 @pytest.mark.parametrize(
     "fields, message",
-    [([0], "1 numbers, expected one for each of 2 laws"), ([0, 2], "no law in the field 1"), ([1, 1], "no law in the field 0"), ([0, -1], "without gaps"), ([0, 0.5], "expected whole numbers")],
-)  # fmt: skip
+    [
+        ([0], "1 numbers, expected one for each of 2 laws"),
+        ([0, 2], "no law in the field 1"),
+        ([1, 1], "no law in the field 0"),
+        ([0, -1], "without gaps"),
+        ([0, 0.5], "expected whole numbers"),
+    ],
+)
 def test_numbers_of_fields_that_cannot_be_are_refused(fields, message):
     with pytest.raises(mpm.InputError, match=message):
         mpm.Model(box((2, 2)), [SOFT, SOFT], velocity_fields=fields)

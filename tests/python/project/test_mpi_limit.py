@@ -25,7 +25,8 @@ def test_a_test_that_hangs_is_named(tmp_path):
         "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2] / "mpi"), os.environ.get("PYTHONPATH", "")]),
     }  # fmt: skip
     start = time.monotonic()
-    ended = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", sys.executable, "-m", "pytest", "-p", "conftest", "test_hanging.py"],
+    ended = subprocess.run(["mpirun", "-n", "2", "--oversubscribe", sys.executable, "-m", "pytest", "-p", "conftest",
+                            "test_hanging.py"],
                            cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)  # fmt: skip
     assert ended.returncode != 0 and time.monotonic() - start < 100
     assert "in test_that_waits_for_ever" in ended.stderr and "in test_that_is_quick" not in ended.stderr

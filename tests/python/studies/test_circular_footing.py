@@ -1,9 +1,9 @@
-"""The bearing capacities that the verification case of the circular footing compares with, found anew by the method of characteristics.
+"""The bearing capacities that the verification case of the circular footing compares with, by the method of characteristics.
 
-Cox, Eason and Hopkins (1961) for a smooth footing, Eason and Shield (1960) for a rough one: weightless Tresca soil, the hoop stress
-equal to the smaller principal stress (Haar and von Karman). Compression is positive here, z points down, lengths are in radii of the
-footing and stresses in shear strengths. With the mean stress p in the half section and the angle psi from the radius to the major
-principal stress,
+Cox, Eason and Hopkins (1961) for a smooth footing, Eason and Shield (1960) for a rough one: weightless Tresca soil, the hoop
+stress equal to the smaller principal stress (Haar and von Karman). Compression is positive here, z points down, lengths are in
+radii of the footing and stresses in shear strengths. With the mean stress p in the half section and the angle psi from the
+radius to the major principal stress,
 
     sigma_r = p + cos 2 psi,   sigma_z = p - cos 2 psi,   tau = sin 2 psi,   sigma_hoop = p - 1,
 
@@ -12,7 +12,8 @@ equilibrium reads
     alpha lines, dz/dr = tan(psi - pi/4):  dp - 2 dpsi = -(dr - dz) / r
     beta lines,  dz/dr = tan(psi + pi/4):  dp + 2 dpsi = -(dr + dz) / r
 
-The ground beside the footing bears nothing: psi = 0 and p = 1. At the edge a fan of beta lines leaves from one point, p = 1 + 2 psi.
+The ground beside the footing bears nothing: psi = 0 and p = 1. At the edge a fan of beta lines leaves from one point,
+p = 1 + 2 psi.
 """
 
 import importlib

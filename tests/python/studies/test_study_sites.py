@@ -98,7 +98,11 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("[soils.upper]", "[soils.sand]", "no cell has the name 'sand'"),
         ('"tresca"', '"clay"', "soils.lower: material is 'clay', expected one of"),
         ("cell_size = 0.5", "cell_size = 0.5\nsize = 1", "unknown key 'size'"),
-        ("cell_size = 0.5", 'cell_size = 0.5\nsupports = {base = "glued"}', "supports.base is 'glued', expected 'fixed' or 'roller'"),
+        (
+            "cell_size = 0.5",
+            'cell_size = 0.5\nsupports = {base = "glued"}',
+            "supports.base is 'glued', expected 'fixed' or 'roller'",
+        ),
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{fill = ["sand"]}]', "soil 'sand' is not among the soils lower, upper"),
         ("cell_size = 0.5", "cell_size = 0.5\nstages = [{full = []}]", r"stages\[0\]: unknown key 'full'"),
         ("cell_size = 0.5", "cell_size = [", "is not TOML"),

@@ -141,7 +141,8 @@ SUCTION = 0.8 * WEIGHT  # Pa, uniform, of which half is effective
 )
 def test_an_infinite_slope_has_the_factor_of_its_closed_form(water_pressure, unit_weight):
     # F = [c + (gamma d cos^2 b - p) tan(phi)] / (gamma d sin b cos b) at the base, d below the surface; for p = gamma_w d cos^2 b
-    # and no cohesion that is gamma' tan(phi) / (gamma tan b). The ends add what falls with the length: two lengths give the limit.
+    # and no cohesion that is gamma' tan(phi) / (gamma tan b). The ends add what falls with the length: two
+    # lengths give the limit.
     depth, found = 1.0, []
     for length in (20.0, 40.0):
         domain, _, facet_tags = bridge.box_mesh(comm, (length, depth), (int(2 * length), 4))
