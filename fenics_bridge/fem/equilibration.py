@@ -13,6 +13,10 @@ from fenics_bridge.fem.equilibrium import EquilibriumStep
 from fenics_bridge.fem.relaxation import Relaxation, relax
 
 
+PATIENCE = 8
+"""Iterations in which the least residual of Newton's method must halve; relaxation takes over otherwise"""
+
+
 @dataclass(frozen=True)
 class Solver:
     """Solver of an equilibrium and its tolerances. Out-of-balance forces are over the forces at work [-].
@@ -83,7 +87,8 @@ def find_equilibrium(body, laws, external, before, displacement, solver):
     Without equilibrium the body does not change. `body.increment` is the displacement of the whole step. Collective.
     """
     step = EquilibriumStep(body, laws, external, before, displacement)
-    report = newton(step, solver.tolerance, solver.max_iterations)
+    patience = PATIENCE if solver.relaxation else None
+    report = newton(step, solver.tolerance, solver.max_iterations, patience=patience)
     if report.converged:
         motion = body.increment.x.array.copy()
         body.accept()

@@ -74,6 +74,14 @@ class EquilibriumStep:
         points.add_viscosity(self._laws, self._viscosity, np.zeros_like(spread))
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
+    def begin_from(self, motion):
+        """Begin the iteration from an increment, per degree of freedom [m], instead of none, if the laws can follow it."""
+        self._correction.x.array[:] = motion
+        if self.move(1.0) == np.inf:
+            self.start()
+        else:
+            self.keep()
+
     def correction(self):
         """Solve the tangent system for the residual. Returns whether it was solved; `reason` says why not."""
         matrix = self._body.kinematics.stiffness()

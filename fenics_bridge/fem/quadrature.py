@@ -188,6 +188,7 @@ def deviatoric_size(strain):
 def isotropic_stiffness(law, size):
     """Elastic stiffness (S, S) [Pa] with the wave moduli of a law; S = 4 in plane strain, 6 in three dimensions."""
     shear = law.shear_modulus
-    stiffness = np.diag([2 * shear] * 3 + [shear] * (size - 3))
-    stiffness[:3, :3] += law.p_wave_modulus - 2 * shear
+    stiffness = shear * np.eye(size)
+    stiffness[:3, :3] = law.p_wave_modulus - 2 * shear
+    stiffness[[0, 1, 2], [0, 1, 2]] = law.p_wave_modulus
     return stiffness

@@ -10,8 +10,9 @@ The tangent of non-associated flow may lose its positive definiteness, which mak
 normals of yield surface and potential, at the angle alpha in the metric of the elastic stiffness, the smallest eigenvalue
 of the symmetric part of the elasto-plastic tangent is (1 - 1/cos(alpha))/2 of the elastic one, so a larger theta leaves one
 solution to each step, and Newton's method finds it. (It is 0.08 for phi = 20, psi = 0; 0.5 for angles of some
-40 degrees; a step whose iteration fails is repeated with three times the theta.) As the body comes to rest theta is lowered
-towards zero, and what remains is the equilibrium. A body that does not come to rest flows in a mechanism.
+40 degrees; a step whose iteration fails is repeated with three times the theta.) The iteration begins from the motion of the
+step before, at the same rate: from rest its first tangent would be the elastic one. As the body comes to rest theta is
+lowered towards zero, and what remains is the equilibrium. A body that does not come to rest flows in a mechanism.
 
 Sources: Zienkiewicz, Cormeau (1974), IJNME 8, 821-845 (viscoplastic strains as a way to plastic equilibrium); Kelley,
 Keyes (1998), SIAM J. Numer. Anal. 35, 508-523 (pseudo-transient continuation: the step grows as the residual falls).
@@ -36,8 +37,14 @@ ELASTIC = 4.0
 RUN_AWAY = 5.0
 """Growth over the reference, at which the motion counts as failure even if its rate still changes"""
 
-CORRECTIONS = 8
+CORRECTIONS = 6
 """Largest number of iterations of Newton's method in a step"""
+
+NEXT_THETA = 0.3, 0.5, 0.8, 1.0, 1.5, 1.5
+"""Factor of theta after a step that took 1, 2, ... iterations"""
+
+AFTER_FAILURE = 3.0
+"""Factor of theta with which a step that did not converge is repeated"""
 
 REDUCTION = 0.15, 0.3
 """Fractions of the residual: target of a step of relaxation, and limit at which it is still accepted"""
@@ -79,14 +86,15 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
     Returns a Relaxation. The body stays in the state in which the relaxation ended, whatever the outcome. Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
+    rate: np.ndarray | None = None
     start = body.solution.x.array.copy()
     for _ in range(max_steps):
         step = EquilibriumStep(body, laws, external, before, displacement, theta, scale)
-        residuals = _solve_step(step, tolerance)
+        residuals = _solve_step(step, tolerance, None if rate is None else rate / theta)
         result.iterations += len(residuals) - 1
         scale = step.scale
         if not residuals[-1] <= REDUCTION[1] * residuals[0] and not residuals[-1] <= 0.3 * tolerance:
-            theta *= 3
+            theta *= AFTER_FAILURE
             if theta > LARGEST:
                 result.reason = (
                     step.reason or f"no step of the relaxation converged at a residual of {residuals[0]:.1e}"
@@ -94,6 +102,7 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
                 return result
             continue
         _record(result, body, step, theta, start)
+        rate = theta * result.motion
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
             reference += ELASTIC * (1 + theta) * result.growth[0]
         if result.residual[-1] <= tolerance:
@@ -106,16 +115,21 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
                 f"force of {result.residual[-1]:.1e}; the stresses carry {result.carried[-1]:.2%} of the load"
             )
             return result
-        theta *= 0.3 if len(residuals) <= 4 else 1.5 if len(residuals) > 6 else 1.0
+        theta *= NEXT_THETA[len(residuals) - 2]
     result.reason = (
         f"residual {result.residual[-1] if result.residual else np.inf:.1e} after {max_steps} steps of relaxation"
     )
     return result
 
 
-def _solve_step(step, tolerance):
-    """Newton's method for one viscous step, to a fraction of the residual at its start; returns the residuals."""
+def _solve_step(step, tolerance, motion):
+    """Newton's method for one viscous step, to a fraction of the residual at its start; returns the residuals.
+
+    motion: increment that the iteration begins from, per degree of freedom [m], or None
+    """
     residuals = [step.start()]
+    if motion is not None:
+        step.begin_from(motion)
     aim = max(REDUCTION[0] * residuals[0], 0.3 * tolerance)
     while residuals[-1] > aim and len(residuals) <= CORRECTIONS or len(residuals) == 1:
         if not step.correction():

@@ -66,13 +66,15 @@ def newton(
     max_iterations: int = 25,
     max_halvings: int = 5,
     min_iterations: int = 1,
+    patience: int | None = None,
 ) -> NewtonReport:
     """Solve a system by Newton's method with a line search.
 
     The full correction is halved until the work of the residual has fallen to 0.8 of what it was (Matthies, Strang
     1979, IJNME 14, 1613-1626); when no fraction does that, the one with the smallest residual is taken. Unlike a search
     for a decrease of the residual itself, this one continues near collapse and with non-associated flow. An iteration whose
-    residual reaches ten times the forces at work is abandoned.
+    residual reaches ten times the forces at work is abandoned, and so is one whose least residual has not halved within
+    `patience` iterations, if that is given.
     """
     residuals = [system.start()]
     if residuals[0] == float("inf"):
@@ -80,6 +82,8 @@ def newton(
     while residuals[-1] > tolerance or len(residuals) <= min_iterations:
         if len(residuals) > max_iterations:
             return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e} after {max_iterations} iterations")
+        if patience and len(residuals) > patience and min(residuals[-patience:]) > 0.5 * min(residuals[:-patience]):
+            return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e}: it chatters")
         if not system.correction():
             return NewtonReport(False, residuals, system.reason or "the linear solver failed")
         residual = line_search(system, max_halvings)
