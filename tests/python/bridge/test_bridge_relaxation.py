@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bridge_cases import MESHES, POISSON, YOUNG, column, slope_model
 from mpi4py import MPI
+from mpm_core.newton import newton
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -34,6 +35,56 @@ def test_an_elastic_body_relaxes_at_the_rate_of_the_closed_form():
     # On the motion of a step an elastic body carries 1 - theta / (1 + theta) of what is missing, and all of the rest.
     carried = 1 - np.array([report.residuals[0], *expected[:-1]]) / report.residuals[0] * theta / (1 + theta)
     assert np.allclose(np.array(relaxation.carried)[above], carried[above], rtol=1e-6)
+
+
+def test_a_body_that_flows_at_a_steady_rate_takes_one_system_a_step():
+    """A plastic block flows without a change of volume at the strain rate (p - 2 s_u) / 4G, so each step begins at its own end."""
+    block, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
+    clay = mpm.tresca(young=1e6, poisson=0.3, shear_strength=10e3)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1))]
+    model = bridge.QuasiStatic(block, clay, sides, supports)
+    assert model.equilibrate(bridge.Load(pressure={4: 19.9e3})).converged
+    report = model.equilibrate(bridge.Load(pressure={4: 20.2e3}))
+    relaxation = report.relaxation
+    steps = len(relaxation.time)
+    assert report.outcome == "failure" and steps >= 5
+    assert relaxation.iterations <= steps + 3  # but for the first steps, in which the block yields
+    assert relaxation.carried[-1] == pytest.approx(20e3 / 20.2e3, rel=1e-6)
+    rates = np.diff(relaxation.growth) / np.diff(relaxation.time)
+    assert np.allclose(rates[-2:], 0.2e3 / (4 * clay.shear_modulus), rtol=1e-4)
+
+
+class Chatters:
+    """A system whose residual is 1, and after each number of corrections in `falls` half of what it was."""
+
+    reason = ""
+
+    def __init__(self, falls):
+        self.corrections, self.residual, self.falls = 0, 1.0, falls
+
+    def start(self):
+        return self.residual
+
+    def correction(self):
+        self.corrections += 1
+        self.residual *= 0.49 if self.corrections in self.falls else 1.0
+        return True
+
+    def move(self, fraction):
+        return self.residual
+
+    def work(self):
+        return self.residual
+
+    def keep(self):
+        pass
+
+
+def test_newton_gives_up_where_the_residual_does_not_halve_in_time():
+    assert newton(Chatters(falls=[]), patience=6).iterations == 6
+    assert newton(Chatters(falls=[5]), patience=6).iterations == 5 + 6
+    assert newton(Chatters(falls=[5]), max_iterations=20).iterations == 20
+    assert newton(Chatters(falls=range(100)), patience=2, max_iterations=50).converged
 
 
 def test_relaxation_finds_the_equilibrium_that_newton_finds():
