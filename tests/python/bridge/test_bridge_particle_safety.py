@@ -18,12 +18,12 @@ def soil(friction_angle=25.0, dilation_angle=0.0, cohesion=1e3):
     )
 
 
-def particles(law, gravity=GRAVITY):
+def particles(law, gravity=GRAVITY, geometry=None):
     """Function of the factor that returns the slope's particles, unstressed."""
     mesh = bridge.background_mesh(*MESH)
 
     def model_of(factor):
-        model = mpm.Model(mesh, bridge.reduced_strength(law, factor))
+        model = mpm.Model(mesh, bridge.reduced_strength(law, factor), geometry=geometry)
         model.seed(density=UNIT_WEIGHT / GRAVITY, per_cell=3, cell_tag=bridge.SOIL)
         bridge.apply_supports(model, SUPPORTS)
         model.set_gravity((0.0, -gravity))
@@ -33,15 +33,21 @@ def particles(law, gravity=GRAVITY):
 
 
 @pytest.mark.parametrize(
-    ("friction_angle", "dilation_angle", "cohesion"), [(25.0, 0.0, 1e3), (25.0, 25.0, 1e3), (0.0, 0.0, 4e3)]
+    ("friction_angle", "dilation_angle", "cohesion", "geometry"),
+    [
+        (25.0, 0.0, 1e3, None),
+        (25.0, 25.0, 1e3, None),
+        (0.0, 0.0, 4e3, None),
+        (25.0, 0.0, 1e3, bridge.Geometry.AXISYMMETRIC),
+    ],
 )
-def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilation_angle, cohesion):
+def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilation_angle, cohesion, geometry):
     """On the same linear cells, whose particles hardly move: the brackets, at most 1 % wide, overlap within 1 %."""
     law = soil(friction_angle, dilation_angle, cohesion)
     body, _, facet_tags = bridge.soil_mesh(*MESH)
-    model = bridge.QuasiStatic(body, law, facet_tags, SUPPORTS, degree=1)
+    model = bridge.QuasiStatic(body, law, facet_tags, SUPPORTS, degree=1, geometry=geometry)
     elements = bridge.factor_of_safety(model, bridge.Load(unit_weight=UNIT_WEIGHT), first_step=0.2)
-    found = bridge.particle_safety(particles(law), start=0.7)
+    found = bridge.particle_safety(particles(law, geometry=geometry), start=0.7)
     assert elements.failed and found.failed and found.residual <= 1e-3
     assert found.value <= 1.01 * elements.failed_at and elements.value <= 1.01 * found.failed_at
     assert found.failed_at - found.value <= 2 * 5e-3 * found.value
