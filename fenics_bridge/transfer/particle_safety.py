@@ -163,8 +163,8 @@ def _flows(moved):
 def _scales(model):
     """Time that a shear wave takes through the body [s], and its elastic settlement under its weight [m]. Collective."""
     p, comm = model.particles, model.comm
-    low = comm.allreduce(p.position.min(axis=0, initial=np.inf), MPI.MIN)
-    high = comm.allreduce(p.position.max(axis=0, initial=-np.inf), MPI.MAX)
+    low = np.min(comm.allgather(p.position.min(axis=0, initial=np.inf)), axis=0)
+    high = np.max(comm.allgather(p.position.max(axis=0, initial=-np.inf)), axis=0)
     density = comm.allreduce(float((p.mass / p.volume).max(initial=0.0)), MPI.MAX)
     shear = min(law.shear_modulus for law in model.laws)
     wave = min(law.p_wave_modulus for law in model.laws)

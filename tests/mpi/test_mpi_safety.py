@@ -13,7 +13,7 @@ LOAM = mpm.MohrCoulomb(young=20e6, poisson=0.33, cohesion=1e3, friction_angle=25
 
 
 def slope(comm):
-    return bridge.slope_mesh(comm, crest=1.0, cell_size=0.25)
+    return bridge.slope_mesh(comm, crest=1.0, cell_size=0.5)
 
 
 def by_particles(comm, geometry, gravity=9.81, start=0.7):
@@ -26,7 +26,7 @@ def by_particles(comm, geometry, gravity=9.81, start=0.7):
         model.set_gravity((0.0, -gravity))
         return model
 
-    return bridge.particle_safety(weakened, start=start, first_step=0.2, tolerance=0.02)
+    return bridge.particle_safety(weakened, start=start, first_step=0.2, tolerance=0.05)
 
 
 @pytest.mark.parametrize("geometry", [None, mpm.Geometry.AXISYMMETRIC])
