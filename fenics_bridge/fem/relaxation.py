@@ -101,8 +101,7 @@ def relax(body, laws, external, before, displacement, tolerance, max_steps, refe
                 )
                 return result
             continue
-        _record(result, body, step, theta, start)
-        rate = theta * result.motion
+        rate = theta * _record(result, body, step, theta, start)
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
             reference += ELASTIC * (1 + theta) * result.growth[0]
         if result.residual[-1] <= tolerance:
@@ -140,7 +139,7 @@ def _solve_step(step, tolerance, motion):
 
 
 def _record(result, body, step, theta, start):
-    """Accept a step and add it to the result."""
+    """Accept a step and add it to the result; returns its motion."""
     result.residual.append(step.out_of_balance())
     result.carried.append(step.carried_fraction())
     result.motion = body.increment.x.array.copy()
@@ -148,6 +147,7 @@ def _record(result, body, step, theta, start):
     moved = np.abs(body.solution.x.array - start).max(initial=0.0)
     result.growth.append(body.solution.function_space.mesh.comm.allreduce(float(moved), MPI.MAX))
     result.time.append((result.time[-1] if result.time else 0.0) + 1 / theta)
+    return result.motion
 
 
 def _flows(result, reference):

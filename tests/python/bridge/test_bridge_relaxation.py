@@ -38,7 +38,7 @@ def test_an_elastic_body_relaxes_at_the_rate_of_the_closed_form():
 
 
 def test_a_body_that_flows_at_a_steady_rate_takes_one_system_a_step():
-    """A plastic block flows without a change of volume at the strain rate (p - 2 s_u) / 4G, so each step begins at its own end."""
+    """A plastic block flows at constant volume, at the strain rate (p - 2 s_u) / 4G: each step begins at its own end."""
     block, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
     clay = mpm.tresca(young=1e6, poisson=0.3, shear_strength=10e3)
     supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1))]
