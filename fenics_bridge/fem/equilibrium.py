@@ -75,8 +75,9 @@ class EquilibriumStep:
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def begin_from(self, motion):
-        """Begin the iteration from an increment, per degree of freedom [m], instead of none, if the laws can follow it."""
+        """Begin the iteration from an increment per degree of freedom [m], but for the supports', if the laws can follow it."""
         self._correction.x.array[:] = motion
+        self._correction.x.array[self._fixed] = 0.0
         if self.move(1.0) == np.inf:
             self.start()
         else:

@@ -54,6 +54,19 @@ def test_a_body_that_flows_at_a_steady_rate_takes_one_system_a_step():
     assert np.allclose(rates[-2:], 0.2e3 / (4 * clay.shear_modulus), rtol=1e-4)
 
 
+def test_supports_move_once_in_a_relaxation():
+    """A plastic block under a plate that is pressed down: the plate ends where it was told to, at the force 2 s_u."""
+    block, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
+    clay = mpm.tresca(young=1e6, poisson=0.3, shear_strength=10e3)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1)), bridge.Support(4, (None, -0.05))]
+    model = bridge.QuasiStatic(block, clay, sides, supports)
+    report = model.equilibrate(bridge.Load(displacement=1.0), tolerance=1e-30, max_iterations=1)
+    assert report.converged and len(report.relaxation.time) > 1
+    top = model.evaluate_at(np.array([[0.3, 1.0], [0.8, 1.0]]))["displacement"]
+    assert np.allclose(top[:, 1], -0.05, rtol=0, atol=1e-12)
+    assert model.reaction(4)[1] == pytest.approx(20e3, rel=1e-4)
+
+
 class Chatters:
     """A system whose residual is 1, and after each number of corrections in `falls` half of what it was."""
 
