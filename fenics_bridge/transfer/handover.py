@@ -104,7 +104,8 @@ def _take_stress_and_state(model, fem, search, smooth):
     particles.set("stress", stress)
     particles.set("state", state)
     particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
-    particles.set("velocity", np.zeros_like(particles.velocity))
+    for name in ("velocity", "velocity_gradient") if model.resting_cells.any() else ("velocity",):
+        particles.set(name, np.zeros_like(getattr(particles, name)))
     return returned
 
 

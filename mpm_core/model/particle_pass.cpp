@@ -131,24 +131,28 @@ double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& f
 }
 
 /// Moves the particles of a batch, and marks the runs that some have left.
-template <class G, int D = G::dim>
+template <class Kind, class G, int D = G::dim>
 void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
                 const BatchScratch<D>& scratch)
 {
   auto& runs = model.order.runs;
+  Particles<D>& particles = model.particles;
   for (std::size_t r = batch.first_run; options.pic_fraction > 0 && r < batch.last_run; ++r)
-    model.energy.pic_loss += batch.resting
-                                 ? pic_loss_at_rest(model.particles, field, model.mesh, runs[r], options.pic_fraction)
-                                 : pic_loss(model.mesh, model.particles, field, runs[r], options.pic_fraction);
-  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+    if constexpr (Kind::at_rest)
+      model.energy.pic_loss += pic_loss_at_rest(particles, field, model.mesh, runs[r], options.pic_fraction);
+    else
+      model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction);
+  if constexpr (Kind::at_rest)
   {
-    const CellMotion<D>& motion = scratch.motion[r - batch.first_run];
-    if (!batch.resting)
-      runs[r].out_of_order =
-          !move_particles<D>(model.particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
-    else if (!move_row<D>(model.particles, runs[r].first, motion))
-      note_failure<D>(model.failure, model.particles, Failure<D>::Kind::not_finite, runs[r].first, {});
+    const Index failed =
+        move_rows<D>(particles, batch.first, std::span(scratch.motion).first(batch.last_run - batch.first_run));
+    if (failed < batch.last)
+      note_failure<D>(model.failure, particles, Failure<D>::Kind::not_finite, failed, {});
   }
+  else
+    for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+      runs[r].out_of_order = !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell],
+                                                scratch.motion[r - batch.first_run]);
 }
 
 /// Moves and strains the particles of a batch, and brings the moments of their cells to where they are then.
@@ -161,7 +165,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   auto& runs = model.order.runs;
   find_motions(model.mesh, field, runs, options, batch, scratch);
   if (options.move)
-    move_batch(model, field, options, batch, scratch);
+    move_batch<Kind>(model, field, options, batch, scratch);
   if (options.stress)
     update_stress<Kind>(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
@@ -172,7 +176,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     CellMoments<G>& moments = field.moments[run.cell];
     if (run.first_in_cell && options.stress)
       model.energy.stress_work += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
-    if (batch.resting)
+    if constexpr (Kind::at_rest)
     {
       take_row<G>(model.particles, run.first, moments);
       if (options.stress)
@@ -204,7 +208,10 @@ void pass_batches(Model<G>& model, const PassOptions& options)
   for (std::size_t r = 0; r < model.order.runs.size();)
   {
     const Batch batch = next_batch(model.order.runs, r);
-    pass_batch<Kind>(model, options, batch, from_particles, scratch);
+    if (batch.resting)
+      pass_batch<StrainAtRest>(model, options, batch, from_particles, scratch);
+    else
+      pass_batch<Kind>(model, options, batch, from_particles, scratch);
     r = batch.last_run;
   }
 }

@@ -2,6 +2,7 @@
 
 #include "mesh/search.h"
 #include "transfer/lanes.h"
+#include "transfer/turn.h"
 
 #include <algorithm>
 
@@ -35,27 +36,6 @@ inline void move_piece(Piece<2 * D>& piece, const CellShape<D>& shape, const Cel
     for (int i = 1; i < D; ++i)
       n += shape.gradient[k][i] * moved[i];
     outside |= ~(n >= -inside_tolerance); // so also where a coordinate is not a number
-  }
-}
-
-/// R sigma R^T for a piece whose first columns are the stresses without zz in plane strain.
-template <int D, std::size_t N>
-inline void turn(Piece<N>& piece, const Matrix<D>& r)
-{
-  std::array<std::array<Lanes, D>, D> half; // R sigma
-  for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-    {
-      half[i][j] = r[i][0] * piece[symmetric_index<D>(0, j)];
-      for (int k = 1; k < D; ++k)
-        half[i][j] += r[i][k] * piece[symmetric_index<D>(k, j)];
-    }
-  for (int s = 0; s < n_symmetric<D>; ++s)
-  {
-    const auto [i, j] = symmetric_pairs<D>[s];
-    piece[s] = half[i][0] * r[j][0];
-    for (int k = 1; k < D; ++k)
-      piece[s] += half[i][k] * r[j][k];
   }
 }
 } // namespace

@@ -7,6 +7,7 @@
 /// the second moment of the rule, and the velocities v + grad v . xi. So nodes cannot tell a resting cell from its
 /// particles, and nothing changes for them when one takes the place of the other.
 
+#include "transfer/cell_strain.h"
 #include "transfer/moments.h"
 
 #include <map>
@@ -45,10 +46,18 @@ std::array<double, n_symmetric<D>> second_moment(const Mesh<D>& mesh, Index cell
 template <class G, int D = G::dim>
 void take_row(const Particles<D>& particles, Index row, CellMoments<G>& moments);
 
-/// Moves a resting cell with the nodes: its velocity as (18), while its centre stays and the displacement adds up.
-/// @returns whether the velocity is finite
+/// Moves resting cells with the nodes: velocities as (18), while centres stay and displacements add up.
+/// @param first    the first of consecutive rows
+/// @param motions  of each of them
+/// @returns the first row whose velocity is not finite; that behind the last if all are
 template <int D>
-bool move_row(Particles<D>& particles, Index row, const CellMotion<D>& motion);
+Index move_rows(Particles<D>& particles, Index first, std::span<const CellMotion<D>> motions);
+
+/// Rotates the stresses of consecutive rows, each with its cell, grows their volumes and accumulates their deviatoric
+/// strain.
+/// @param strains  of `lanes` rows together
+template <int D>
+void strain_rows(Particles<D>& particles, Index first, Index last, std::span<const CellStrain<D, Lanes>> strains);
 
 /// Gradient in the row of a resting cell.
 template <int D>
