@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <set>
 
@@ -18,7 +19,12 @@ Particles<D> marked(Index size, Index n_cells, Index n_materials)
   particles.state.resize(3);
   add_field(particles, {"shear_strength", "Pa", "Of undrained soil", 5e3, {}}, 2);
   resize(particles, size);
-  require(particles.traction, particles.id.size());
+  for_each_field(particles,
+                 [&](const Field&, auto& columns)
+                 {
+                   if constexpr (is_optional<std::remove_cvref_t<decltype(columns)>>)
+                     require(columns, particles.id.size());
+                 });
   double column_number = 0;
   for_each_column(particles,
                   [&](std::string_view, int, auto& column)
@@ -65,13 +71,16 @@ TYPED_TEST_SUITE(ParticlesTest, Dimensions);
 
 TYPED_TEST(ParticlesTest, EveryColumnIsOnTheList)
 {
-  // The struct holds nothing but columns, one flag and the list of added fields, so its size counts them; the schedule
-  // visits each column once (state and added fields have none here).
+  // The struct holds nothing but columns, a flag for each optional field and the list of added fields, so its size
+  // counts them; the schedule visits each column once (state and added fields have none here).
   constexpr int D = TypeParam::value;
   Particles<D> particles;
   std::set<const void*> visited;
   for_each_column(particles, [&](std::string_view, int, auto& column) { visited.insert(&column); });
-  EXPECT_EQ((visited.size() + 2) * sizeof(Column) + alignof(Column), sizeof(Particles<D>));
+  std::size_t flags = 0;
+  for_each_field(particles, [&](const Field&, const auto& columns)
+                 { flags += is_optional<std::remove_cvref_t<decltype(columns)>>; });
+  EXPECT_EQ((visited.size() + 2) * sizeof(Column) + flags * alignof(Column), sizeof(Particles<D>));
 }
 
 TYPED_TEST(ParticlesTest, SortingKeepsEveryRowWhole)
@@ -136,6 +145,7 @@ TYPED_TEST(ParticlesTest, RunsCoverAllParticlesAndStayInOneCellAndMaterial)
 {
   constexpr int D = TypeParam::value;
   Particles<D> particles = marked<D>(400, 9, 2);
+  particles.resting = {};
   sort_by_cell(particles, 9, 2);
   std::vector<Run> runs;
   find_runs(particles, 16, runs);
@@ -153,11 +163,33 @@ TYPED_TEST(ParticlesTest, RunsCoverAllParticlesAndStayInOneCellAndMaterial)
   EXPECT_EQ(runs.size(), 18u); // one per cell and material, all of which occur
 }
 
+TYPED_TEST(ParticlesTest, TheRowOfARestingCellIsARun)
+{
+  constexpr int D = TypeParam::value;
+  Particles<D> particles = marked<D>(90, 9, 1);
+  for (Index p = 0; p < 90; ++p)
+  {
+    particles.cell[p] = p % 9;
+    particles.resting[0][p] = p == 4 || p == 13 || p == 40; // three rows of cell 4, of ten there
+  }
+  sort_by_cell(particles, 9, 1);
+  std::vector<Run> runs;
+  find_runs(particles, 400, runs);
+  for (const Run& run : runs)
+  {
+    EXPECT_TRUE(!run.resting || run.last - run.first == 1);
+    for (Index p = run.first; p < run.last; ++p)
+      EXPECT_EQ(run.resting, is_resting(particles, p));
+  }
+  EXPECT_EQ(std::ranges::count_if(runs, &Run::resting), 3);
+}
+
 TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
 {
   // Particles of some runs go to other cells, among them to that of the run before; long runs are cut.
   constexpr int D = TypeParam::value;
   Particles<D> particles = marked<D>(400, 9, 2);
+  particles.resting = {};
   sort_by_cell(particles, 9, 2);
   std::vector<Run> again, anew;
   find_runs(particles, 16, again);
@@ -182,7 +214,7 @@ TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
 TYPED_TEST(ParticlesTest, BytesPerParticleCountTheColumns)
 {
   // 8 bytes: id, 3 D (position, velocity, initial position) + D (traction), stress, volume, mass, strain, 3 states, 2
-  // of the added field; 4: two
+  // of the added field, 1 + D + 2 D^2 of resting cells; 4: two
   constexpr int D = TypeParam::value;
-  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (1 + 4 * D + n_stress<D> + 3 + 3 + 2) + 2 * 4);
+  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (2 + 5 * D + 2 * D * D + n_stress<D> + 3 + 3 + 2) + 2 * 4);
 }
