@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from mpm_core.newton import EASY_ITERATIONS, newton
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
-from fenics_bridge.fem.equilibrium import EquilibriumStep
+from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
 from fenics_bridge.fem.relaxation import Relaxation, relax
-
+from fenics_bridge.types import Law
 
 PATIENCE = 8
 """Iterations in which the least residual of Newton's method must halve; relaxation takes over otherwise"""
@@ -21,17 +24,22 @@ PATIENCE = 8
 class Solver:
     """Solver of an equilibrium and its tolerances. Out-of-balance forces are over the forces at work [-].
 
-    tolerance: at which Newton's method ends; max_iterations: its corrections in a step
-    relaxation: whether `relaxation.relax` takes over where Newton's method does not converge
-    relaxed_tolerance: out-of-balance at which a relaxation ends; max_steps: of it
-    Raises InputError for values out of range. `PRACTICE` is the level that is customary in practice, 1 % out of balance.
+    `PRACTICE` is the level that is customary in practice, 1 % out of balance.
+
+    Raises:
+        InputError: a value out of its range.
     """
 
     tolerance: float = 1e-8
+    """Out-of-balance force at which Newton's method ends [-]"""
     max_iterations: int = 25
+    """Largest number of iterations of Newton's method in a step"""
     relaxation: bool = True
+    """Whether `relaxation.relax` takes over where Newton's method does not converge"""
     relaxed_tolerance: float = 1e-5
+    """Out-of-balance force at which a relaxation ends [-]"""
     max_steps: int = 80
+    """Largest number of steps of a relaxation"""
 
     def __post_init__(self):
         for name in ("tolerance", "relaxed_tolerance"):
@@ -48,43 +56,55 @@ PRACTICE = Solver(tolerance=1e-2, relaxed_tolerance=1e-2)
 
 @dataclass(frozen=True)
 class EquilibriumReport:
-    """Result of one step to equilibrium.
-
-    outcome: "equilibrium"; "failure": the body flows in a mechanism; "undecided": neither could be shown
-    residuals: out-of-balance over the forces at work [-], before each iteration of Newton's method (or step of
-        relaxation) and at the end; reason: why there is no equilibrium, empty otherwise
-    iterations: linear systems solved; relaxation: its Relaxation, or None where Newton's method sufficed
-    motion: displacement of the step, or of the mechanism where it fails, per degree of freedom [m]
-    """
+    """Result of one step to equilibrium."""
 
     outcome: str
+    """How the step ended: "equilibrium", "failure" (the body flows in a mechanism) or "undecided" (neither could be shown)"""
     residuals: list[float]
+    """Out-of-balance force over the forces at work [-], before each iteration of Newton's method (or step of relaxation) and at
+    the end"""
     reason: str
+    """Why there is no equilibrium; empty otherwise"""
     iterations: int
+    """Linear systems solved"""
     relaxation: Relaxation | None = None
-    motion: np.ndarray | None = field(default=None, repr=False)
+    """The relaxation; None where Newton's method sufficed"""
+    motion: NDArray[np.float64] | None = field(default=None, repr=False)
+    """Displacement of the step, or of the mechanism where it fails, per degree of freedom [m]"""
 
     @property
-    def converged(self):
+    def converged(self) -> bool:
+        """Whether the step ended in equilibrium."""
         return self.outcome == "equilibrium"
 
     @property
-    def carried(self):
+    def carried(self) -> float:
         """Fraction of the load that the stresses carry in the mechanism of a failure [-]; NaN otherwise."""
         return self.relaxation.carried[-1] if self.outcome == "failure" and self.relaxation else np.nan
 
     @property
-    def easy(self):
+    def easy(self) -> bool:
         """Whether Newton's method converged in a few iterations."""
         return self.converged and self.relaxation is None and self.iterations <= EASY_ITERATIONS
 
 
-def find_equilibrium(body, laws, external, before, displacement, solver):
-    """Bring a body to equilibrium under a load, from its last equilibrium on. Returns an EquilibriumReport.
+def find_equilibrium(
+    body: Body, laws: Sequence[Law], external: Any, before: Any, displacement: float, solver: Solver
+) -> EquilibriumReport:
+    """Bring a body to equilibrium under a load, from its last equilibrium on; without equilibrium it does not change.
 
-    laws: in the order of the body's points; external, before: nodal forces of the load and of the load before it
-    displacement: fraction of the displacements that the supports prescribe; solver: Solver
-    Without equilibrium the body does not change. `body.increment` is the displacement of the whole step. Collective.
+    `body.increment` is the displacement of the whole step.
+
+    Args:
+        body: the body.
+        laws: laws in the order of the body's points.
+        external: nodal forces of the load.
+        before: nodal forces of the load before it.
+        displacement: fraction of the displacements that the supports prescribe [-].
+        solver: tolerances.
+
+    Note:
+        Collective.
     """
     step = EquilibriumStep(body, laws, external, before, displacement)
     patience = PATIENCE if solver.relaxation else None

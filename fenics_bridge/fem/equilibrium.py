@@ -2,54 +2,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from dolfinx import fem
 
+from fenics_bridge.types import Law
+
 
 @dataclass
 class Body:
-    """A body of finite elements: the state that a step changes, and the operators for it.
-
-    solution, increment: functions of the unknowns, total and of the step; points: QuadraturePoints
-    kinematics: gives the points' strain, internal forces and stiffness, as `Kinematics`
-    constraints: Constraints on the unknowns; solver: LinearSolver
-    """
+    """A body of finite elements: the state that a step changes, and the operators for it."""
 
     solution: fem.Function
+    """Function of the unknowns"""
     increment: fem.Function
+    """Their change in the step"""
     points: Any
+    """Quadrature points"""
     kinematics: Any
+    """Operator that gives the points' strain, internal forces and stiffness, as `Kinematics`"""
     constraints: Any
+    """Constraints on the unknowns"""
     solver: Any
+    """Solver of linear systems"""
 
-    def accept(self):
+    def accept(self) -> None:
         """Accept the end of the step as the state that the next step starts from."""
         self.points.accept()
         self.solution.x.array[:] += self.increment.x.array
 
-    def snapshot(self):
+    def snapshot(self) -> tuple[Any, Any]:
         """Copies of the state that the next step starts from, for `restore`."""
         return self.solution.x.array.copy(), self.points.snapshot()
 
-    def restore(self, snapshot):
+    def restore(self, snapshot: tuple[Any, Any]) -> None:
         """Restore a state that was copied before."""
         self.solution.x.array[:] = snapshot[0]
         self.points.restore(snapshot[1])
 
 
 class EquilibriumStep:
-    """One step of a Body to equilibrium, as a system for `newton`."""
+    """One step of a Body to equilibrium, as a system for `newton`.
 
-    def __init__(self, body, laws, external, before, displacement, viscosity=0.0, scale=None):
-        """
-        laws: in the order of the points; external, before: nodal forces of the loads at the step's end and at its start
-        displacement: fraction of the displacements that the supports prescribe, at the step's end
-        viscosity: factor of the elastic stiffness, times the strain increment a stress added to that of the laws [-]
-        scale: norm of forces that residuals are divided by; by default it is found at the start
-        """
+    Args:
+        body: the body.
+        laws: laws in the order of the body's points.
+        external: nodal forces of the loads at the step's end.
+        before: nodal forces of the loads at its start.
+        displacement: fraction of the displacements that the supports prescribe at the step's end [-].
+        viscosity: factor of the elastic stiffness; that times the strain increment is a stress added to that of the laws [-].
+        scale: norm of forces by which residuals are divided; by default it is found at the start.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        laws: Sequence[Law],
+        external: Any,
+        before: Any,
+        displacement: float,
+        viscosity: float = 0.0,
+        scale: Any = None,
+    ) -> None:
         self._body, self._laws, self._viscosity = body, laws, viscosity
         self._space = body.solution.function_space
         self._comm = self._space.mesh.comm
@@ -63,7 +80,7 @@ class EquilibriumStep:
         self._base = np.zeros_like(body.increment.x.array)
         self._correction = fem.Function(self._space)
 
-    def start(self):
+    def start(self) -> float:
         """The residual at no increment but that of the supports, whose effect is taken by the present tangent."""
         points, increment = self._body.points, self._body.increment
         increment.x.array[:] = 0.0
@@ -83,13 +100,13 @@ class EquilibriumStep:
         else:
             self.keep()
 
-    def correction(self):
+    def correction(self) -> bool:
         """Solve the tangent system for the residual. Returns whether it was solved; `reason` says why not."""
         matrix = self._body.kinematics.stiffness()
         self.reason = self._body.solver.solve(matrix, self._residual_vector, self._correction)
         return not self.reason
 
-    def move(self, step):
+    def move(self, step: float) -> float:
         """Add a fraction of the correction to the last point of the iteration; returns the residual there."""
         body, points = self._body, self._body.points
         body.increment.x.array[:] = self._base + step * self._correction.x.array
@@ -100,11 +117,11 @@ class EquilibriumStep:
             return np.inf
         return self._residual(points.trial_stress + points.add_viscosity(self._laws, self._viscosity, strain))
 
-    def out_of_balance(self):
+    def out_of_balance(self) -> float:
         """The residual of the laws' stresses alone, without the viscous ones, at the last point that was moved to."""
         return self._residual(self._body.points.trial_stress)
 
-    def carried_fraction(self):
+    def carried_fraction(self) -> float:
         """Power of the laws' stresses over that of the external forces, both on the increment; NaN where these do none.
 
         In a mechanism it is the factor by which the load would have to be multiplied to be carried.
@@ -115,12 +132,12 @@ class EquilibriumStep:
         works = self._comm.allreduce(np.array([internal @ increment, self._external[:n] @ increment]))
         return works[0] / works[1] if works[1] > 0 else np.nan
 
-    def work(self):
+    def work(self) -> float:
         """The residual times the correction."""
         n = self._n_owned
         return self._comm.allreduce(float(np.dot(self._residual_vector.array[:n], self._correction.x.array[:n])))
 
-    def keep(self):
+    def keep(self) -> None:
         """Make this the last point of the iteration."""
         self._base[:] = self._body.increment.x.array
 

@@ -2,68 +2,93 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpm_core.parameter_fields import differences_of, has_varying
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import N_STRESS
 from fenics_bridge.mesh.tagged import cell_volumes
+from fenics_bridge.types import Law
 from mpm_core.mesh import cell_sizes
 
 
 class QuadraturePoints:
     """The quadrature points of the cells that this rank owns, cell after cell, the cells of each material together.
 
-    n: their number; per_cell: number in a cell; cells: (m,) int32, the cells; material: (m,) int32, of each of them
-    off: rows of the points in inactive cells, whose stress is zero
-    cell_size: (n,) [m] of the points' cells; time, duration: of the step under trial [s], for laws that depend on rate
-    parameters: {name: (n,)}, values of laws' parameters that vary, NaN where the law's number holds
-    stress, state: (n, S) [Pa] and (n, n_state) of the last equilibrium; n_state: that of the law with most variables
-    deviatoric_strain: (n,) accumulated up to there, the sum of sqrt(2/3 de : de) as the particles have it [-]
-    trial_stress, trial_state, tangent: (n, S), (n, n_state), (n, S, S) at the displacement under trial
+    Args:
+        domain: mesh of the body.
+        laws: the laws, by number.
+        material: number of each cell's law, shape (owned cells,).
+        degree: degree of the quadrature.
+        axisymmetric: whether means over a cell are those of its volume of one radian, r dA.
     """
 
-    def __init__(self, domain, laws, material, degree, axisymmetric=False):
-        """laws: by number; material: (owned cells,) int32, number of each cell's law; degree: of the quadrature.
-
-        axisymmetric: whether means over a cell are those of its volume of one radian, r dA
-        """
+    def __init__(
+        self, domain: Mesh, laws: Sequence[Law], material: NDArray[np.int32], degree: int, axisymmetric: bool = False
+    ) -> None:
         self.size = N_STRESS[domain.geometry.dim]
         self._domain = domain
         self.degree, self.reference = degree, compat.quadrature_points(domain, degree)
         self.per_cell = len(self.reference)
+        """Number of points in a cell"""
         # With the points of a law in one piece it works on them in place.
         self.cells = np.argsort(material, kind="stable").astype(np.int32)
+        """The cells, shape (m,), int32, those of a material together"""
         self.n = len(self.cells) * self.per_cell
+        """Number of points"""
         self._radii = self.coordinates()[:, 0].reshape(-1, self.per_cell) if axisymmetric else None
         sizes = cell_sizes(cell_volumes(domain)[self.cells], domain.geometry.dim)
         self.cell_size = np.repeat(sizes, self.per_cell)
-        self.time, self.duration = 0.0, np.inf
-        self.parameters = {}
+        """Size of the points' cells [m], shape (n,)"""
+        self.time = 0.0
+        """Time at the start of the step under trial [s], for laws that depend on rate"""
+        self.duration = np.inf
+        """Duration of that step [s]"""
+        self.parameters: dict[str, NDArray[np.float64]] = {}
+        """Values (n,) of laws' parameters that vary, by name; NaN where the law's number holds"""
         self.assign(material, len(laws))
         self.stress = np.zeros((self.n, self.size))
+        """Stress of the last equilibrium [Pa], shape (n, S), tension positive"""
         self.state = np.zeros((self.n, max(law.n_state for law in laws)))
+        """State variables of the last equilibrium, shape (n, n_state), n_state being that of the law with most variables"""
         self.deviatoric_strain = np.zeros(self.n)
-        self.trial_stress, self.trial_state = self.stress.copy(), self.state.copy()
+        """Accumulated deviatoric strain [-], shape (n,): the sum of sqrt(2/3 de : de), as the particles have it"""
+        self.trial_stress = self.stress.copy()
+        """Stress at the displacement under trial [Pa], shape (n, S)"""
+        self.trial_state = self.state.copy()
+        """State variables at the displacement under trial, shape (n, n_state)"""
         self._trial_strain = np.zeros((self.n, self.size))
         self.tangent = np.zeros((self.n, self.size, self.size))
+        """Tangent at the displacement under trial [Pa], shape (n, S, S)"""
         self.reset_state(laws)
 
-    def assign(self, material, n_laws):
-        """Give each cell the number of its law; -1 for an inactive cell, whose points no law updates.
+    def assign(self, material: NDArray[np.int32], n_laws: int) -> None:
+        """Give each cell the number of its law.
 
-        material: (owned cells,) int32, in the order of the mesh
+        Args:
+            material: numbers, shape (owned cells,), in the order of the mesh; -1 for an inactive cell, whose points no law
+                updates.
+            n_laws: number of laws.
         """
         self.material = material[self.cells]
+        """Number of the law of each of the cells, shape (m,), int32"""
         of_point = self._numbers()
         self._pieces = [_piece(np.flatnonzero(of_point == number)) for number in range(n_laws)]
         self.off = np.flatnonzero(of_point < 0)
+        """Rows of the points in inactive cells, whose stress is zero"""
 
-    def reset_state(self, laws, points=slice(None)):
-        """Initial state variables of the laws: zero, except for parameters that vary.
+    def reset_state(self, laws: Sequence[Law], points: Any = slice(None)) -> None:
+        """Give points the initial state variables of the laws: zero, except for parameters that vary.
 
-        points: rows of the points that are reset; all by default
+        Args:
+            laws: the laws, by number.
+            points: rows of the points; all by default.
         """
         missing = max(law.n_state for law in laws) - self.state.shape[1]
         if missing > 0:  # a law with more variables has come in
@@ -73,10 +98,16 @@ class QuadraturePoints:
         for name in self.parameters:
             self._write_parameter(laws, name)
 
-    def set_parameter(self, laws, name, values):
-        """Give points their values (n,) of a parameter that varies; those where they are NaN keep theirs.
+    def set_parameter(self, laws: Sequence[Law], name: str, values: NDArray[np.float64]) -> None:
+        """Give points their values of a parameter that varies.
 
-        Raises InputError for a parameter that varies in no law, and for values out of its range.
+        Args:
+            laws: the laws, by number.
+            name: name of the parameter.
+            values: values, shape (n,); points where they are NaN keep theirs.
+
+        Raises:
+            InputError: a parameter that varies in no law, or values out of its range.
         """
         before = self.parameters.get(name, np.full(self.n, np.nan))
         values = np.where(np.isnan(values), before, values)
@@ -92,7 +123,7 @@ class QuadraturePoints:
         """Number of each point's law: (n,)."""
         return np.repeat(self.material, self.per_cell)
 
-    def update(self, laws, strain_increment):
+    def update(self, laws: Sequence[Law], strain_increment: NDArray[np.float64]) -> str:
         """Trial stress, state and tangent by one call of each law; returns where and why one failed, empty if none did."""
         np.copyto(self.trial_stress, self.stress)
         np.copyto(self.trial_state, self.state)
@@ -117,7 +148,7 @@ class QuadraturePoints:
         strain = ", ".join(f"{e:.6g}" for e in self._trial_strain[point])
         return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
 
-    def add_viscosity(self, laws, factor, strain_increment):
+    def add_viscosity(self, laws: Sequence[Law], factor: float, strain_increment: NDArray[np.float64]) -> Any:
         """Add a factor times the elastic stiffness to the tangent; returns that times the strain increment: (n, S) [Pa].
 
         The stiffness is the isotropic one of each law's wave moduli, an estimate for laws whose stiffness changes.
@@ -131,30 +162,35 @@ class QuadraturePoints:
             stress[piece] = strain_increment[piece] @ stiffness
         return stress
 
-    def snapshot(self):
+    def snapshot(self) -> tuple[NDArray[np.float64], ...]:
         """Copies of stress, state and accumulated strain, for `restore`."""
         return self.stress.copy(), self.state.copy(), self.deviatoric_strain.copy()
 
-    def restore(self, snapshot):
+    def restore(self, snapshot: tuple[NDArray[np.float64], ...]) -> None:
         """Restore values that were copied before."""
         for values, copied in zip((self.stress, self.state, self.deviatoric_strain), snapshot):
             values[:] = copied
 
-    def accept(self):
+    def accept(self) -> None:
         """Accept the trial as the last equilibrium."""
         np.copyto(self.stress, self.trial_stress)
         np.copyto(self.state, self.trial_state)
         self.deviatoric_strain += deviatoric_size(self._trial_strain)
 
-    def coordinates(self):
+    def coordinates(self) -> NDArray[np.float64]:
         """Positions of the points: (n, D) [m]."""
         corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
         return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, -1)
 
-    def cell_function(self, values, name, degree):
-        """Function that is constant (degree 0: the mean by volume) or linear (degree 1: through the points) in each cell.
+    def cell_function(self, values: NDArray, name: str, degree: int) -> fem.Function:
+        """Function in the cells that follows from values at the points.
 
-        The mean of admissible stresses is admissible; the linear function is exact at the points. values: (n, k)
+        The mean of admissible stresses is admissible; the linear function is exact at the points.
+
+        Args:
+            values: values at the points, shape (n,) or (n, k).
+            name: name of the function.
+            degree: 0 for the mean by volume, constant in each cell; 1 for the function through the points, linear in each cell.
         """
         values = values.reshape(len(self.cells), self.per_cell, -1)
         if degree == 0:
@@ -179,13 +215,13 @@ def _piece(rows):
     return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] + 1 == len(rows) else rows
 
 
-def deviatoric_size(strain):
+def deviatoric_size(strain: NDArray[np.float64]) -> NDArray[np.float64]:
     """sqrt(2/3 e : e) of the deviators e of strains (n, S) with engineering shear: (n,)."""
     deviator = strain[:, :3] - strain[:, :3].mean(axis=1, keepdims=True)
     return np.sqrt(2 / 3 * (np.sum(deviator**2, axis=1) + 0.5 * np.sum(strain[:, 3:] ** 2, axis=1)))
 
 
-def isotropic_stiffness(law, size):
+def isotropic_stiffness(law: Law, size: int) -> NDArray[np.float64]:
     """Elastic stiffness (S, S) [Pa] with the wave moduli of a law; S = 4 in plane strain, 6 in three dimensions."""
     shear = law.shear_modulus
     stiffness = shear * np.eye(size)

@@ -20,13 +20,17 @@ Keyes (1998), SIAM J. Numer. Anal. 35, 508-523 (pseudo-transient continuation: t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from mpm_core.newton import line_search
+from numpy.typing import NDArray
 
-from fenics_bridge.fem.equilibrium import EquilibriumStep
+from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
+from fenics_bridge.types import Law
 
 FIRST, LARGEST = 0.3, 100.0
 """theta at the start, and the one at which the relaxation ends without a result [-]"""
@@ -55,35 +59,54 @@ STEADY = 0.8
 
 @dataclass
 class Relaxation:
-    """Result of a relaxation; lists have one entry for each step that was accepted.
-
-    outcome: "equilibrium", "failure" (the displacement grows at a steady rate) or "undecided"; reason: in words
-    time: pseudo-time in units of the viscous time tau [-]; residual: out-of-balance force over the forces at work [-],
-        with one entry more where Newton's method could refine the end
-    growth: largest displacement of a node since the start [m]
-    carried: power of the stresses over that of the load on the step's motion [-]; in a mechanism, the factor by which the
-        load would have to be multiplied to be carried
-    iterations: linear systems solved; motion: displacement increments of the last step, per degree of freedom [m]
-    """
+    """Result of a relaxation; lists have one entry for each step that was accepted."""
 
     outcome: str = "undecided"
+    """How it ended: "equilibrium", "failure" (the displacement grows at a steady rate) or "undecided" (neither was shown)"""
     reason: str = ""
+    """Why there is no equilibrium, in words"""
     time: list[float] = field(default_factory=list)
+    """Pseudo-time in units of the viscous time tau [-]"""
     residual: list[float] = field(default_factory=list)
+    """Out-of-balance force over the forces at work [-], with one entry more where Newton's method could refine the end"""
     growth: list[float] = field(default_factory=list)
+    """Largest displacement of a node since the start [m]"""
     carried: list[float] = field(default_factory=list)
+    """Power of the stresses over that of the load on the step's motion [-]; in a mechanism, the factor by which the load would
+    have to be multiplied to be carried"""
     iterations: int = 0
-    motion: np.ndarray | None = None
+    """Linear systems solved"""
+    motion: NDArray[np.float64] | None = None
+    """Displacement increments of the last step, per degree of freedom [m]"""
 
 
-def relax(body, laws, external, before, displacement, tolerance, max_steps, reference):
+def relax(
+    body: Body,
+    laws: Sequence[Law],
+    external: Any,
+    before: Any,
+    displacement: float,
+    tolerance: float,
+    max_steps: int,
+    reference: float,
+) -> Relaxation:
     """Relax a body under a load, from its present state.
 
-    external, before: nodal forces of the load and of the load before it; displacement: fraction of the prescribed displacements
-    tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-]
-    max_steps: of pseudo-time; reference: displacement at the start [m]; the growth must exceed it, and some times the
-        elastic displacement of the change of load besides, before it counts as failure
-    Returns a Relaxation. The body stays in the state in which the relaxation ended, whatever the outcome. Collective.
+    The body stays in the state in which the relaxation ended, whatever the outcome.
+
+    Args:
+        body: the body.
+        laws: laws in the order of the body's points.
+        external: nodal forces of the load.
+        before: nodal forces of the load before it.
+        displacement: fraction of the prescribed displacements [-].
+        tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-].
+        max_steps: largest number of steps of pseudo-time.
+        reference: displacement at the start [m]; the growth must exceed it, and some times the elastic displacement of the
+            change of load besides, before it counts as failure.
+
+    Note:
+        Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
     rate: np.ndarray | None = None

@@ -25,7 +25,7 @@ class Support:
     facet_tag: int | str
     """Number or name of the tag"""
     displacement: tuple[float | None, ...] | None = None
-    """Components of the displacement [m], shape (D,), of which None leaves one free; None stands for "all zero\""""
+    """Components of the displacement [m], shape (D,), of which None leaves one free; None instead of a tuple sets all to zero"""
 
 
 def fixed(facet_tag: int | str) -> Support:
