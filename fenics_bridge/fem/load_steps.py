@@ -112,9 +112,8 @@ def print_step(step: LoadStep) -> None:
         return
     report = step.report
     method = "Newton" if report.relaxation is None else "relaxed"
-    state = {"equilibrium": "ok", "failure": f"fails: {report.reason}"}.get(
-        report.outcome, f"undecided ({report.reason})"
-    )
+    why = report.reason if np.isnan(report.carried) else f"the stresses carry {report.carried:.2%} of the load"
+    state = {"equilibrium": "ok", "failure": f"fails: {why}"}.get(report.outcome, f"undecided ({report.reason})")
     print(
         f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
         f"{method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
