@@ -137,16 +137,16 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
 
 namespace
 {
-/// Finds by law: 0 where nodal mixed discretisation averages strains only; empty where it does for all. In frictional
-/// soil that hardly dilates, pressures that alternate from cell to cell would grow, if forces did not feel them, and
-/// cost it strength.
-void find_averaged_laws(const std::vector<Law>& laws, bool nmd, std::vector<unsigned char>& averaged)
+/// Fraction of nodal mixed discretisation in frictional soil that hardly dilates. Forces of strains that are averaged
+/// in full do not feel pressures that alternate from cell to cell: there these would cost the soil strength.
+constexpr double averaged_in_non_associated_soil = 0.5;
+
+/// Finds by law the fraction of averaging; empty without nodal mixed discretisation.
+void find_averaged_laws(const std::vector<Law>& laws, bool nmd, std::vector<double>& averaged)
 {
   averaged.clear();
-  if (!nmd || std::ranges::all_of(laws, is_non_associated))
-    return;
-  for (const Law& law : laws)
-    averaged.push_back(is_non_associated(law) ? 0 : 1);
+  for (std::size_t k = 0; nmd && k < laws.size(); ++k)
+    averaged.push_back(is_non_associated(laws[k]) ? averaged_in_non_associated_soil : 1);
 }
 } // namespace
 
@@ -156,7 +156,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = options.integration;
-    find_averaged_laws(model.laws, options.nmd, field.integration.average_stress);
+    find_averaged_laws(model.laws, options.nmd, field.integration.averaged_by_law);
   }
   model.last.dt = dt;
   begin_contacts(model, {model.time, dt});

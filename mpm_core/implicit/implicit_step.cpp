@@ -35,7 +35,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.time = model.time;
   step.length = dt;
   field.integration.kind = options.integration;
-  field.integration.average_stress.assign(options.average_stress ? model.laws.size() : 0, 1);
+  field.integration.averaged_by_law.assign(options.average_stress ? model.laws.size() : 0, 1.0);
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   if (options.quasi_static)

@@ -1,6 +1,7 @@
 #include "model/batch_strain.h"
 
 #include "model/integration.h"
+#include "model/mapping.h"
 #include "transfer/affine_field.h"
 #include "transfer/resting.h"
 
@@ -75,7 +76,8 @@ void find_cell_strains(const Mesh<D>& mesh, const VelocityField<G>& field, const
     {
       Lanes theta{};
       for (std::size_t r = first; r < last; ++r)
-        theta[r - first] = mean_of_nodes<D>(mesh.cells[runs[batch.first_run + r].cell], field.volumetric_strain);
+        theta[r - first] =
+            averaged_strain<G>(mesh, field, runs[batch.first_run + r].cell, strain.volumetric[r - first]);
       set_volumetric<G>(strain, theta);
     }
     if (options.small)
@@ -128,7 +130,7 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
       const Matrix<D> gradient = dual_gradient(mesh, field, at<D>(particles.position, p), run.cell);
       CellStrain<D> strain = strain_increment<D>(gradient, options.dt);
       if (options.nmd)
-        set_volumetric<G>(strain, mean_of_nodes<D>(mesh.cells[run.cell], field.volumetric_strain));
+        set_volumetric<G>(strain, averaged_strain<G>(mesh, field, run.cell, strain.volumetric));
       for (int k = 0; k < n_stress<D>; ++k)
         scratch.strain[k][p - batch.first] = strain.increment[k];
       strain_particles<D>(particles, p, p + 1, strain);

@@ -2,6 +2,7 @@
 
 #include "model/integration.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace mpm::model
@@ -39,7 +40,8 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if constexpr (!G::has_hoop)
     if (field.integration.kind == Integration::dual_domain)
       integrate_dual_domains(mesh, exchange, particles, runs, field);
-  if (!field.integration.average_stress.empty())
+  field.integration.averaged_of_cell.clear();
+  if (!field.integration.averaged_by_law.empty())
     average_forces(mesh, exchange, runs, field);
 }
 
@@ -135,12 +137,18 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
 template <class G, int D>
 void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field)
 {
-  const auto& by_law = field.integration.average_stress;
-  auto& averaged = field.integration.averaged_cells;
-  averaged.assign(static_cast<std::size_t>(mesh.owned_cells), 1);
+  const auto& by_law = field.integration.averaged_by_law;
+  auto& averaged = field.integration.averaged_of_cell;
+  averaged.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
   for (const Run& run : runs)
-    averaged[run.cell] &= by_law[run.material];
-  const auto stress_of = [&](Index c) { return averaged[c] ? integrated_stress(mesh, field, c) : Working<G>{}; };
+    averaged[run.cell] = std::min(averaged[run.cell], by_law[run.material]);
+  const auto stress_of = [&](Index c)
+  {
+    Working<G> stress = integrated_stress(mesh, field, c);
+    for (double& component : stress)
+      component *= averaged[c];
+    return stress;
+  };
   average_mean_stress<G>(mesh, exchange, field, stress_of,
                          [&](Index c, double change)
                          {

@@ -48,11 +48,23 @@ template <class G, int D = G::dim>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
 
-/// The same for the internal forces of a field on this rank: adds what averaging changes where
-/// `integration.average_stress` says so of all soils in a cell. The mean stress of other cells stays theirs.
+/// The same for the internal forces of a field on this rank, in each cell by the fraction that its soils have in
+/// `integration.averaged_by_law`.
+/// @post integration.averaged_of_cell has the fractions, by which the strains are to be averaged, too
 /// @note Collective
 template <class G, int D = G::dim>
 void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field);
+
+/// Volumetric strain of a cell after nodal mixed discretisation.
+/// @param own  of the cell before
+/// @pre average_strains has been called for the field
+template <class G, int D = G::dim>
+double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, double own)
+{
+  const auto& fraction = field.integration.averaged_of_cell;
+  const double mean = mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain);
+  return fraction.empty() ? mean : own + fraction[cell] * (mean - own);
+}
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.
 ///

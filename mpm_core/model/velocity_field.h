@@ -30,12 +30,12 @@ template <int D>
 struct CellIntegration
 {
   Integration kind = Integration::particles; ///< of the run under way
-  /// By law: 1 where the forces of a cell with its soil alone are those of mean stresses averaged over nodes, as
-  /// strains are in a run with nodal mixed discretisation; empty where none are.
-  std::vector<unsigned char> average_stress;
-  std::vector<unsigned char> averaged_cells; ///< per owned cell: 1 where that holds for all soils in it
-  std::vector<std::array<double, 2>> fills;  ///< per node: volumes of particles and of cells around it
-  std::vector<unsigned char> whole;          ///< per owned cell, at the step's start: 1 where full; not with particles
+  /// By law: fraction of nodal mixed discretisation in a cell with its soil alone, of its strains and, by their
+  /// transpose, of its forces. Empty where strains are averaged in full, and forces not.
+  std::vector<double> averaged_by_law;
+  std::vector<double> averaged_of_cell;     ///< per owned cell: the least of its soils; empty as above
+  std::vector<std::array<double, 2>> fills; ///< per node: volumes of particles and of cells around it
+  std::vector<unsigned char> whole;         ///< per owned cell, at the step's start: 1 where full; not with particles
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< with dual domains, as are the mean gradients of nodes
   std::vector<MeanGradient<D>> mean_gradients;
 };

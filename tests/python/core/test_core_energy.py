@@ -160,8 +160,10 @@ def failing_block(law):
             water_modulus=2e6,
             porosity=0.4,
         ),
+        mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0),
+        mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0, dilation_angle=15.0),
     ],
-    ids=["Tresca", "dilating", "undrained"],
+    ids=["Tresca", "dilating", "undrained", "not dilating", "dilating less"],
 )
 def test_yielding_soil_with_averaged_strains_keeps_its_energy(law):
     # The nodes' forces do the work of the particles' stresses only if these are averaged by the transpose of what averages the
@@ -187,16 +189,19 @@ def test_softening_clay_with_averaged_strains_and_mixed_integration_keeps_its_en
     assert abs(report.unexplained_fraction) < 0.01
 
 
-def test_pressures_of_frictional_soil_do_not_alternate():
-    # Forces of averaged mean stresses do not feel pressures that alternate from cell to cell. Where flow is not associated these
-    # would grow and cost the soil strength, so it keeps its mean stresses as they are: no rougher with NMD than without.
+def test_alternating_pressures_of_frictional_soil_stay_bounded():
+    # Forces feel a pressure that alternates from cell to cell by the fraction that is not averaged, a half where flow is not
+    # associated. So under the same forces such pressures are at most twice what they are without averaging; with forces that do not feel
+    # them they grow until particles are thrown out of this mesh.
     law = mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0)
     rough = {}
     for nmd in (False, True):
         model = failing_block(law)
-        run(model, 0.6, nmd=nmd, dt=0.25 * model.critical_time_step())
-        rough[nmd] = np.std(averaged_over_nodes(model)) / np.std(by_id(model, "stress")[:, :2].mean(axis=1))
-    assert rough[True] < 1.1 * rough[False]
+        snapshots = []
+        for _ in model.explicit(0.6, every=0.05, nmd=nmd, courant=0.25):
+            snapshots.append(np.std(averaged_over_nodes(model)) / np.std(by_id(model, "stress")[:, :2].mean(axis=1)))
+        rough[nmd] = np.mean(snapshots)
+    assert rough[True] < 2 * rough[False]
 
 
 @pytest.mark.parametrize("per_cell, noisy", [(6, True), (24, False)])
