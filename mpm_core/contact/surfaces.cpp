@@ -123,6 +123,17 @@ Distance<2> distance_from(const Polyline& line, const Vector<2>& x)
   return {sign * length, scaled<2>(nearest.offset, sign / length)};
 }
 
+Distance<3> distance_from(const Triangles& triangles, const Vector<3>& x)
+{
+  const NearestOnTriangles nearest = nearest_on(triangles, x);
+  const Vector<3> out = outward_at(triangles, nearest);
+  const double height = dot<3>(out, nearest.offset), length = std::sqrt(nearest.squared);
+  if (length == 0 || is_at_border(triangles, nearest))
+    return {height, out};
+  const double sign = height < 0 ? -1 : 1;
+  return {sign * length, scaled<3>(nearest.offset, sign / length)};
+}
+
 template <int D>
 double reach_of(const Plane<D>&, const Vector<D>&)
 {
@@ -151,6 +162,14 @@ double reach_of(const Polyline& line, const Vector<2>& centre)
     reach = std::max(reach, norm<2>(difference<2>(point, centre)));
   return reach;
 }
+
+double reach_of(const Triangles& triangles, const Vector<3>& centre)
+{
+  double reach = 0;
+  for (std::size_t v = 0; v < triangles.vertices.size(); ++v)
+    reach = std::max(reach, triangles.at_border[v] ? endless : norm<3>(difference<3>(triangles.vertices[v], centre)));
+  return reach;
+}
 } // namespace
 
 template <int D>
@@ -158,7 +177,7 @@ double rotation_reach(const Surface<D>& surface, const Vector<D>& centre)
 {
   const auto of = [&centre](const auto& shape)
   {
-    if constexpr (std::is_same_v<decltype(shape), const Polyline&>)
+    if constexpr (requires { reach_of(shape, centre); })
       return reach_of(shape, centre);
     else
       return reach_of<D>(shape, centre);
@@ -171,7 +190,7 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
 {
   const auto from = [&x](const auto& shape)
   {
-    if constexpr (std::is_same_v<decltype(shape), const Polyline&>)
+    if constexpr (requires { distance_from(shape, x); })
       return distance_from(shape, x);
     else
       return distance_from<D>(shape, x);

@@ -2,7 +2,7 @@
 /// @file
 /// Rigid surfaces as plain values, with their signed distance and their normal.
 
-#include "base/types.h"
+#include "contact/triangles.h"
 
 #include <variant>
 
@@ -40,7 +40,7 @@ struct Polyline
 
 template <int D>
 using Surface = std::conditional_t<D == 2, std::variant<Plane<2>, Ball<2>, Box<2>, Polyline>,
-                                   std::variant<Plane<3>, Ball<3>, Box<3>>>;
+                                   std::variant<Plane<3>, Ball<3>, Box<3>, Triangles>>;
 
 /// From a rigid body to a point: positive outside of the body; the normal has length 1 and points out of it.
 template <int D>

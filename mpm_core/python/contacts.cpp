@@ -1,6 +1,7 @@
 #include "python/bindings.h"
 
 #include "model/contacts.h"
+#include "python/arrays.h"
 
 #include <algorithm>
 
@@ -128,6 +129,17 @@ void bind_contacts(py::module_& m)
       .def(py::init(
           [](const std::vector<Vector<2>>& points, bool closed) {
             return Polyline{points, closed};
+          }));
+  py::class_<Triangles>(m, "Triangles3")
+      .def(py::init(
+          [](const py::array_t<double, py::array::c_style>& vertices,
+             const py::array_t<Index, py::array::c_style>& triangles)
+          {
+            std::vector<Vector<3>> points(static_cast<std::size_t>(vertices.shape(0)));
+            std::copy_n(vertices.data(), 3 * points.size(), points.empty() ? nullptr : points.front().data());
+            std::vector<std::array<Index, 3>> corners(static_cast<std::size_t>(triangles.shape(0)));
+            std::copy_n(triangles.data(), 3 * corners.size(), corners.empty() ? nullptr : corners.front().data());
+            return make_triangles(std::move(points), std::move(corners));
           }));
   bind_contacts_of<PlaneStrain>(m);
   bind_contacts_of<Axisymmetric>(m);

@@ -48,6 +48,7 @@ from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
 from .surfaces import Box, Disc, Plane, Polyline, Sphere
+from .triangles import Triangles
 
 for _law in law_types:
     _law.__signature__ = signature_of(_law)
@@ -92,6 +93,7 @@ __all__ = [
     "Space",
     "Sphere",
     "StressUpdate",
+    "Triangles",
     "Umat",
     "Undrained",
     "ViscoplasticMohrCoulomb",

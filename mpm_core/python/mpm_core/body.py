@@ -19,6 +19,7 @@ from .parameter_fields import Field, differences_of, has_varying, nominal_value,
 from .particles import Particles
 from .resting import RestingCells, refuse_resting
 from .space import SpaceWatch
+from .triangles import Triangles
 
 
 def _geometry(mesh: Mesh, geometry: Geometry | None) -> Geometry:
@@ -76,6 +77,7 @@ class Body(Conditions, RestingCells):
         self._velocity_fields = fields or [0] * len(self.laws)
         self._space_watch: SpaceWatch | None = None
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
+        self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run

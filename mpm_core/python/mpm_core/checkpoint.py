@@ -12,7 +12,7 @@ from mpi4py import MPI
 from . import _core, partition
 from ._core import InputError, RunError
 from .collective import collectively
-from .contact import set_contacts
+from .contact import require_surfaces, set_contacts
 from .description import parsed
 from .fingerprint import fingerprint
 from .step_control import StepControl
@@ -60,6 +60,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     there = checkpoint_description(name, model.comm)
     here = _description(model)
     collectively(model.comm, lambda: _compare(name, there, here))
+    collectively(model.comm, lambda: require_surfaces(model, there.get("contacts", [])))
     if there.get("cuts") and there["ranks"] == model.comm.size:
         cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
         if not partition.is_partition(model, cells):

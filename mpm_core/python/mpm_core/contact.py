@@ -16,6 +16,7 @@ from .collective import collectively
 from .mesh import floats
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
 from .surfaces import KINDS, Surface
+from .triangles import Triangles
 
 if TYPE_CHECKING:
     from .model import Model
@@ -163,9 +164,8 @@ def add_contact(
         positive("adhesion", adhesion, "Pa", zero=True)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
-        shape = {field.name: _plain(getattr(surface, field.name)) for field in fields(surface)}
         return {
-            "surface": {"kind": type(surface).__name__, **shape}, "friction": float(friction), "adhesion": float(adhesion),
+            "surface": _described(surface), "friction": float(friction), "adhesion": float(adhesion),
             "penalty": float(penalty),
             "body": describe(surface, about, velocity, spin, body, geometry=model.geometry, time=model.time),
         }  # fmt: skip
@@ -179,20 +179,46 @@ def add_contact(
             f"surface {surface!r} overlaps the soil by {-gap:.6g} m, expected it outside of all particles, which have the radius "
             "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
         )
+    if isinstance(surface, Triangles):
+        model._triangulated[surface.fingerprint] = surface
     set_contacts(model, [*model._contacts, new])
     return RigidContact(model, len(model._contacts) - 1)
+
+
+def _described(surface: Surface) -> dict[str, Any]:
+    """A surface as checkpoints have it; triangles by their fingerprint."""
+    if isinstance(surface, Triangles):
+        return {"kind": "Triangles", "fingerprint": surface.fingerprint, "triangles": len(surface.triangles)}
+    shape = {field.name: _plain(getattr(surface, field.name)) for field in fields(surface)}
+    return {"kind": type(surface).__name__, **shape}
 
 
 def _plain(value: Any) -> Any:
     return value if isinstance(value, bool) else np.asarray(value, dtype=float).tolist()
 
 
+def require_surfaces(model: Model, entries: list[dict[str, Any]]) -> None:
+    """Raises InputError where the model does not have the triangles of a contact in a checkpoint."""
+    for surface in (entry["surface"] for entry in entries):
+        if surface["kind"] == "Triangles" and surface["fingerprint"] not in model._triangulated:
+            raise InputError(
+                f"the checkpoint has contact with a surface of {surface['triangles']} triangles that the model does not have; add "
+                "it by model.add_contact before model.restore"
+            )
+
+
+def _surface_of(model: Model, described: dict[str, Any]) -> Surface:
+    if described["kind"] == "Triangles":
+        return model._triangulated[described["fingerprint"]]
+    surface: Surface = KINDS[described["kind"]](**{key: value for key, value in described.items() if key != "kind"})
+    return surface
+
+
 def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     """Give the model these contacts; those that it has already, at the beginning of the list, keep their state."""
     dim, known = model.mesh.dim, len(model._contacts)
     for number, entry in list(enumerate(entries))[known:]:
-        shape = dict(entry["surface"])
-        surface, _ = KINDS[shape.pop("kind")](**shape)._checked(dim)
+        surface, _ = _surface_of(model, entry["surface"])._checked(dim)
         slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
         if slip and slip not in {field["name"] for field in model.particles.schedule()}:
             model.add_field(slip, unit="m", meaning=f"Elastic slip on rigid surface {number}", components=dim)

@@ -78,12 +78,17 @@ def _is_field(value: Any) -> bool:
     )
 
 
+def _is_known_by_fingerprint(surface: Any) -> bool:
+    return isinstance(surface.get("fingerprint"), str) and _is_count(surface.get("triangles"))
+
+
 def _is_contact(value: Any) -> bool:
     return (
         isinstance(value, dict)
         and set(value) == {"surface", "friction", "adhesion", "penalty", "body"}
         and isinstance(value["surface"], dict)
         and value["surface"].get("kind") in KINDS
+        and (value["surface"]["kind"] != "Triangles" or _is_known_by_fingerprint(value["surface"]))
         and all(_is_number(value[key]) for key in ("friction", "adhesion", "penalty"))
         and _is_body(value["body"])
     )

@@ -119,7 +119,7 @@ class Model(Body):
         the forces on it.
 
         Args:
-            surface: a `Plane`, `Box`, `Disc`, `Sphere` or `Polyline`, where it is now; outside of all particles.
+            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Polyline` or `Triangles`, where it is now; outside of all particles.
             friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
             adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
                 there is none where the soil does not touch the surface, and no tension.
@@ -129,7 +129,8 @@ class Model(Body):
                 (times [s], spins (n,) or (n, 3)). Of a body that rotates freely, its initial spin.
             body: a `FreeBody`, which forces move, or a `Servo`, which keeps a load; by default all motion is prescribed.
             centre: centre of mass of a free body; the point about which the surface rotates and moments count [m], shape
-                (D,). By default the centre of a Disc, Sphere or Box, and the first point of the other surfaces.
+                (D,). By default the centre of a Disc, Sphere or Box, the middle of the extent of Triangles, and the first
+                point of the other surfaces.
             penalty: stiffness beta in (0, 1], over what a mass that oscillates as fast as the time step allows would need; a
                 larger one lets particles penetrate less.
 

@@ -12,6 +12,7 @@ from . import _core
 from ._core import InputError
 from .checks import positive
 from .mesh import floats
+from .triangles import Triangles
 
 
 @dataclass(frozen=True)
@@ -146,5 +147,5 @@ def _crossing(starts: NDArray, ends: NDArray) -> tuple[int, int] | None:
     return None
 
 
-Surface: TypeAlias = Plane | Disc | Sphere | Box | Polyline
-KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Polyline)}
+Surface: TypeAlias = Plane | Disc | Sphere | Box | Polyline | Triangles
+KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Polyline, Triangles)}

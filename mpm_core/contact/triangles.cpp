@@ -1,0 +1,245 @@
+#include "contact/triangles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace mpm::contact
+{
+namespace
+{
+constexpr Index most_in_leaf = 4;
+
+Vector<3> minus(const Vector<3>& a, const Vector<3>& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+Vector<3> plus(const Vector<3>& a, const Vector<3>& b, double factor)
+{
+  return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
+}
+
+Vector<3> unit_normal(const Triangles& surface, Index t)
+{
+  const auto& [a, b, c] = surface.triangles[static_cast<std::size_t>(t)];
+  const Vector<3>& origin = surface.vertices[static_cast<std::size_t>(a)];
+  const Vector<3> e = minus(surface.vertices[static_cast<std::size_t>(b)], origin);
+  const Vector<3> f = minus(surface.vertices[static_cast<std::size_t>(c)], origin);
+  const Vector<3> n{e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]};
+  const double length = norm<3>(n);
+  return {n[0] / length, n[1] / length, n[2] / length};
+}
+
+void find_vertex_normals(Triangles& surface)
+{
+  surface.vertex_normals.assign(surface.vertices.size(), {});
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+  {
+    const Vector<3> normal = unit_normal(surface, static_cast<Index>(t));
+    for (std::size_t k = 0; k < 3; ++k)
+    {
+      const auto corner = static_cast<std::size_t>(surface.triangles[t][k]);
+      const Vector<3> e = minus(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 1) % 3])],
+                                surface.vertices[corner]);
+      const Vector<3> f = minus(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 2) % 3])],
+                                surface.vertices[corner]);
+      const double cosine = dot<3>(e, f) / (norm<3>(e) * norm<3>(f));
+      surface.vertex_normals[corner] =
+          plus(surface.vertex_normals[corner], normal, std::acos(std::clamp(cosine, -1.0, 1.0)));
+    }
+  }
+}
+
+/// Triangles across each side, by sorting the sides.
+void find_neighbours(Triangles& surface)
+{
+  struct Side
+  {
+    Index low, high, triangle, number;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * surface.triangles.size());
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+    {
+      const Index a = surface.triangles[t][k], b = surface.triangles[t][(k + 1) % 3];
+      sides.push_back({std::min(a, b), std::max(a, b), static_cast<Index>(t), static_cast<Index>(k)});
+    }
+  std::ranges::sort(sides, {}, [](const Side& side) { return std::array{side.low, side.high}; });
+  surface.neighbours.assign(surface.triangles.size(), {-1, -1, -1});
+  surface.at_border.assign(surface.vertices.size(), 0);
+  const auto entry = [&surface](const Side& side) -> Index&
+  { return surface.neighbours[static_cast<std::size_t>(side.triangle)][static_cast<std::size_t>(side.number)]; };
+  for (std::size_t s = 0; s < sides.size(); ++s)
+    if (s + 1 < sides.size() && sides[s].low == sides[s + 1].low && sides[s].high == sides[s + 1].high)
+    {
+      entry(sides[s]) = sides[s + 1].triangle;
+      entry(sides[s + 1]) = sides[s].triangle;
+      ++s;
+    }
+    else
+    {
+      surface.at_border[static_cast<std::size_t>(sides[s].low)] = 1;
+      surface.at_border[static_cast<std::size_t>(sides[s].high)] = 1;
+    }
+}
+
+/// A box around triangles, with those of its halves behind it.
+/// @param order  numbers of the triangles, put in the order of the leaves
+void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, Index first, Index last,
+             std::vector<Index>& order, std::vector<TriangleBox>& boxes)
+{
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  TriangleBox box{{infinite, infinite, infinite}, {-infinite, -infinite, -infinite}, first, last - first};
+  Vector<3> low = box.lower, high = box.upper; // of the centres
+  for (Index k = first; k < last; ++k)
+  {
+    const auto t = static_cast<std::size_t>(order[static_cast<std::size_t>(k)]);
+    for (std::size_t i = 0; i < 3; ++i)
+    {
+      for (Index vertex : surface.triangles[t])
+      {
+        box.lower[i] = std::min(box.lower[i], surface.vertices[static_cast<std::size_t>(vertex)][i]);
+        box.upper[i] = std::max(box.upper[i], surface.vertices[static_cast<std::size_t>(vertex)][i]);
+      }
+      low[i] = std::min(low[i], centres[t][i]);
+      high[i] = std::max(high[i], centres[t][i]);
+    }
+  }
+  const std::size_t number = boxes.size();
+  boxes.push_back(box);
+  if (box.count <= most_in_leaf)
+    return;
+  const Vector<3> extent = minus(high, low);
+  const auto axis = static_cast<std::size_t>(std::ranges::max_element(extent) - extent.begin());
+  const Index middle = first + box.count / 2;
+  std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last,
+                   [&](Index a, Index b)
+                   { return centres[static_cast<std::size_t>(a)][axis] < centres[static_cast<std::size_t>(b)][axis]; });
+  boxes[number].count = 0;
+  add_box(surface, centres, first, middle, order, boxes);
+  boxes[number].first = static_cast<Index>(boxes.size());
+  add_box(surface, centres, middle, last, order, boxes);
+}
+
+double squared_distance(const TriangleBox& box, const Vector<3>& x)
+{
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+  {
+    const double beyond = std::max({box.lower[i] - x[i], 0.0, x[i] - box.upper[i]});
+    sum += beyond * beyond;
+  }
+  return sum;
+}
+
+/// The nearest point of a triangle, by the regions of Voronoi of its corners and sides (Ericson 2005, section 5.1.5).
+NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vector<3>& x)
+{
+  const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
+  const Vector<3>& a = surface.vertices[static_cast<std::size_t>(corners[0])];
+  const Vector<3> ab = minus(surface.vertices[static_cast<std::size_t>(corners[1])], a);
+  const Vector<3> ac = minus(surface.vertices[static_cast<std::size_t>(corners[2])], a);
+  const Vector<3> ap = minus(x, a), bp = minus(ap, ab), cp = minus(ap, ac);
+  const auto at = [&](int feature, double v, double w)
+  {
+    const Vector<3> offset = plus(plus(ap, ab, -v), ac, -w);
+    return NearestOnTriangles{t, feature, offset, dot<3>(offset, offset)};
+  };
+  const double d1 = dot<3>(ab, ap), d2 = dot<3>(ac, ap), d3 = dot<3>(ab, bp), d4 = dot<3>(ac, bp);
+  const double d5 = dot<3>(ab, cp), d6 = dot<3>(ac, cp);
+  if (d1 <= 0 && d2 <= 0)
+    return at(4, 0, 0);
+  if (d3 >= 0 && d4 <= d3)
+    return at(5, 1, 0);
+  if (d6 >= 0 && d5 <= d6)
+    return at(6, 0, 1);
+  const double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0)
+    return at(1, d1 / (d1 - d3), 0);
+  if (vb <= 0 && d2 >= 0 && d6 <= 0)
+    return at(3, 0, d2 / (d2 - d6));
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+  {
+    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return at(2, 1 - w, w);
+  }
+  const double sum = va + vb + vc;
+  return at(0, vb / sum, vc / sum);
+}
+} // namespace
+
+Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles)
+{
+  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}};
+  std::vector<Vector<3>> centres;
+  for (const auto& [a, b, c] : surface.triangles)
+  {
+    Vector<3> sum{};
+    for (Index vertex : {a, b, c})
+      sum = plus(sum, surface.vertices[static_cast<std::size_t>(vertex)], 1.0 / 3);
+    centres.push_back(sum);
+  }
+  std::vector<Index> order(surface.triangles.size());
+  std::iota(order.begin(), order.end(), 0);
+  add_box(surface, centres, 0, static_cast<Index>(order.size()), order, surface.boxes);
+  // Triangles in the order of the leaves: near ones are near in memory.
+  std::vector<std::array<Index, 3>> sorted;
+  for (Index t : order)
+    sorted.push_back(surface.triangles[static_cast<std::size_t>(t)]);
+  surface.triangles = std::move(sorted);
+  find_neighbours(surface);
+  find_vertex_normals(surface);
+  return surface;
+}
+
+NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x)
+{
+  NearestOnTriangles best;
+  best.squared = std::numeric_limits<double>::infinity();
+  std::array<std::pair<double, Index>, 64> stack; // halves have as many triangles as each other: 2^64 of them suffice
+  std::size_t size = 0;
+  stack[size++] = {0, 0};
+  while (size > 0)
+  {
+    const auto [squared, number] = stack[--size];
+    if (squared >= best.squared)
+      continue;
+    const TriangleBox& box = surface.boxes[static_cast<std::size_t>(number)];
+    for (Index t = box.first; t < box.first + box.count; ++t)
+      if (const NearestOnTriangles found = nearest_on_one(surface, t, x); found.squared < best.squared)
+        best = found;
+    if (box.count > 0)
+      continue;
+    std::pair<double, Index> near{squared_distance(surface.boxes[static_cast<std::size_t>(number) + 1], x), number + 1};
+    std::pair<double, Index> far{squared_distance(surface.boxes[static_cast<std::size_t>(box.first)], x), box.first};
+    if (far.first < near.first)
+      std::swap(near, far);
+    stack[size++] = far;
+    stack[size++] = near;
+  }
+  return best;
+}
+
+Vector<3> outward_at(const Triangles& surface, const NearestOnTriangles& nearest)
+{
+  const auto t = static_cast<std::size_t>(nearest.triangle);
+  Vector<3> normal = unit_normal(surface, nearest.triangle);
+  if (nearest.feature >= 4)
+    normal = surface.vertex_normals[static_cast<std::size_t>(
+        surface.triangles[t][static_cast<std::size_t>(nearest.feature - 4)])];
+  else if (nearest.feature > 0)
+    if (const Index other = surface.neighbours[t][static_cast<std::size_t>(nearest.feature - 1)]; other >= 0)
+      normal = plus(normal, unit_normal(surface, other), 1);
+  const double length = norm<3>(normal);
+  return {normal[0] / length, normal[1] / length, normal[2] / length};
+}
+
+bool is_at_border(const Triangles& surface, const NearestOnTriangles& nearest)
+{
+  const auto t = static_cast<std::size_t>(nearest.triangle);
+  if (nearest.feature >= 4)
+    return surface.at_border[static_cast<std::size_t>(
+               surface.triangles[t][static_cast<std::size_t>(nearest.feature - 4)])] != 0;
+  return nearest.feature > 0 && surface.neighbours[t][static_cast<std::size_t>(nearest.feature - 1)] < 0;
+}
+} // namespace mpm::contact

@@ -1,0 +1,51 @@
+#pragma once
+/// @file
+/// Triangulated surfaces, with a tree of boxes that finds the triangle nearest to a point in O(log n).
+
+#include "base/tensor.h"
+
+#include <vector>
+
+namespace mpm::contact
+{
+/// A box around some triangles: of a leaf those from `first` on, else those of its two children.
+struct TriangleBox
+{
+  Vector<3> lower, upper;
+  Index first; ///< triangle of a leaf; else number of the second child, the first one being the next box
+  Index count; ///< of triangles; 0 where it has children
+};
+
+/// Triangles whose vertices run counterclockwise as seen from the soil. A closed surface bounds a body or a cavity; an
+/// open one, with one border, goes on straight beyond it.
+struct Triangles
+{
+  std::vector<Vector<3>> vertices; ///< [m]
+  std::vector<std::array<Index, 3>> triangles;
+  std::vector<std::array<Index, 3>> neighbours; ///< across the side from vertex k to k + 1; -1 at a border
+  std::vector<Vector<3>> vertex_normals;        ///< normals of the triangles around it, weighted with their angles
+  std::vector<unsigned char> at_border;         ///< per vertex
+  std::vector<TriangleBox> boxes;               ///< the root first
+};
+
+/// @pre each side belongs to one triangle, or to two that pass it in opposite directions; no triangle without area
+Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles);
+
+/// The point of a surface that is nearest to another one.
+struct NearestOnTriangles
+{
+  Index triangle = 0;
+  int feature = 0;    ///< 0 inside of it, 1 to 3 on the side from vertex k - 1, 4 to 6 at vertex k - 4
+  Vector<3> offset{}; ///< from there to the other point [m]
+  double squared = 0; ///< its length squared [m2]
+};
+
+NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x);
+
+/// The outward direction where a point is nearest, of length 1: its sign is right also where it is nearest to a side or
+/// to a vertex (Baerentzen & Aanaes 2005).
+Vector<3> outward_at(const Triangles& surface, const NearestOnTriangles& nearest);
+
+/// Whether the nearest point is on a border.
+bool is_at_border(const Triangles& surface, const NearestOnTriangles& nearest);
+} // namespace mpm::contact
