@@ -32,6 +32,25 @@ void bind_surfaces(py::module_& m, const std::string& suffix)
           }));
 }
 
+/// Signed distances of points, one to a row.
+template <int D>
+void bind_distances(py::module_& m)
+{
+  m.def("distances",
+        [](const Surface<D>& surface, const py::array_t<double, py::array::c_style>& points)
+        {
+          const py::ssize_t n = points.shape(0);
+          py::array_t<double> values(n);
+          for (py::ssize_t k = 0; k < n; ++k)
+          {
+            Vector<D> x;
+            std::copy_n(points.data(k), D, x.begin());
+            values.mutable_at(k) = distance<D>(surface, x).value;
+          }
+          return values;
+        });
+}
+
 template <int N>
 using GivenHistory = std::tuple<std::vector<double>, std::vector<Vector<N>>>; // times, values
 
@@ -123,6 +142,8 @@ void bind_contacts(py::module_& m)
 {
   bind_surfaces<2>(m, "2");
   bind_surfaces<3>(m, "3");
+  bind_distances<2>(m);
+  bind_distances<3>(m);
   bind_body<2>(m, "2");
   bind_body<3>(m, "3");
   py::class_<Polyline>(m, "Polyline2")

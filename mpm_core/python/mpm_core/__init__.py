@@ -47,7 +47,7 @@ from .reports import Reports
 from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
-from .surfaces import Box, Disc, Plane, Polyline, Sphere
+from .surfaces import Box, Disc, Plane, Polyline, Sphere, distances
 from .triangles import Triangles
 
 for _law in law_types:
@@ -99,6 +99,7 @@ __all__ = [
     "ViscoplasticMohrCoulomb",
     "__version__",
     "checkpoint_description",
+    "distances",
     "log_preconsolidation",
     "matched_drucker_prager",
     "parts",

@@ -149,3 +149,18 @@ def _crossing(starts: NDArray, ends: NDArray) -> tuple[int, int] | None:
 
 Surface: TypeAlias = Plane | Disc | Sphere | Box | Polyline | Triangles
 KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Polyline, Triangles)}
+
+
+def distances(surface: Surface, points: ArrayLike) -> NDArray[np.float64]:
+    """Distances of points from a rigid surface [m], shape (n,): positive where the soil is to be, negative within the body.
+
+    Args:
+        points: [m], shape (n, D).
+
+    Raises:
+        InputError: a surface of another dimension, or points of another shape.
+    """
+    shape = np.shape(points)
+    dim = shape[1] if len(shape) == 2 and shape[1] in (2, 3) else 3
+    x = floats("points", points, (None, dim))
+    return np.asarray(_core.distances(surface._checked(dim)[0], x))

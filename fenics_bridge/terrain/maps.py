@@ -1,0 +1,52 @@
+"""Maps of a slide in plan: thickness of the deposit, largest thickness and speed, and where it has been."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_bridge.terrain.raster import Raster
+
+
+class SlideMaps:
+    """Thickness and speed of a slide on a grid, whose greatest values are kept over time.
+
+    model: of a slide in three dimensions; ground: the `Raster` whose points are the centres of the map's cells
+    least: [m] thickness below which a cell is taken for untouched
+    """
+
+    def __init__(self, model, ground, least=0.01):
+        self.model, self.ground, self.least = model, ground, least
+        self._most = np.zeros(ground.values.shape)
+        self._fastest = np.zeros(ground.values.shape)
+        self.record()
+
+    def thickness(self):
+        """Volume of the particles over area [m], (ny, nx): each gives it to the four points around it. Collective."""
+        row, column, s, t = self.ground.place(self.model.particles.position)
+        volume = self.model.particles.volume / self.ground.spacing**2
+        found = np.zeros(self.ground.values.shape)
+        for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):
+            np.add.at(found, (row + up, column + across), part * volume)
+        self.model.comm.Allreduce(MPI.IN_PLACE, found)
+        return found
+
+    def record(self):
+        """Take the present state into the greatest values. Collective."""
+        row, column, s, t = self.ground.place(self.model.particles.position)
+        speed = np.linalg.norm(self.model.particles.velocity, axis=1)
+        fastest = np.zeros(self.ground.values.shape)
+        np.maximum.at(fastest, (row + (t >= 0.5), column + (s >= 0.5)), speed)
+        self.model.comm.Allreduce(MPI.IN_PLACE, fastest, MPI.MAX)
+        self._fastest = np.maximum(self._fastest, fastest)
+        self._most = np.maximum(self._most, self.thickness())
+
+    def maps(self):
+        """{name: Raster}: deposit (thickness now) [m], most (largest thickness) [m], speed (largest) [m/s], with gaps where the slide has
+        not been, and reached: 1 where it has, else 0. Collective."""
+        deposit, reached = self.thickness(), self._most >= self.least
+        values = {
+            "deposit": np.where(deposit >= self.least, deposit, np.nan), "most": np.where(reached, self._most, np.nan),
+            "speed": np.where(reached, self._fastest, np.nan), "reached": reached.astype(float),
+        }  # fmt: skip
+        return {name: Raster(self.ground.x, self.ground.y, value, self.ground.crs) for name, value in values.items()}

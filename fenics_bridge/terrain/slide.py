@@ -1,0 +1,66 @@
+"""The soil between two surfaces of ground, as particles: before a slide, and where it breaks loose."""
+
+from __future__ import annotations
+
+import mpm_core as mpm
+import numpy as np
+
+from fenics_bridge.errors import InputError, on_root
+
+
+def seed_slide(model, before, rupture, *, spacing, density, friction=0.0, adhesion=0.0, material=0):
+    """Fill the space between two rasters with particles, and let them touch the ground that is left.
+
+    The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow they
+    are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
+
+    model: without particles, on a mesh over the ground (see `terrain_mesh`)
+    before, rupture: `Raster` of the ground before the slide, and of the ground that remains; the body is where the first is higher
+    spacing: [m] between particles; density: [kg/m3]; friction, adhesion: of the ground, see `mpm_core.Model.add_contact`
+    Returns (contact, lift [m]). Raises InputError, on all ranks, when the rasters have other coordinate references, or no soil is
+    between them. Collective.
+    """
+    surface = rupture.triangles()
+    found = on_root(model.comm, lambda: _points(before, rupture, surface, spacing))
+    points, volumes, lift = model.comm.bcast(found)
+    model.seed_points(points, volumes, density=density, material=material)
+    return model.add_contact(surface, friction=friction, adhesion=adhesion), lift
+
+
+def _points(before, rupture, surface, spacing):
+    """Places and volumes of the particles, and how far they were lifted at most."""
+    if before.crs != rupture.crs:
+        raise InputError(f"rupture: is in {rupture.crs!r}, expected {before.crs!r} as the ground before the slide")
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise InputError(f"spacing: got {spacing!r} m, expected a positive length")
+    low = np.maximum((before.x[0], before.y[0]), (rupture.x[0], rupture.y[0]))
+    high = np.minimum((before.x[-1], before.y[-1]), (rupture.x[-1], rupture.y[-1]))
+    along = [a + spacing * (np.arange(int((b - a) / spacing)) + 0.5) for a, b in zip(low, high)]
+    plan = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    thickness = before.at(plan) - rupture.at(plan)
+    numbers = np.round(thickness / spacing).astype(int)  # of particles in a column
+    plan, thickness, numbers = plan[numbers > 0], thickness[numbers > 0], numbers[numbers > 0]
+    if len(plan) == 0:
+        raise InputError(
+            f"before: is nowhere higher than rupture by more than half a spacing of {spacing:g} m, expected a body"
+        )
+    column = np.repeat(np.arange(len(plan)), numbers)
+    first = np.repeat(np.cumsum(numbers) - numbers, numbers)
+    height = (np.arange(len(column)) - first + 0.5) * (thickness / numbers)[column]
+    volumes = (spacing**2 * thickness / numbers)[column]
+    points = np.column_stack([plan[column], rupture.at(plan)[column] + height])
+    lift = _lift(points, 0.5 * np.cbrt(volumes), column, surface)
+    return points + np.outer(lift[column], (0, 0, 1)), volumes, float(lift.max())
+
+
+def _lift(points, radii, column, surface):
+    """How far each column goes up until no particle of it is nearer to the ground than its radius [m]."""
+    lift = np.zeros(column.max() + 1)
+    below = np.arange(len(points))  # those that may still be too near
+    while len(below):
+        raised = points[below] + np.outer(lift[column[below]], (0, 0, 1))
+        overlap = radii[below] - mpm.distances(surface, raised)
+        near = overlap > 0
+        below, overlap = below[near], overlap[near]
+        np.maximum.at(lift, column[below], lift[column[below]] + 1.001 * overlap + 1e-9 * radii[below])
+    return lift

@@ -1,0 +1,226 @@
+"""A slide runs out over ground in three dimensions: over a valley given by formulas, or over a raster of heights.
+
+The body between the ground before the slide and the surface on which it breaks loose is filled with particles, which touch the
+ground that is left with friction. Maps of the deposit, of the largest thickness and speed, and of where the slide has been are
+written as ESRI ASCII grids and drawn over a hillshade.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from common.figures import Pictures
+from common.files import OutputError
+from common.history import History
+from common.interrupt import Interrupt
+from common.options import add_count, add_number, check, study_parser
+from common.output_options import add_picture_options
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import open_results
+from common.summary import write_summary
+from common.terrain_plots import save_map
+from mpi4py import MPI
+from mpm_core.output import ModelOutput
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import terrain
+
+comm = MPI.COMM_WORLD
+COLUMNS = ["time_s", "front_m", "centre_x_m", "centre_y_m", "centre_z_m", "fastest_m_per_s", "kinetic_energy_J",
+           "ground_force_N", "dt_s"]  # fmt: skip
+LABELS = {"deposit": "Thickness of the deposit [m]", "most": "Largest thickness [m]", "speed": "Largest speed [m/s]"}
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
+                   help="heights of the ground before the slide, .asc or .xyz (default: a valley given by formulas)")  # fmt: skip
+    p.add_argument("--rupture", type=Path, default=None, metavar="FILE", help="heights of the ground that the slide leaves")
+    p.add_argument("--crs", default=None, metavar="TEXT", help="coordinate reference of files that name none; local for metres on a plane")
+    add_number(p, "--height", 60.0, "m", "height of the valley's side, without --terrain", above=0)
+    add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide, without --terrain", above=0)
+    add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
+    add_number(p, "--spacing", 2.0, "m", "distance between particles", above=0)
+    add_number(p, "--headroom", 20.0, "m", "height of the background mesh above the ground", above=0)
+    add_number(p, "--ground-friction-angle", 15.0, "degrees", "friction between slide and ground", at_least=0, below=90)
+    add_number(p, "--density", 1900.0, "kg/m3", "density of the slide", above=0)
+    add_number(p, "--young", 5e6, "Pa", "Young's modulus; stiffer soil takes shorter steps", above=0)
+    add_number(p, "--friction-angle", 28.0, "degrees", "friction within the slide", at_least=0, below=60)
+    add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide", at_least=0)
+    add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)
+    add_number(p, "--time", 20.0, "s", "duration", above=0)
+    add_count(p, "--frames", 20, "times at which maps and particles are taken")
+    add_picture_options(p)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check(p, (options.terrain is None) == (options.rupture is None), "--terrain and --rupture are both needed, or none of them")
+    check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
+          f"{options.cell_size:g} m, at most")  # fmt: skip
+    return options
+
+
+# --- 2. Ground -------------------------------------------------------------------------------------------------------
+
+
+def valley(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
+    """Ground before and after: a side that flattens out, H exp(-x / L), with a channel, and a cap on it."""
+    spacing, length = a.cell_size, 1.25 * a.height
+    x = np.arange(-0.5 * length, 3.0 * length + spacing, spacing)
+    y = np.arange(-0.8 * length, 0.8 * length + spacing, spacing)
+    u, v = np.meshgrid(x, y)
+    channel = 0.15 * a.height * np.minimum((v / (0.5 * length)) ** 2, 1.5) * np.exp(-((u / (1.5 * length)) ** 2))
+    rupture = a.height * np.exp(-u / length) + channel
+    cap = 1 - ((u - 0.15 * length) / (0.35 * length)) ** 2 - (v / (0.35 * length)) ** 2
+    return terrain.Raster(x, y, rupture + a.thickness * np.maximum(cap, 0)), terrain.Raster(x, y, rupture)
+
+
+def grounds(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
+    """Ground before and after the slide."""
+    if a.terrain is None:
+        return valley(a)
+    before, rupture = (terrain.read_raster(path, crs=a.crs) for path in (a.terrain, a.rupture))
+    low = max(before.x[0], rupture.x[0]), max(before.y[0], rupture.y[0])
+    high = min(before.x[-1], rupture.x[-1]), min(before.y[-1], rupture.y[-1])
+    return before.window(low, high), rupture.window(low, high)
+
+
+def fine_part(before: terrain.Raster, rupture: terrain.Raster) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Where the mesh is fine: the slide, and the ground lower than its top within four of its lengths."""
+    x, y = np.meshgrid(before.x, before.y)
+    body = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape) > 0.05
+    if not body.any():
+        raise mpm.InputError("--terrain is nowhere higher than --rupture, expected a body between them")
+    reach = 4 * max(np.ptp(x[body]), np.ptp(y[body]))
+    lower = (before.values < before.values[body].max()) & (x > x[body].min() - reach) & (x < x[body].max() + reach)
+    lower &= (y > y[body].min() - reach) & (y < y[body].max() + reach)
+    near = body | lower
+    return (float(x[near].min()), float(y[near].min())), (float(x[near].max()), float(y[near].max()))
+
+
+def build(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> tuple[mpm.Model, mpm.RigidContact, float]:
+    """Mesh, particles and contact; and by how much the slide was lifted [m]. Collective."""
+    domain, _, facet_tags = terrain.terrain_mesh(
+        comm, rupture, cell_size=a.cell_size, height=a.headroom + float((before.values - rupture.values).max()),
+        fine=fine_part(before, rupture),
+    )  # fmt: skip
+    soil = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=0.0)
+    model = mpm.Model(bridge.background_mesh(domain, facet_tags=facet_tags), soil)
+    friction = float(np.tan(np.radians(a.ground_friction_angle)))
+    ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, friction=friction)
+    model.outflow("sides")
+    model.set_gravity((0.0, 0.0, -9.81))
+    model.rebalance()
+    return model, ground, lift
+
+
+# --- 3. The slide ----------------------------------------------------------------------------------------------------
+
+
+def centre(model: mpm.Model) -> np.ndarray:
+    """Centre of mass [m]. Collective."""
+    p = model.particles
+    sums = comm.allreduce(np.array([*(p.mass @ p.position), p.mass.sum()]))
+    return sums[:3] / sums[3]
+
+
+def look(model: mpm.Model, ground: mpm.RigidContact, start: np.ndarray, report: mpm.Report) -> dict[str, float]:
+    """A row of the history. Collective."""
+    p, x = model.particles, centre(model)
+    away = np.linalg.norm(p.position[:, :2] - start[:2], axis=1)
+    fastest = np.linalg.norm(p.velocity, axis=1).max(initial=0.0)
+    return {
+        "time_s": report.time, "front_m": comm.allreduce(float(away.max(initial=0.0)), MPI.MAX), "centre_x_m": x[0],
+        "centre_y_m": x[1], "centre_z_m": x[2], "fastest_m_per_s": comm.allreduce(float(fastest), MPI.MAX),
+        "kinetic_energy_J": report.kinetic_energy, "ground_force_N": float(np.linalg.norm(ground.force)), "dt_s": report.dt,
+    }  # fmt: skip
+
+
+def run(a: Namespace, model: mpm.Model, ground: mpm.RigidContact, maps: terrain.SlideMaps, folder: Path) -> tuple[History, str | None]:
+    """The slide, with its frames; its history, and why it ended early if it did. Collective."""
+    start, stopped = centre(model), None
+    with (
+        Interrupt(comm) as interrupt,
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        ModelOutput(model, folder / "particles", particle_fields=("velocity", "displacement", "volume", "id")) as output,
+        Progress("slide", a.time, comm) as progress,
+    ):
+        history.add(**look(model, ground, start, model.report()))
+        try:
+            for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3, energy_limit=np.inf):
+                maps.record()
+                history.add(**look(model, ground, start, report))
+                output.write()
+                progress.show(report.time, report.steps, front=f"{history['front_m'][-1]:.1f} m")
+                if interrupt.requested():
+                    stopped = f"interrupted at {report.time:g} s"
+                    break
+        except mpm.RunError as error:
+            stopped = str(error)
+    return history, stopped
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def write_maps(found: dict[str, terrain.Raster], rupture: terrain.Raster, folder: Path) -> Pictures:
+    """Maps as grids, the ground as a surface for ParaView, and pictures to draw. On the first rank."""
+    for name, raster in found.items():
+        terrain.write_raster(folder / f"{name}.asc", raster)
+    rupture.triangles().write(folder / "ground.obj")
+    return {name: partial(save_map, folder / f"{name}.png", rupture, found[name], label) for name, label in LABELS.items()}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    begin = perf_counter()
+    folder = open_results(a, comm)
+    before, rupture = grounds(a)
+    model, ground, lift = build(a, before, rupture)
+    maps = terrain.SlideMaps(model, rupture)
+    particles, volume = comm.allreduce(len(model.particles)), comm.allreduce(float(model.particles.volume.sum()))
+    top = comm.allreduce(float(model.particles.position[:, 2].max(initial=-np.inf)), MPI.MAX)
+    if comm.rank == 0:
+        print(f"{particles} particles, {volume:.4g} m3, lifted by {lift:.3f} m", file=sys.stderr)
+    start = perf_counter()
+    history, stopped = run(a, model, ground, maps, folder)
+    seconds, report = perf_counter() - start, model.report()
+    found = maps.maps()
+    low = comm.allreduce(float(model.particles.position[:, 2].min(initial=np.inf)), MPI.MIN)
+    x = np.array([history[f"centre_{axis}_m"] for axis in "xyz"])
+    fall, travel = float(x[2, 0] - x[2, -1]), float(np.linalg.norm(x[:2, -1] - x[:2, 0]))
+    summary = {
+        "finished_run": stopped is None, "stopped_because": stopped, "particles": particles, "volume_m3": volume, "lift_m": lift,
+        "front_m": float(history["front_m"][-1]), "fall_height_m": top - low, "centre_travel_m": travel,
+        "angle_of_travel_degrees": float(np.degrees(np.arctan2(fall, travel))) if travel > 0 else None,
+        "fastest_m_per_s": float(history["fastest_m_per_s"].max()), "largest_deposit_m": float(np.nanmax(found["deposit"].values)),
+        "reached_area_m2": float(found["reached"].values.sum() * rupture.spacing**2), "outflow_mass_kg": report.outflow_mass,
+        "particle_steps_per_second": report.particle_steps / seconds, "wall_seconds": perf_counter() - begin,
+    }  # fmt: skip
+    pictures = write_maps(found, rupture, folder) if comm.rank == 0 else {}
+    write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {})
+    if comm.rank == 0:
+        if stopped:
+            print(f"the run ended early: {stopped}", file=sys.stderr)
+        print(f"front {summary['front_m']:.1f} m from the start's centre, whose mass fell {fall:.1f} m over {travel:.1f} m; fastest "
+              f"{summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps per second\n"
+              f"results in {folder}")  # fmt: skip
+    return 1 if stopped else 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, OutputError)
