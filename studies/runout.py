@@ -46,8 +46,15 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
                    help="heights of the ground before the slide, .asc or .xyz (default: a valley given by formulas)")  # fmt: skip
-    p.add_argument("--rupture", type=Path, default=None, metavar="FILE", help="heights of the ground that the slide leaves")
-    p.add_argument("--crs", default=None, metavar="TEXT", help="coordinate reference of files that name none; local for metres on a plane")
+    p.add_argument(
+        "--rupture", type=Path, default=None, metavar="FILE", help="heights of the ground that the slide leaves"
+    )
+    p.add_argument(
+        "--crs",
+        default=None,
+        metavar="TEXT",
+        help="coordinate reference of files that name none; local for metres on a plane",
+    )
     add_number(p, "--height", 60.0, "m", "height of the valley's side, without --terrain", above=0)
     add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide, without --terrain", above=0)
     add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
@@ -60,7 +67,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide", at_least=0)
     add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)
     add_number(p, "--time", 20.0, "s", "duration", above=0)
-    add_count(p, "--frames", 20, "times at which maps and particles are taken")
+    add_count(p, "--frames", 80, "times at which maps and particles are taken")
     add_picture_options(p)
     return p
 
@@ -68,7 +75,11 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
-    check(p, (options.terrain is None) == (options.rupture is None), "--terrain and --rupture are both needed, or none of them")
+    check(
+        p,
+        (options.terrain is None) == (options.rupture is None),
+        "--terrain and --rupture are both needed, or none of them",
+    )
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
           f"{options.cell_size:g} m, at most")  # fmt: skip
     return options
@@ -118,7 +129,9 @@ def build(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> tupl
         comm, rupture, cell_size=a.cell_size, height=a.headroom + float((before.values - rupture.values).max()),
         fine=fine_part(before, rupture),
     )  # fmt: skip
-    soil = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=0.0)
+    soil = mpm.MohrCoulomb(
+        young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=0.0
+    )
     model = mpm.Model(bridge.background_mesh(domain, facet_tags=facet_tags), soil)
     friction = float(np.tan(np.radians(a.ground_friction_angle)))
     ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, friction=friction)
@@ -150,18 +163,24 @@ def look(model: mpm.Model, ground: mpm.RigidContact, start: np.ndarray, report: 
     }  # fmt: skip
 
 
-def run(a: Namespace, model: mpm.Model, ground: mpm.RigidContact, maps: terrain.SlideMaps, folder: Path) -> tuple[History, str | None]:
+def run(
+    a: Namespace, model: mpm.Model, ground: mpm.RigidContact, maps: terrain.SlideMaps, folder: Path
+) -> tuple[History, str | None]:
     """The slide, with its frames; its history, and why it ended early if it did. Collective."""
     start, stopped = centre(model), None
     with (
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", COLUMNS, comm) as history,
-        ModelOutput(model, folder / "particles", particle_fields=("velocity", "displacement", "volume", "id")) as output,
+        ModelOutput(
+            model, folder / "particles", particle_fields=("velocity", "displacement", "volume", "id")
+        ) as output,
         Progress("slide", a.time, comm) as progress,
     ):
         history.add(**look(model, ground, start, model.report()))
         try:
-            for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3, energy_limit=np.inf):
+            for report in model.explicit(
+                a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3, energy_limit=np.inf
+            ):
                 maps.record()
                 history.add(**look(model, ground, start, report))
                 output.write()
@@ -182,7 +201,9 @@ def write_maps(found: dict[str, terrain.Raster], rupture: terrain.Raster, folder
     for name, raster in found.items():
         terrain.write_raster(folder / f"{name}.asc", raster)
     rupture.triangles().write(folder / "ground.obj")
-    return {name: partial(save_map, folder / f"{name}.png", rupture, found[name], label) for name, label in LABELS.items()}
+    return {
+        name: partial(save_map, folder / f"{name}.png", rupture, found[name], label) for name, label in LABELS.items()
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -207,7 +228,8 @@ def main(arguments: list[str] | None = None) -> int:
         "finished_run": stopped is None, "stopped_because": stopped, "particles": particles, "volume_m3": volume, "lift_m": lift,
         "front_m": float(history["front_m"][-1]), "fall_height_m": top - low, "centre_travel_m": travel,
         "angle_of_travel_degrees": float(np.degrees(np.arctan2(fall, travel))) if travel > 0 else None,
-        "fastest_m_per_s": float(history["fastest_m_per_s"].max()), "largest_deposit_m": float(np.nanmax(found["deposit"].values)),
+        "fastest_m_per_s": float(history["fastest_m_per_s"].max()),
+        "largest_deposit_m": float(np.nanmax(found["deposit"].values)),
         "reached_area_m2": float(found["reached"].values.sum() * rupture.spacing**2), "outflow_mass_kg": report.outflow_mass,
         "particle_steps_per_second": report.particle_steps / seconds, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
@@ -216,8 +238,8 @@ def main(arguments: list[str] | None = None) -> int:
     if comm.rank == 0:
         if stopped:
             print(f"the run ended early: {stopped}", file=sys.stderr)
-        print(f"front {summary['front_m']:.1f} m from the start's centre, whose mass fell {fall:.1f} m over {travel:.1f} m; fastest "
-              f"{summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps per second\n"
+        print(f"front {summary['front_m']:.1f} m from the start's centre, whose mass fell {fall:.1f} m over {travel:.1f} m; "
+              f"fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps per second\n"
               f"results in {folder}")  # fmt: skip
     return 1 if stopped else 0
 

@@ -21,29 +21,33 @@ class SlideMaps:
         self._fastest = np.zeros(ground.values.shape)
         self.record()
 
+    def _around(self):
+        """The four points around each particle: (rows, columns) and the fraction of the particle that each of them has."""
+        row, column, s, t = self.ground.place(self.model.particles.position)
+        for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):
+            yield (row + up, column + across), part
+
     def thickness(self):
         """Volume of the particles over area [m], (ny, nx): each gives it to the four points around it. Collective."""
-        row, column, s, t = self.ground.place(self.model.particles.position)
-        volume = self.model.particles.volume / self.ground.spacing**2
         found = np.zeros(self.ground.values.shape)
-        for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):
-            np.add.at(found, (row + up, column + across), part * volume)
+        for places, part in self._around():
+            np.add.at(found, places, part * self.model.particles.volume / self.ground.spacing**2)
         self.model.comm.Allreduce(MPI.IN_PLACE, found)
         return found
 
     def record(self):
         """Take the present state into the greatest values. Collective."""
-        row, column, s, t = self.ground.place(self.model.particles.position)
         speed = np.linalg.norm(self.model.particles.velocity, axis=1)
         fastest = np.zeros(self.ground.values.shape)
-        np.maximum.at(fastest, (row + (t >= 0.5), column + (s >= 0.5)), speed)
+        for places, part in self._around():
+            np.maximum.at(fastest, places, np.where(part > 0, speed, 0.0))
         self.model.comm.Allreduce(MPI.IN_PLACE, fastest, MPI.MAX)
         self._fastest = np.maximum(self._fastest, fastest)
         self._most = np.maximum(self._most, self.thickness())
 
     def maps(self):
-        """{name: Raster}: deposit (thickness now) [m], most (largest thickness) [m], speed (largest) [m/s], with gaps where the slide has
-        not been, and reached: 1 where it has, else 0. Collective."""
+        """{name: Raster}: deposit (thickness now) [m], most (largest thickness) [m], speed (largest) [m/s], with gaps where the
+        slide has not been, and reached: 1 where it has, else 0. Collective."""
         deposit, reached = self.thickness(), self._most >= self.least
         values = {
             "deposit": np.where(deposit >= self.least, deposit, np.nan), "most": np.where(reached, self._most, np.nan),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import mpm_core as mpm
 import numpy as np
 
+import mpm_core as mpm
 from fenics_bridge.errors import InputError
 
 STEEPEST = 20.0
@@ -33,7 +33,8 @@ class Raster:
         return float(self.x[-1] - self.x[0]) / (len(self.x) - 1)
 
     def place(self, points):
-        """Row, column and the parts of a cell that points (n, 2) lie beyond its first point; those outside are moved to the side."""
+        """Row and column of the cells of points (n, 2), and the fractions of a cell by which they are beyond its first corner;
+        points outside are moved to the border."""
         across = np.clip((np.asarray(points)[:, 0] - self.x[0]) / self.spacing, 0, len(self.x) - 1)
         up = np.clip((np.asarray(points)[:, 1] - self.y[0]) / self.spacing, 0, len(self.y) - 1)
         column = np.minimum(across.astype(int), len(self.x) - 2)
@@ -66,7 +67,8 @@ class Raster:
             and high[1] - eps <= self.y[-1]
         )
         if not (low[0] < high[0] and low[1] < high[1] and inside):
-            raise InputError(f"window: got {tuple(low)} to {tuple(high)} m, expected corners inside of x {self.x[0]:g} to {self.x[-1]:g} m "
+            raise InputError(f"window: got {tuple(low)} to {tuple(high)} m, expected corners inside of x "
+                             f"{self.x[0]:g} to {self.x[-1]:g} m "
                              f"and y {self.y[0]:g} to {self.y[-1]:g} m")  # fmt: skip
         return Raster(self.x[columns], self.y[rows], self.values[np.ix_(rows, columns)], self.crs)
 
@@ -97,7 +99,8 @@ def read_raster(path, *, crs=None, window=None):
         text = path.read_text()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"path: {str(path)!r} cannot be read: {error}") from None
-    raster = Raster(*readers[path.suffix.lower()](text, str(path)), crs=_reference(path, crs))
+    x, y, values = readers[path.suffix.lower()](text, str(path))
+    raster = Raster(x, y, values, _reference(path, crs))
     raster = raster if window is None else raster.window(*window)
     _check_heights(raster, str(path))
     return raster
@@ -118,8 +121,8 @@ def _reference(path, crs):
     beside = path.with_suffix(".prj")
     found = crs if crs is not None else beside.read_text().strip() if beside.is_file() else ""
     if not found:
-        raise InputError(f"crs: the coordinate reference of {str(path)!r} is unknown; name it by crs=, for instance crs='EPSG:25832', or "
-                         "crs='local' for metres on a plane")  # fmt: skip
+        raise InputError(f"crs: the coordinate reference of {str(path)!r} is unknown; name it by crs=, for instance "
+                         "crs='EPSG:25832', or crs='local' for metres on a plane")  # fmt: skip
     if found.upper().startswith(("GEOGCS", "GEOGCRS")) or found.upper() in ("EPSG:4326", "EPSG:4258", "WGS84"):
         raise InputError(
             f"crs: {str(path)!r} is in degrees ({found[:40]}), expected metres; project it first, for instance by gdalwarp"
@@ -169,8 +172,8 @@ def _read_points(text, name):
     (x, column), (y, row) = (np.unique(points[:, k], return_inverse=True) for k in (0, 1))
     steps = np.concatenate([np.diff(x), np.diff(y)])
     if len(x) < 2 or len(y) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
-        raise InputError(f"path: {name!r} has points at distances of {steps.min(initial=np.inf):g} to {steps.max(initial=0):g} m, expected a "
-                         "grid of square cells")  # fmt: skip
+        raise InputError(f"path: {name!r} has points at distances of {steps.min(initial=np.inf):g} to {steps.max(initial=0):g} m, "
+                         "expected a grid of square cells")  # fmt: skip
     values = np.full((len(y), len(x)), np.nan)
     values[row, column] = points[:, 2]
     return np.linspace(x[0], x[-1], len(x)), np.linspace(y[0], y[-1], len(y)), values
@@ -180,10 +183,11 @@ def _check_heights(raster, name):
     gaps = np.argwhere(~np.isfinite(raster.values))
     if len(gaps):
         at = raster.x[gaps[0][1]], raster.y[gaps[0][0]]
-        raise InputError(f"path: {name!r} has {len(gaps)} gaps, the first one at x = {at[0]:g} m, y = {at[1]:g} m; fill them, for instance by "
-                         "gdal_fillnodata, or take a window without any")  # fmt: skip
+        raise InputError(f"path: {name!r} has {len(gaps)} gaps, the first one at x = {at[0]:g} m, y = {at[1]:g} m; fill them, "
+                         "for instance by gdal_fillnodata, or take a window without any")  # fmt: skip
     steep = np.abs(np.diff(raster.values, axis=1)).mean() / raster.spacing
     small = max(np.abs(raster.x).max(), np.abs(raster.y).max()) <= 360
     if small and steep > STEEPEST:
-        raise InputError(f"path: {name!r} has a mean slope of {np.degrees(np.arctan(steep)):.1f} degrees on cells of {raster.spacing:g}: its "
+        raise InputError(f"path: {name!r} has a mean slope of {np.degrees(np.arctan(steep)):.1f} degrees on cells of "
+                         f"{raster.spacing:g}: its "
                          "coordinates seem to be in degrees, expected metres")  # fmt: skip

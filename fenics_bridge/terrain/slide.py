@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import mpm_core as mpm
 import numpy as np
 
+import mpm_core as mpm
 from fenics_bridge.errors import InputError, on_root
 
 
 def seed_slide(model, before, rupture, *, spacing, density, friction=0.0, adhesion=0.0, material=0):
     """Fill the space between two rasters with particles, and let them touch the ground that is left.
 
-    The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow they
-    are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
+    The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow
+    they are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
 
     model: without particles, on a mesh over the ground (see `terrain_mesh`)
-    before, rupture: `Raster` of the ground before the slide, and of the ground that remains; the body is where the first is higher
+    before, rupture: `Raster` of the ground before the slide, and of the ground that remains; the body is where the first is
+        higher
     spacing: [m] between particles; density: [kg/m3]; friction, adhesion: of the ground, see `mpm_core.Model.add_contact`
     Returns (contact, lift [m]). Raises InputError, on all ranks, when the rasters have other coordinate references, or no soil is
     between them. Collective.

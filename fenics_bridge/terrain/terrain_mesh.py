@@ -22,8 +22,8 @@ def terrain_mesh(comm, ground, *, cell_size, height, fine, coarse_size=None, dep
     fine: ((x, y), (x, y)) [m], corners of the rectangle in plan where the mesh is fine
     coarse_size: [m] of the triangles far from it, four times cell_size by default; depth: [m] of the mesh below the ground, 1.5
         cell_size by default: room for cells that the ground cuts
-    Returns (domain, cell_tags, facet_tags): facets SIDES, GROUND and SKY. Raises InputError, on all ranks, for sizes that do not fit.
-    Collective.
+    Returns (domain, cell_tags, facet_tags): facets SIDES, GROUND and SKY. Raises InputError, on all ranks, for sizes that do not
+    fit.     Collective.
     """
     coarse = 4 * cell_size if coarse_size is None else coarse_size
     below = 1.5 * cell_size if depth is None else depth
@@ -89,6 +89,6 @@ def _extruded(plan, ground, below, height, layers):
     groups = [(SIDES, np.concatenate(sides)), (GROUND, columns), (SKY, columns + layers * n)]
     facets = np.concatenate([nodes for _, nodes in groups]).astype(np.int64)
     tags = np.concatenate([np.full(len(nodes), tag, np.int32) for tag, nodes in groups])
-    cells = np.concatenate(cells).astype(np.int64)
     names = {"sides": (SIDES,), "ground": (GROUND,), "sky": (SKY,)}
-    return MeshArrays(points, cells, np.zeros(len(cells), np.int32), facets, tags, {}, names)
+    tetrahedra = np.concatenate(cells).astype(np.int64)
+    return MeshArrays(points, tetrahedra, np.zeros(len(tetrahedra), np.int32), facets, tags, {}, names)

@@ -30,12 +30,14 @@ def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
     wide = (extent[1] - extent[0]) / (extent[3] - extent[2])
     with paper_style():
         figure, ax = plt.subplots(figsize=(WIDTH, min(9.0, 0.85 * WIDTH / wide + 0.6)), layout="constrained")
-        shade = LIGHT.hillshade(ground.values, vert_exag=1, dx=ground.spacing, dy=ground.spacing)
+        shade = LIGHT.hillshade(ground.values, vert_exag=1, dx=ground.spacing, dy=-ground.spacing)  # rows go north
         ax.imshow(shade, cmap="gray", extent=extent, origin="lower", vmin=-0.3, vmax=1.2, interpolation="bilinear")
         lines = ax.contour(x, y, ground.values, levels=ROUND_TICKS.tick_values(ground.values.min(), ground.values.max()),
-                           colors="#444444", linewidths=0.5)  # fmt: skip
+                           colors="#222222", linewidths=0.6)  # fmt: skip
         ax.clabel(lines, fmt="%g m", fontsize=7)
-        colours = ax.imshow(np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85)
+        colours = ax.imshow(
+            np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85
+        )
         figure.colorbar(colours, ax=ax, label=label, shrink=0.9)
         ax.set(xlabel="$x$ [m]", ylabel="$y$ [m]", aspect="equal")
         save_figure(figure, path)

@@ -202,8 +202,8 @@ def require_surfaces(model: Model, entries: list[dict[str, Any]]) -> None:
     for surface in (entry["surface"] for entry in entries):
         if surface["kind"] == "Triangles" and surface["fingerprint"] not in model._triangulated:
             raise InputError(
-                f"the checkpoint has contact with a surface of {surface['triangles']} triangles that the model does not have; add "
-                "it by model.add_contact before model.restore"
+                f"the checkpoint has contact with a surface of {surface['triangles']} triangles that the model does not have; "
+                "add it by model.add_contact before model.restore"
             )
 
 

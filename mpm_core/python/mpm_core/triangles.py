@@ -28,7 +28,8 @@ class Triangles:
 
     Raises:
         InputError: arrays of another shape, a number that no vertex has, a triangle without area; holes, a side of three or more
-            triangles, or a triangle whose corners run the other way than those of its neighbours, with the number of the triangle.
+            triangles, or a triangle whose corners run the other way than those of its neighbours, with the number of the
+            triangle.
     """
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
@@ -48,8 +49,10 @@ class Triangles:
         Raises:
             InputError: a file that cannot be read, or has no triangles; what the constructor refuses.
         """
-        import meshio
-
+        try:
+            import meshio
+        except ImportError:
+            raise InputError("path cannot be read without the Python package meshio; install python3-meshio") from None
         try:
             mesh = meshio.read(path)
         except (meshio.ReadError, OSError, ValueError, SystemExit) as error:

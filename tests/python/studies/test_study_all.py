@@ -32,6 +32,7 @@ SMALL = {
     "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
     "rain": "--cell-size 3 --elements P1 --days 3 --factor-times 1",
     "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
+    "runout": "--cell-size 16 --spacing 8 --thickness 12 --time 0.5 --frames 2",
     "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
     "scaling": "--side-2d 4 --side-3d 2 --steps 2",
     "seepage": "--cell-size 2 --days 20 --frames 2",
