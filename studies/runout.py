@@ -55,8 +55,8 @@ def parser() -> ArgumentParser:
         metavar="TEXT",
         help="coordinate reference of files that name none; local for metres on a plane",
     )
-    add_number(p, "--height", 60.0, "m", "height of the valley's side, without --terrain", above=0)
-    add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide, without --terrain", above=0)
+    add_number(p, "--height", 60.0, "m", "height of the valley's side where it is given by formulas", above=0)
+    add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide in that valley", above=0)
     add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
     add_number(p, "--spacing", 2.0, "m", "distance between particles", above=0)
     add_number(p, "--headroom", 20.0, "m", "height of the background mesh above the ground", above=0)
