@@ -238,8 +238,8 @@ def main(arguments: list[str] | None = None) -> int:
     if comm.rank == 0:
         if stopped:
             print(f"the run ended early: {stopped}", file=sys.stderr)
-        print(f"front {summary['front_m']:.1f} m from the start's centre, whose mass fell {fall:.1f} m over {travel:.1f} m; "
-              f"fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps per second\n"
+        print(f"front {summary['front_m']:.1f} m from the centre, which fell {fall:.1f} m over {travel:.1f} m; "
+              f"fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps/s\n"
               f"results in {folder}")  # fmt: skip
     return 1 if stopped else 0
 

@@ -172,7 +172,7 @@ def _read_points(text, name):
     (x, column), (y, row) = (np.unique(points[:, k], return_inverse=True) for k in (0, 1))
     steps = np.concatenate([np.diff(x), np.diff(y)])
     if len(x) < 2 or len(y) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
-        raise InputError(f"path: {name!r} has points at distances of {steps.min(initial=np.inf):g} to {steps.max(initial=0):g} m, "
+        raise InputError(f"path: {name!r} has points {steps.min(initial=np.inf):g} to {steps.max(initial=0):g} m apart, "
                          "expected a grid of square cells")  # fmt: skip
     values = np.full((len(y), len(x)), np.nan)
     values[row, column] = points[:, 2]
