@@ -230,8 +230,16 @@ def _mixed_stress(e, p, shear):
 def _solved(space, constraints, tangent, load, internal, options_prefix):
     """Solution of a linear problem: one correction by the tangent, starting from the displacements of the supports.
 
-    load: UFL; internal: function of the solution that returns UFL. They are assembled one by one: in a form with integrals of
-    degree 1 and 2, FFCx 0.5 takes the radius of the first degree for both.
+    Load and internal forces are assembled one by one: in a form with integrals of degree 1 and 2, FFCx 0.5 takes the radius of
+    the first degree for both.
+
+    Args:
+        space: space of the unknowns.
+        constraints: the boundary conditions.
+        tangent: bilinear form, UFL.
+        load: work of the load, UFL.
+        internal: function of the solution that returns the work of the internal forces, UFL.
+        options_prefix: prefix of the PETSc options of the linear solver.
     """
     solution, increment = fem.Function(space), fem.Function(space)
     solution.x.array[constraints.dofs] = constraints.values

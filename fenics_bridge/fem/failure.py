@@ -41,8 +41,8 @@ def advice(reason, free, law, tension):
         return "The soil has no cohesion, and next to a free surface it carries hardly anything: give it some, or less load"
     if tension and "mechanism" in reason:
         return (
-            "The ground fails and comes under tension there: take less load, or away what pulls, or give it more strength, a larger "
-            "tension_cutoff or support"
+            "The ground fails and comes under tension there: take less load, or away what pulls, or give it more strength, a "
+            "larger tension_cutoff or support"
         )
     if tension or "law" in reason:
         return (

@@ -147,7 +147,10 @@ def relax(
 def _solve_step(step, tolerance, motion):
     """Newton's method for one viscous step, to a fraction of the residual at its start; returns the residuals.
 
-    motion: increment that the iteration begins from, per degree of freedom [m], or None
+    Args:
+        step: the EquilibriumStep.
+        tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-].
+        motion: increment that the iteration begins from, per degree of freedom [m], or None.
     """
     residuals = [step.start()]
     if motion is not None:

@@ -91,10 +91,14 @@ def _distinct(rows):
 
 
 def _point_on_facet(places, nodes, points, facets):
-    """Row of the first of some places (n, D) that lies on a facet; None if none does.
+    """Row of the first of some places that lies on a facet; None if none does.
 
-    nodes: (n,) of the places, which may lie on the facets that they are corners of; None for centres of the facets, of which
-    each may lie on its own.
+    Args:
+        places: positions [m], shape (n, D).
+        nodes: their nodes, shape (n,), which may lie on the facets that they are corners of; None for centres of the facets, of
+            which each may lie on its own.
+        points: coordinates of the nodes of the mesh [m].
+        facets: nodes of the facets, shape (k, D).
     """
     corners = points[facets]
     centres = corners.mean(axis=1)

@@ -67,7 +67,9 @@ NAMED = re.compile(rb"\b(?:Include|Merge|MergeWithBoundingBox|Open)\s+(?:\"([^\"
 def command_in(path, seen=()):
     """Why a .geo file, or one that it names, may run commands; None when no word of theirs says so. Their comments count too.
 
-    seen: files that have been searched already.
+    Args:
+        path: the file.
+        seen: files that have been searched already.
     """
     text = path.read_bytes()
     if COMMANDS.search(text):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
 from fenics_bridge.mesh import gmsh_reader
@@ -31,8 +32,19 @@ class Limits:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 
 
-def read_apart(path, dim, result, name, limits):
-    """What `gmsh_reader.read_file` gives. result: a file for it; name: of the mesh in messages. Raises InputError."""
+def read_apart(path: Path, dim: int, result: Path, name: str, limits: Limits) -> dict[str, NDArray]:
+    """Arrays of a file as `gmsh_reader.read_file` gives them, read by a process of its own.
+
+    Args:
+        path: the file.
+        dim: 2 for triangles, 3 for tetrahedra.
+        result: file to which the process writes the arrays.
+        name: name of the mesh in messages.
+        limits: what the process may take and do.
+
+    Raises:
+        InputError: the mesh cannot be used, or the process failed or exceeded its limits.
+    """
     code, text = _ran(path, dim, result, name, limits)
     if code == gmsh_reader.REFUSED:
         raise InputError(f"path: {name!r}: {text}")

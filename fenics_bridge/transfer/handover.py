@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpm_core.checks import renamed
 
+import mpm_core as mpm
 from fenics_bridge.errors import agree
+from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -19,25 +21,32 @@ _BALANCED, _MOST_STEPS = 5e-4, 60
 
 @dataclass(frozen=True)
 class Handover:
-    """Result of a hand-over; sums are over all ranks.
-
-    unbalanced_ratio: out-of-balance over external force of the particles as they were given their stress [-]
-    equilibrated_ratio: the same after the equilibration [-]; None without equilibration, as with cells that rest
-    returned_fraction: fraction of the particles whose stress had to be returned to the yield surface [-]
-    yielded_fraction: fraction of the particles that yielded in the equilibration where the finite elements did not [-]
-    """
+    """Result of a hand-over; sums are over all ranks."""
 
     unbalanced_ratio: float
+    """Out-of-balance over external force of the particles as they were given their stress [-]"""
     equilibrated_ratio: float | None
+    """The same after the equilibration [-]; None without equilibration, as with cells that rest"""
     returned_fraction: float
+    """Fraction of the particles whose stress had to be returned to the yield surface [-]"""
     yielded_fraction: float
+    """Fraction of the particles that yielded in the equilibration where the finite elements did not [-]"""
 
     settled_ratio = renamed("settled_ratio", "equilibrated_ratio")
     returned_share = renamed("returned_share", "returned_fraction")
     yielded_share = renamed("yielded_share", "yielded_fraction")
 
 
-def initialise(model, fem, *, count_displacement=True, move=False, smooth=False, equilibrate=True, resting=False):
+def initialise(
+    model: mpm.Model,
+    fem: QuasiStatic | ElasticSolution,
+    *,
+    count_displacement: bool = True,
+    move: bool = False,
+    smooth: bool = False,
+    equilibrate: bool = True,
+    resting: bool = False,
+) -> Handover:
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
 
     Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
@@ -50,21 +59,30 @@ def initialise(model, fem, *, count_displacement=True, move=False, smooth=False,
     some 1e-3 of quadratic elements out of balance; and the weights of nodes are exact for particles at Gauss points of
     degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size.
 
-    model: `mpm_core.Model` with particles; fem: QuasiStatic, solved and converged, or ElasticSolution; the meshes and
-        their partitions may differ
-    move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
-        Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
-        of the moved body (`moved.fitted_volumes`). A body that has moved is only near equilibrium: that of small
-        strains is one of the undeformed body, and now its surface cuts cells.
-    count_displacement: displacements of particles include those of the finite elements; otherwise they start from zero
-    smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
-        equilibrium as it is; with other cells the smooth stress is far nearer to it.
-    equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads, to an
-        out-of-balance ratio of 5e-4
-    resting: let all cells rest (`Model.rest`) as the finite elements that they were; only what fails turns into particles.
-        They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are
-    Returns a Handover. Raises InputError, on all ranks, for a particle outside the finite elements' mesh or, moved,
-    outside the background mesh, for laws or geometries that do not match, and for finite elements that did not converge. Collective.
+    Args:
+        model: model with particles.
+        fem: finite elements, solved and converged; the meshes and their partitions may differ.
+        count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
+        move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
+            Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
+            of the moved body (`moved.fitted_volumes`). A body that has moved is only near equilibrium: that of small
+            strains is one of the undeformed body, and now its surface cuts cells.
+        smooth: take the smooth stress instead of the cell's mean. With the same cells in both meshes the mean is in
+            equilibrium as it is; with other cells the smooth stress is far nearer to it.
+        equilibrate: bring the particles to equilibrium (`Model.equilibrate`) under the model's present loads, to an
+            out-of-balance ratio of 5e-4.
+        resting: let all cells rest (`Model.rest`) as the finite elements that they were; only what fails turns into particles.
+            They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are.
+
+    Returns:
+        How far the particles are from equilibrium, and how many of them yield.
+
+    Raises:
+        InputError: a particle is outside the finite elements' mesh or, moved, outside the background mesh, laws or geometries do
+            not match, or the finite elements did not converge. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     particles = model.particles
     _require_usable(model, fem, move)
@@ -149,7 +167,13 @@ def _require_usable(model, fem, move):
 
 
 def _require_same_laws(model, fem, number):
-    """number: (n,) of the law that the finite elements have at each particle."""
+    """Raise InputError, on all ranks, unless particles have the laws that the finite elements have there.
+
+    Args:
+        model: the particles.
+        fem: the finite elements.
+        number: number of the law that the finite elements have at each particle, shape (n,).
+    """
     laws = fem.laws
     pairs = np.unique(np.column_stack([model.particles.material, number]), axis=0)
     mistakes = (_law_mistake(material, model.laws[material], laws[there]) for material, there in pairs)

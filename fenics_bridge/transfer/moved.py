@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.fields import cell_function
@@ -17,7 +20,7 @@ _FULL = 0.95
 """Filled fraction above which a cell counts as full: the samples are accurate to about a hundredth."""
 
 
-def volume_change(displacement):
+def volume_change(displacement: fem.Function) -> fem.Function:
     """det(1 + grad u) as a function that is linear in each cell: exact for linear displacements.
 
     Of an axisymmetric body it is the change of the section's area; volumes change by the ratio of the radii besides.
@@ -27,12 +30,22 @@ def volume_change(displacement):
     return cell_function(domain, ufl.as_vector([change]), 1, "volume change")
 
 
-def held_volumes(domain, displacement, geometry=None):
-    """Volume [m^D] of the moved body in each cell of another mesh that this rank owns: (m,).
+def held_volumes(domain: Mesh, displacement: fem.Function, geometry: Geometry | None = None) -> NDArray[np.float64]:
+    """Volume of the moved body in each cell of another mesh that this rank owns.
 
     Sampled in the cells of the finite elements, each sample moved by the displacement. Parts of the body outside of
-    the other mesh are left out. domain: the other mesh; displacement: function [m]
-    geometry: a Geometry; volumes of an axisymmetric body are those of one radian. Collective.
+    the other mesh are left out.
+
+    Args:
+        domain: the other mesh.
+        displacement: displacement of the finite elements [m].
+        geometry: plane strain, axial symmetry or a solid; volumes of an axisymmetric body are those of one radian.
+
+    Returns:
+        Shape (m,) [m^D].
+
+    Note:
+        Collective.
     """
     body, volumes = displacement.function_space.mesh, body_volumes(domain, geometry)
     own = cell_volumes(body)
@@ -51,25 +64,38 @@ def held_volumes(domain, displacement, geometry=None):
     return np.where(held > _FULL * volumes, volumes, held)
 
 
-def fitted_volumes(volume, cell, held):
+def fitted_volumes(
+    volume: NDArray[np.float64], cell: NDArray[np.integer], held: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Volumes of particles, scaled in each cell so that they add up to what the cell holds of the body.
 
     A particle that has crossed into a full cell would else make it fuller than full, and leave a gap where it was:
     forces out of balance by a fraction of the stress on a cell's side, however small the displacements are.
-    volume (n,), cell (n,): of the particles; held (m,): by cell (0: the samples found nothing there, and the particles
-    keep their volume)
+
+    Args:
+        volume: volumes of the particles [m^D], shape (n,).
+        cell: their cells, shape (n,).
+        held: volume of the body in each cell [m^D], shape (m,); 0 where the samples found nothing, and the particles keep their
+            volume.
     """
     together = np.bincount(cell, volume, len(held))
     factor = np.divide(held, together, out=np.ones(len(held)), where=(together > 0) & (held > 0))
     return volume * factor[cell]
 
 
-def simplex_samples(dim, count):
-    """Points spread evenly over a simplex, for equal fractions of its volume: barycentric coordinates (count, D + 1).
+def simplex_samples(dim: int, count: int) -> NDArray[np.float64]:
+    """Points spread evenly over a simplex, for equal fractions of its volume.
 
     A sequence of low discrepancy in the unit cube, multiples of the powers of 1/g with g^(D + 1) = g + 1 (Roberts 2018,
     The unreasonable effectiveness of quasirandom sequences); sorting coordinates maps the cube evenly to the simplex
     1 > x > y > z > 0.
+
+    Args:
+        dim: dimension D of the simplex, 2 or 3.
+        count: number of points.
+
+    Returns:
+        Barycentric coordinates, shape (count, D + 1).
     """
     root = {2: 1.324717957244746, 3: 1.2207440846057596}[dim]
     points = -np.sort(-(np.outer(np.arange(count) + 0.5, root ** -np.arange(1.0, dim + 1)) % 1.0), axis=1)

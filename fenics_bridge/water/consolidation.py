@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.equilibration import Solver
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.fields import assembled, force_on, nodal_average, part_of
+from fenics_bridge.fem.fields import force_on, nodal_average, part_of
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.supports import Constraints, tagged_facets
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
+from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
-from fenics_bridge.water.boundary import Flux
+from fenics_bridge.water.boundary import Flux, WaterBoundary
 from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, solve_step
 from fenics_bridge.water.coupled import (
     CoupledConstraints,
@@ -30,38 +37,74 @@ from fenics_bridge.water.coupled import (
     WaterTerms,
     pressure_is_free,
 )
-from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.initial_state import set_initial_state
-from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, soils_by_tag
+from fenics_bridge.water.retention import AlwaysSaturated
+from fenics_bridge.water.seepage import Seepage
+from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
 from fenics_bridge.water.time_steps import run
+from mpm_core import Geometry
 
 
 class Consolidation:
     """Quasi-static deformation of saturated soil coupled with the flow of its water: displacement u and pore pressure p.
 
-    pressure: pore pressure [Pa], a function, linear in each cell, compression positive; time: [s]
-    load: the Load, or a function of the time [s] that returns one; boundary: conditions of the water. Both may be changed
-        between steps, and hold at the end of a step.
-    points: QuadraturePoints, with effective stress and state; domain, geometry: mesh and Geometry
+    Args:
+        domain: mesh of the body.
+        law: law of `mpm_core` for effective stresses, or laws by cell tag or name.
+        soil: soil, or soils by cell tag or name; its compressibility does not count, and its retention curve must be
+            AlwaysSaturated.
+        facet_tags: tags of the boundary.
+        supports: boundary conditions of the displacement, from `fixed`, `roller` and `prescribed`.
+        boundary: boundary conditions of the water, as for `Seepage`; a Reservoir also presses on the soil.
+        load: load, or function of the time [s] that returns one; unit weights are those of the saturated soil, pressures are
+            total stresses.
+        element: elements of displacement and pressure.
+        cell_tags: tags of the cells; needed where laws, soils or unit weights are given by cell tag.
+        geometry: as for `QuasiStatic`.
+        unit_weight: unit weight of water [N/m3].
+        water_modulus: bulk modulus of water [Pa], may be infinite.
+        solver: solver, of which tolerance and iterations count.
+        options_prefix: prefix of the PETSc options of the linear solver.
+
+    Raises:
+        InputError: an unknown tag, cells without law or soil, or another argument out of range. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, domain, law, soil, facet_tags, supports, boundary, load=None, element=Element.TAYLOR_HOOD,
-                 cell_tags=None, geometry=None, unit_weight=WATER_WEIGHT, water_modulus=WATER_MODULUS, solver=None,
-                 options_prefix="consolidation_"):  # fmt: skip
-        """
-        law: of `mpm_core`, for effective stresses, or {cell tag or name: law}; soil: PorousSoil, or one by cell tag or name;
-            its compressibility does not count, and its retention curve must be AlwaysSaturated
-        facet_tags, supports: as for `QuasiStatic`
-        boundary: list of Head, Reservoir, SeepageFace, Flux and Rain, as for `Seepage`; a Reservoir also presses on the soil
-        load: as the attribute; unit weights are those of the saturated soil, pressures are total stresses
-        element: Element; geometry: as for `QuasiStatic`; solver: Solver, of which tolerance and iterations count
-        unit_weight: of water [N/m3]; water_modulus: bulk modulus of water [Pa], may be infinite
-        Raises InputError, on all ranks, for bad arguments. Collective.
-        """
+    def __init__(
+        self,
+        domain: Mesh,
+        law: Laws,
+        soil: PorousSoil | dict[int | str, PorousSoil],
+        facet_tags: MeshTags,
+        supports: Sequence[Support],
+        boundary: Iterable[WaterBoundary],
+        load: Load | Callable[[float], Load] | None = None,
+        element: Element = Element.TAYLOR_HOOD,
+        cell_tags: MeshTags | None = None,
+        geometry: Geometry | None = None,
+        unit_weight: float = WATER_WEIGHT,
+        water_modulus: float = WATER_MODULUS,
+        solver: Solver | None = None,
+        options_prefix: str = "consolidation_",
+    ) -> None:
         agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus))
-        self.domain, self.geometry, self.time = domain, geometry_of(domain, geometry), 0.0
-        self.load, self.boundary, self.solver = load or Load(), list(boundary), solver or Solver()
+        self.domain = domain
+        """Mesh of the body"""
+        self.geometry = geometry_of(domain, geometry)
+        """Plane strain, axial symmetry or a solid"""
+        self.time = 0.0
+        """Time of the consolidation [s]"""
+        self.load = load or Load()
+        """The load, or a function of the time [s] that returns one; may be changed between steps, and holds at the end of one"""
+        self.boundary = list(boundary)
+        """Boundary conditions of the water; they may be changed between steps, and hold at the end of a step"""
+        self.solver = solver or Solver()
+        """Tolerances of the solution"""
         self.radius = radius_of(domain, self.geometry)
+        """Radius of an axisymmetric body, a UFL expression; None in others"""
         self._weights, self._facet_tags = (unit_weight, water_modulus), facet_tags
         self._space = space = compat.displacement_pressure_space(domain, element.value)
         self._displacements, self._pressures = ((part, np.asarray(dofs)) for part, dofs in _parts(space))
@@ -71,6 +114,7 @@ class Consolidation:
         self._laws = materials.laws(law)
         degree = max(1, 2 * (element.value - 1))
         self.points = QuadraturePoints(domain, self._laws, materials.number, degree, self.radius is not None)
+        """Quadrature points, with effective stress and state"""
         self._unit = max(one.p_wave_modulus for one in self._laws)
         self._loads = LoadVectors(space, facet_tags, cell_tags, test=ufl.TestFunctions(space)[0], radius=self.radius)
         self._external = self._loads.forces(Load())
@@ -83,6 +127,7 @@ class Consolidation:
             self._pressures[0], facet_tags, _largest_conductivity(self._soils[0]), self.radius
         )
         self.pressure = fem.Function(self._pressures[0], name="pore_pressure")
+        """Pore pressure [Pa], a function that is linear in each cell, compression positive"""
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self._assemble(options_prefix)
 
@@ -116,20 +161,41 @@ class Consolidation:
         )
         self._reservoirs = ReservoirLoads(self._space, self._facet_tags, self._applied, self._weights[0], self.radius)
 
-    def initialise(self, stress=None, pore_pressure=None):
+    def initialise(
+        self, stress: ArrayLike | QuasiStatic | None = None, pore_pressure: OfPosition | Seepage | None = None
+    ) -> None:
         """Begin with effective stresses and pore pressures, undeformed; what is out of balance is released in the first step.
 
-        stress: (n, S) [Pa] at `points.coordinates()`, or a QuasiStatic on the same mesh with elements of the same degree and
-            the same laws, of which the state is taken too; None for none
-        pore_pressure: function of positions (n, D) that returns pressures (n,) [Pa], or a Seepage; None for none
-        Raises InputError, on all ranks, for other shapes and values that are not finite. Collective.
+        Args:
+            stress: effective stress [Pa] at `points.coordinates()`, shape (n, S), or a QuasiStatic on the same mesh with elements
+                of the same degree and the same laws, of which the state is taken too; None for none.
+            pore_pressure: function of positions (n, D) [m] that returns pressures (n,) [Pa], or a Seepage; None for none.
+
+        Raises:
+            InputError: values of another shape or not finite. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         set_initial_state(self, stress, pore_pressure)
 
     # --- steps -------------------------------------------------------------------------------------------------------
 
-    def advance(self, dt):
-        """One step of dt [s] by backward Euler. Returns a ConsolidationReport; a step that fails changes nothing. Collective."""
+    def advance(self, dt: float) -> ConsolidationReport:
+        """Make a step of backward Euler.
+
+        Args:
+            dt: length of the step [s].
+
+        Returns:
+            Report of the step; a step that fails changes nothing.
+
+        Raises:
+            InputError: dt is not positive, or a load or boundary condition is not possible. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
         self._take_boundary()
         end, stored = self.time + dt, self.stored_water()
@@ -150,12 +216,33 @@ class Consolidation:
         error = self.stored_water() - stored - dt * self.inflow(None)
         return ConsolidationReport(end, dt, iterations, report.residuals, error)
 
-    def run(self, until, first_step, growth=1.2, longest=np.inf, progress=None):
-        """Steps up to a time [s], each longer than the one before, as long as Newton's method takes them easily.
+    def run(
+        self,
+        until: float,
+        first_step: float,
+        growth: float = 1.2,
+        longest: float = np.inf,
+        progress: Callable[[ConsolidationReport], Any] | None = None,
+    ) -> list[ConsolidationReport]:
+        """Make steps up to a time, each longer than the one before, as long as Newton's method takes them easily.
 
-        first_step: [s]; growth: factor from step to step, 1 or more; longest: [s]; progress: called with each report, or None
-        A step that fails is halved. Returns the list of ConsolidationReport; the run ended early where the last one has not
-        converged. Raises InputError, on all ranks, for values out of range. Collective.
+        A step that fails is halved.
+
+        Args:
+            until: time at the end [s].
+            first_step: length of the first step [s].
+            growth: factor from step to step, 1 or more [-].
+            longest: length of the longest step [s].
+            progress: function that is called with each report.
+
+        Returns:
+            Reports of all steps; the run ended early where the last one has not converged.
+
+        Raises:
+            InputError: an argument out of range. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return run(self, until, first_step, growth, longest, progress)
 
@@ -177,7 +264,14 @@ class Consolidation:
         return solve_step(step, self._body.constraints, bounds, self._active, state, self.solver)
 
     def _step_state(self, dt):
-        """Pressures over their unit and inflows [m3/s] beside the prescribed rates, of the step under trial, both (m,). Collective."""
+        """Pressures and inflows of the step under trial.
+
+        Returns:
+            Pressures over their unit [-], and inflows beside the prescribed rates [m3/s], both of shape (m,).
+
+        Note:
+            Collective.
+        """
         body, dofs = self._body, self._pressures[1]
         internal = body.kinematics.internal_forces(self.points.trial_stress).array[dofs]
         return (body.solution.x.array + body.increment.x.array)[dofs], -internal / (self._unit * dt)
@@ -185,41 +279,88 @@ class Consolidation:
     # --- results -----------------------------------------------------------------------------------------------------
 
     @property
-    def displacement(self):
+    def displacement(self) -> fem.Function:
         """Displacement as a function of its own [m]."""
         return part_of(self._body.solution, self._displacements, "displacement")
 
-    def stress_function(self, smooth=False):
-        """Effective stress [Pa] as a function that is constant in each cell, the mean of its points; smooth: averaged at nodes."""
+    def stress_function(self, smooth: bool = False) -> fem.Function:
+        """Effective stress as a function.
+
+        Args:
+            smooth: average the stress of the cells at the nodes, which makes it continuous.
+
+        Returns:
+            Effective stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
+
+        Note:
+            Collective.
+        """
         mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
         return nodal_average(mean, self.radius) if smooth else mean
 
-    def state_function(self):
+    def state_function(self) -> fem.Function:
         """State variables of the law as a function that is constant in each cell."""
         return self.points.cell_function(self.points.state, "state", 0)
 
-    def evaluate_at(self, points):
-        """Dictionary of `displacement` (n, D) [m], `pressure` (n, 1) [Pa] and effective `stress` (n, S) [Pa] at points (n, D).
+    def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Values at points, whichever ranks have the points and their cells.
 
-        Raises InputError, on all ranks, naming a point outside the body. Collective.
+        Args:
+            points: positions [m], shape (n, D).
+
+        Returns:
+            `displacement` [m], shape (n, D), `pressure` [Pa], shape (n, 1), and effective `stress` [Pa], shape (n, S).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return evaluate_at(
             points, displacement=self.displacement, pressure=self.pressure, stress=self.stress_function()
         )
 
-    def stored_water(self):
-        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure. Collective."""
+    def stored_water(self) -> float:
+        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure.
+
+        Note:
+            Collective.
+        """
         return self.domain.comm.allreduce(fem.assemble_scalar(self._terms.content))
 
-    def inflow(self, facet_tag):
-        """Water that entered through the facets of a tag in the last step [m3/s], [m2/s] in plane strain; as for `Seepage`.
+    def inflow(self, facet_tag: int | str | None) -> float:
+        """Water that entered through the facets of a tag in the last step; as for `Seepage`.
 
-        facet_tag: None for all boundary conditions together. Collective.
+        Args:
+            facet_tag: number or name of the tag; None for all boundary conditions together.
+
+        Returns:
+            Inflow [m3/s], [m2/s] in plane strain; negative where water leaves.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         return self._applied.inflow(facet_tag, self._inflow)
 
-    def reaction(self, facet_tag):
-        """Force of the body, soil and water, on its support at the facets of a tag: (D,) [N], as for `QuasiStatic`. Collective."""
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """Force of the body, soil and water, on its support at the facets of a tag, summed over them.
+
+        Args:
+            facet_tag: number or name of the tag.
+
+        Returns:
+            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
         self._body.increment.x.array[:] = 0.0
         forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
         facets = tagged_facets(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fenics_bridge.errors import agree
@@ -10,7 +12,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.water.seepage import Seepage
 
 
-def set_initial_state(model, stress, pore_pressure):
+def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     """Do what `Consolidation.initialise` says."""
     comm, points, solution = model.domain.comm, model.points, model._body.solution
     state = None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from mpm_core.step_control import StepControl
 
@@ -11,7 +14,9 @@ SHORTEST = 1e-4
 """Step, over the first one, below which a run gives up."""
 
 
-def run(model, until, first_step, growth, longest, progress):
+def run(
+    model: Any, until: float, first_step: float, growth: float, longest: float, progress: Callable[[Any], Any] | None
+) -> list[Any]:
     """Do what `Consolidation.run` says."""
     agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
     reports, control = [], StepControl(longest, min(first_step, longest))
