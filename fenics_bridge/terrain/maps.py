@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
+import mpm_core as mpm
 from fenics_bridge.terrain.raster import Raster
 
 
 class SlideMaps:
     """Thickness and speed of a slide on a grid, whose greatest values are kept over time.
 
-    model: of a slide in three dimensions; ground: the `Raster` whose points are the centres of the map's cells
-    least: [m] thickness below which a cell is taken for untouched
+    Args:
+        model: model of a slide in three dimensions.
+        ground: raster whose points are the centres of the map's cells.
+        least: thickness below which a cell counts as untouched [m].
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, model, ground, least=0.01):
+    def __init__(self, model: mpm.Model, ground: Raster, least: float = 0.01) -> None:
         self.model, self.ground, self.least = model, ground, least
         self._most = np.zeros(ground.values.shape)
         self._fastest = np.zeros(ground.values.shape)
@@ -27,16 +34,24 @@ class SlideMaps:
         for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):
             yield (row + up, column + across), part
 
-    def thickness(self):
-        """Volume of the particles over area [m], (ny, nx): each gives it to the four points around it. Collective."""
+    def thickness(self) -> NDArray[np.float64]:
+        """Volume of the particles over area [m], shape (ny, nx): each gives it to the four points around it.
+
+        Note:
+            Collective.
+        """
         found = np.zeros(self.ground.values.shape)
         for places, part in self._around():
             np.add.at(found, places, part * self.model.particles.volume / self.ground.spacing**2)
         self.model.comm.Allreduce(MPI.IN_PLACE, found)
         return found
 
-    def record(self):
-        """Take the present state into the greatest values. Collective."""
+    def record(self) -> None:
+        """Include the present state in the greatest values.
+
+        Note:
+            Collective.
+        """
         speed = np.linalg.norm(self.model.particles.velocity, axis=1)
         fastest = np.zeros(self.ground.values.shape)
         for places, part in self._around():
@@ -45,9 +60,16 @@ class SlideMaps:
         self._fastest = np.maximum(self._fastest, fastest)
         self._most = np.maximum(self._most, self.thickness())
 
-    def maps(self):
-        """{name: Raster}: deposit (thickness now) [m], most (largest thickness) [m], speed (largest) [m/s], with gaps where the
-        slide has not been, and reached: 1 where it has, else 0. Collective."""
+    def maps(self) -> dict[str, Raster]:
+        """The maps by name.
+
+        Returns:
+            `deposit` (thickness now) [m], `most` (largest thickness) [m] and `speed` (largest) [m/s], with gaps where the slide
+            has not been, and `reached`: 1 where it has been, else 0.
+
+        Note:
+            Collective.
+        """
         deposit, reached = self.thickness(), self._most >= self.least
         values = {
             "deposit": np.where(deposit >= self.least, deposit, np.nan), "most": np.where(reached, self._most, np.nan),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError
@@ -16,47 +18,76 @@ STEEPEST = 20.0
 
 @dataclass(frozen=True)
 class Raster:
-    """Values at the points of a grid, commonly heights of ground.
+    """Values at the points of a grid, commonly heights of ground."""
 
-    x, y: (nx,) and (ny,) [m], both rising, with the same spacing; values: (ny, nx) [m]
-    crs: the coordinate reference, for instance "EPSG:25832", or "local" for metres on a plane
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    values: np.ndarray
+    x: NDArray[np.float64]
+    """Coordinates of the columns [m], shape (nx,), rising, with the same spacing as the rows"""
+    y: NDArray[np.float64]
+    """Coordinates of the rows [m], shape (ny,), rising"""
+    values: NDArray[np.float64]
+    """Values at the points, such as heights [m], shape (ny, nx)"""
     crs: str = "local"
+    """Coordinate reference, for instance "EPSG:25832", or "local" for metres on a plane"""
 
     @property
     def spacing(self) -> float:
         """Distance between neighbouring points [m]."""
         return float(self.x[-1] - self.x[0]) / (len(self.x) - 1)
 
-    def place(self, points):
-        """Row and column of the cells of points (n, 2), and the fractions of a cell by which they are beyond its first corner;
-        points outside are moved to the border."""
+    def place(self, points: ArrayLike) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Cells of points; points outside are moved to the border.
+
+        Args:
+            points: positions [m], shape (n, 2) or (n, 3).
+
+        Returns:
+            Rows and columns of the cells, and the fractions of a cell by which the points are beyond its first corner, along x
+            and along y, each of shape (n,).
+        """
         across = np.clip((np.asarray(points)[:, 0] - self.x[0]) / self.spacing, 0, len(self.x) - 1)
         up = np.clip((np.asarray(points)[:, 1] - self.y[0]) / self.spacing, 0, len(self.y) - 1)
         column = np.minimum(across.astype(int), len(self.x) - 2)
         row = np.minimum(up.astype(int), len(self.y) - 2)
         return row, column, across - column, up - row
 
-    def at(self, points):
-        """Values at points (n, 2) or (n, 3), bilinear between those of the grid and constant beyond it."""
+    def at(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Values at points, bilinear between those of the grid and constant beyond it.
+
+        Args:
+            points: positions [m], shape (n, 2) or (n, 3).
+
+        Returns:
+            Shape (n,).
+        """
         row, column, s, t = self.place(points)
         v = self.values
         low = (1 - s) * v[row, column] + s * v[row, column + 1]
         return (1 - t) * low + t * ((1 - s) * v[row + 1, column] + s * v[row + 1, column + 1])
 
-    def slope(self, points):
-        """Gradient (n, 2) of the bilinear values at points [-]."""
+    def slope(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Gradient of the bilinear values at points.
+
+        Args:
+            points: positions [m], shape (n, 2) or (n, 3).
+
+        Returns:
+            Shape (n, 2) [-].
+        """
         row, column, s, t = self.place(points)
         v = self.values
         a, b, c, d = v[row, column], v[row, column + 1], v[row + 1, column], v[row + 1, column + 1]
         return np.stack([(1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b)], axis=1) / self.spacing
 
-    def window(self, low, high):
-        """The part between two corners (x, y) [m], rounded outwards to whole cells. Raises InputError when it is not inside."""
+    def window(self, low: Sequence[float], high: Sequence[float]) -> Raster:
+        """The part between two corners, rounded outwards to whole cells.
+
+        Args:
+            low: lower left corner (x, y) [m].
+            high: upper right corner (x, y) [m].
+
+        Raises:
+            InputError: it is not inside the raster.
+        """
         eps = 1e-9 * self.spacing
         columns = np.flatnonzero((self.x > low[0] - self.spacing + eps) & (self.x < high[0] + self.spacing - eps))
         rows = np.flatnonzero((self.y > low[1] - self.spacing + eps) & (self.y < high[1] + self.spacing - eps))
@@ -83,13 +114,19 @@ class Raster:
         return mpm.Triangles(vertices, np.concatenate([low, high]).astype(np.int32))
 
 
-def read_raster(path, *, crs=None, window=None):
-    """Heights from a file: an ESRI ASCII grid (.asc), or points x y z of a grid in any order (.xyz, .txt).
+def read_raster(
+    path: str | Path, *, crs: str | None = None, window: tuple[Sequence[float], Sequence[float]] | None = None
+) -> Raster:
+    """Read heights from a file: an ESRI ASCII grid (.asc), or points x y z of a grid in any order (.xyz, .txt).
 
-    crs: the coordinate reference, where neither the file nor a .prj beside it names one; "local" for metres on a plane
-    window: ((x, y), (x, y)) [m], corners of the part to take; outside of it there may be gaps
-    Raises InputError for a file that is missing or damaged, points that are no grid of square cells, gaps (with their number and
-    the first one), degrees in place of metres, and an unknown coordinate reference.
+    Args:
+        path: the file.
+        crs: coordinate reference, where neither the file nor a .prj beside it names one; "local" for metres on a plane.
+        window: corners ((x, y), (x, y)) [m] of the part to take; outside of it there may be gaps.
+
+    Raises:
+        InputError: a file that is missing or damaged, points that are no grid of square cells, gaps (with their number and the
+            first one), degrees in place of metres, and an unknown coordinate reference.
     """
     path = Path(path)
     readers = {".asc": _read_ascii, ".xyz": _read_points, ".txt": _read_points}
@@ -106,8 +143,13 @@ def read_raster(path, *, crs=None, window=None):
     return raster
 
 
-def write_raster(path, raster):
-    """An ESRI ASCII grid; values that are not numbers are gaps (-9999). A .prj beside it names the coordinate reference."""
+def write_raster(path: str | Path, raster: Raster) -> None:
+    """Write an ESRI ASCII grid, and a .prj beside it that names the coordinate reference.
+
+    Args:
+        path: the file.
+        raster: values; those that are not numbers are gaps (-9999).
+    """
     path = Path(path)
     header = (f"ncols {len(raster.x)}\nnrows {len(raster.y)}\nxllcenter {raster.x[0]!r}\nyllcenter {raster.y[0]!r}\n"
               f"cellsize {raster.spacing!r}\nNODATA_value -9999\n")  # fmt: skip

@@ -2,24 +2,49 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.terrain.raster import Raster
 
 
-def seed_slide(model, before, rupture, *, spacing, density, friction=0.0, adhesion=0.0, material=0):
+def seed_slide(
+    model: mpm.Model,
+    before: Raster,
+    rupture: Raster,
+    *,
+    spacing: float,
+    density: float,
+    friction: float = 0.0,
+    adhesion: float = 0.0,
+    material: int = 0,
+) -> tuple[Any, float]:
     """Fill the space between two rasters with particles, and let them touch the ground that is left.
 
     The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow
     they are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
 
-    model: without particles, on a mesh over the ground (see `terrain_mesh`)
-    before, rupture: `Raster` of the ground before the slide, and of the ground that remains; the body is where the first is
-        higher
-    spacing: [m] between particles; density: [kg/m3]; friction, adhesion: of the ground, see `mpm_core.Model.add_contact`
-    Returns (contact, lift [m]). Raises InputError, on all ranks, when the rasters have other coordinate references, or no soil is
-    between them. Collective.
+    Args:
+        model: model without particles, on a mesh over the ground (see `terrain_mesh`).
+        before: ground before the slide; the body is where it is higher than the ground that remains.
+        rupture: ground that remains.
+        spacing: distance between particles [m].
+        density: density of the soil [kg/m3].
+        friction: friction coefficient of the ground [-], see `mpm_core.Model.add_contact`.
+        adhesion: adhesion of the ground [Pa], likewise.
+        material: number of the soil's law in the model.
+
+    Returns:
+        The contact with the ground, and the largest lift of a particle [m].
+
+    Raises:
+        InputError: the rasters have other coordinate references, or no soil is between them. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     surface = rupture.triangles()
     found = on_root(model.comm, lambda: _points(before, rupture, surface, spacing))

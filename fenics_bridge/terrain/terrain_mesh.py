@@ -2,28 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
+from fenics_bridge.terrain.raster import Raster
+from fenics_bridge.types import MeshTags
 
 SIDES, GROUND, SKY = 1, 2, 3
 """Facet tags of a terrain mesh: its upright sides, its lower side below the ground, and its upper side."""
 
 
-def terrain_mesh(comm, ground, *, cell_size, height, fine, coarse_size=None, depth=None):
+def terrain_mesh(
+    comm: MPI.Comm,
+    ground: Raster,
+    *,
+    cell_size: float,
+    height: float,
+    fine: tuple[Sequence[float], Sequence[float]],
+    coarse_size: float | None = None,
+    depth: float | None = None,
+) -> tuple[Mesh, MeshTags, MeshTags]:
     """Tetrahedra over ground: gmsh makes triangles in plan, which are extruded in layers parallel to the ground.
 
-    ground: a `Raster`; the mesh is as large as it is less a cell of it on each side, so that no soil comes to its border
-    cell_size: [m] of the triangles where it is fine, and thickness of the layers
-    height: [m] of the mesh above the ground: more than the thickness of the slide, with what it is thrown up
-    fine: ((x, y), (x, y)) [m], corners of the rectangle in plan where the mesh is fine
-    coarse_size: [m] of the triangles far from it, four times cell_size by default; depth: [m] of the mesh below the ground, 1.5
-        cell_size by default: room for cells that the ground cuts
-    Returns (domain, cell_tags, facet_tags): facets SIDES, GROUND and SKY. Raises InputError, on all ranks, for sizes that do not
-    fit.     Collective.
+    Args:
+        comm: the ranks that share the mesh.
+        ground: heights; the mesh is as large as the raster less a cell of it on each side, so that no soil comes to its border.
+        cell_size: size of the triangles where the mesh is fine, and thickness of the layers [m].
+        height: height of the mesh above the ground [m]: more than the thickness of the slide, with what it is thrown up.
+        fine: corners ((x, y), (x, y)) of the rectangle in plan where the mesh is fine [m].
+        coarse_size: size of the triangles far from it [m], four times cell_size by default.
+        depth: depth of the mesh below the ground [m], 1.5 cell_size by default: space for cells that the ground cuts.
+
+    Returns:
+        The mesh, the tags of its cells, and the tags of its facets, SIDES, GROUND and SKY.
+
+    Raises:
+        InputError: sizes that do not fit. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     coarse = 4 * cell_size if coarse_size is None else coarse_size
     below = 1.5 * cell_size if depth is None else depth
@@ -73,8 +97,10 @@ def _plan(ground, cell_size, coarse, fine):
 
 
 def _extruded(plan, ground, below, height, layers):
-    """Prisms over the triangles, each in three tetrahedra; the diagonals of sides go up from the column of the lower number, so
-    that neighbours agree (Dompierre et al. 1999)."""
+    """Prisms over the triangles, each in three tetrahedra.
+
+    The diagonals of sides go up from the column of the lower number, so that neighbours agree (Dompierre et al. 1999).
+    """
     columns, n = np.sort(plan.cells, axis=1), len(plan.points)
     floor = ground.at(plan.points) - below
     levels = (below + height) * np.arange(layers + 1) / layers

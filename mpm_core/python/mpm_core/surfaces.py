@@ -155,7 +155,8 @@ def distances(surface: Surface, points: ArrayLike) -> NDArray[np.float64]:
     """Distances of points from a rigid surface [m], shape (n,): positive where the soil is to be, negative within the body.
 
     Args:
-        points: [m], shape (n, D).
+        surface: the rigid surface.
+        points: positions [m], shape (n, D).
 
     Raises:
         InputError: a surface of another dimension, or points of another shape.

@@ -191,8 +191,8 @@ def test_softening_clay_with_averaged_strains_and_mixed_integration_keeps_its_en
 
 def test_alternating_pressures_of_frictional_soil_stay_bounded():
     # Forces feel a pressure that alternates from cell to cell by the fraction that is not averaged, a half where flow is not
-    # associated. So under the same forces such pressures are at most twice what they are without averaging; with forces that do not feel
-    # them they grow until particles are thrown out of this mesh.
+    # associated. So under the same forces such pressures are at most twice what they are without averaging; with forces that do
+    # not feel them they grow until particles are thrown out of this mesh.
     law = mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=0.5e3, friction_angle=25.0)
     rough = {}
     for nmd in (False, True):
