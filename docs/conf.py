@@ -37,11 +37,8 @@ suppress_warnings = ["ref.python"]
 
 
 def readable(app, what, name, obj, options, lines):
-    """Docstrings are plain text: a bar is the length of a vector; those of fenics_bridge without sections keep their lines."""
+    """Docstrings are plain text: a bar is the length of a vector."""
     lines[:] = [line.replace("|", "\\|").replace("*", "\\*") for line in lines]
-    sections = {"Args:", "Returns:", "Raises:", "Note:", "Example:"}
-    if name.startswith("fenics_bridge.") and sections.isdisjoint(lines):
-        lines[:] = [f"| {line}" if line.strip() else "" for line in lines]
 
 
 def with_field_tables(app, name, source):

@@ -101,7 +101,8 @@ class RestingCells:
         """Turn resting cells into the particles that they stand for, which a run does by itself where the soil fails.
 
         Args:
-            cell_tag, where: as for `rest`.
+            cell_tag: as for `rest`.
+            where: as for `rest`.
 
         Returns:
             Number of cells that rest still, over all ranks.
