@@ -91,7 +91,11 @@ class VanGenuchten(_Curve):
         return _at_least(suction * self.alpha, entry) ** self.n, entry**self.n
 
     def effective(self, suction: Any) -> Any:
-        """Effective saturation S_e [-] at a suction [Pa]."""
+        """Effective saturation S_e [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         here, at_entry = self._powers(suction)
         return ((1 + here) / (1 + at_entry)) ** (1 / self.n - 1)
 
@@ -130,11 +134,19 @@ class Gardner(_Curve):
         _check_residual(self.residual)
 
     def effective(self, suction: Any) -> Any:
-        """Effective saturation S_e [-] at a suction [Pa]."""
+        """Effective saturation S_e [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return _exp(-self.alpha * _at_least(suction, 0.0))
 
     def relative_permeability(self, suction: Any) -> Any:
-        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
+        """Fraction k_r of the saturated conductivity [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return LEAST_PERMEABILITY + (1 - LEAST_PERMEABILITY) * self.effective(suction)
 
 
@@ -179,15 +191,27 @@ class Tabulated(_Curve):
         return self.saturation_values[-1]
 
     def effective(self, suction: Any) -> Any:
-        """Effective saturation S_e [-] at a suction [Pa]."""
+        """Effective saturation S_e [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return (self.saturation(suction) - self.residual) / (1 - self.residual)
 
     def saturation(self, suction: Any) -> Any:
-        """Degree of saturation S [-] at a suction [Pa]."""
+        """Degree of saturation S [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return _joined(suction, self.suction, self.saturation_values)
 
     def relative_permeability(self, suction: Any) -> Any:
-        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
+        """Fraction k_r of the saturated conductivity [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         kept = _joined(suction, self.suction, self.permeability_values)
         return LEAST_PERMEABILITY + (1 - LEAST_PERMEABILITY) * kept
 
@@ -217,12 +241,20 @@ class FreeSurface(_Curve):
             raise InputError(f"dry_permeability: got {self.dry_permeability!r}, expected more than 0 and less than 1")
 
     def effective(self, suction: Any) -> Any:
-        """Effective saturation S_e [-] at a suction [Pa]."""
+        """Effective saturation S_e [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         x = _at_most(_at_least(suction / self.fringe, 0.0), 1.0)
         return 1 - x * x * (3 - 2 * x)
 
     def relative_permeability(self, suction: Any) -> Any:
-        """Fraction k_r of the saturated conductivity [-] at a suction [Pa]."""
+        """Fraction k_r of the saturated conductivity [-].
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return self.dry_permeability + (1 - self.dry_permeability) * self.effective(suction)
 
 
@@ -233,7 +265,11 @@ class AlwaysSaturated(_Curve):
     residual = 0.0
 
     def effective(self, suction: Any) -> Any:
-        """Effective saturation S_e = 1 [-], which is also the fraction k_r of the saturated conductivity."""
+        """Effective saturation S_e = 1 [-], which is also the fraction k_r of the saturated conductivity.
+
+        Args:
+            suction: minus the pore pressure [Pa]: a number, a NumPy array or a UFL expression.
+        """
         return 1 + 0 * suction
 
     relative_permeability = effective
