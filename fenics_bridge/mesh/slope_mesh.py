@@ -36,11 +36,13 @@ def slope_mesh(
     kind: str = "crossed",
     runout: float = 2.0,
     headroom: float | None = None,
+    depth: float = 0.0,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Background mesh of a slope, with the soil before failure tagged.
 
     The soil has the corners (0, 0), (base, 0), (crest, height) and (0, height), base = crest + height / tan(angle).
-    The background reaches from x = 0 to base + runout and from y = 0 to height + headroom.
+    The background reaches from x = 0 to base + runout and from y = -depth to height + headroom; the ground below y = 0 is soil
+    over the whole of that length.
 
     Args:
         comm: the ranks that share the mesh.
@@ -52,6 +54,7 @@ def slope_mesh(
             with the squares stretched to fit any slope; "gmsh", unstructured.
         runout: length of the background past the toe [m]. All kinds but "gmsh" round it up to whole cells.
         headroom: height of the background above the crest [m], rounded like `runout`; None for one cell.
+        depth: of the soil below the toe [m], rounded like `runout`; none with "gmsh".
 
     Returns:
         The mesh, the tags of its cells, SOIL and EMPTY, and the tags of its facets: LEFT, BASE, RIGHT, TOP on the sides of the
@@ -66,7 +69,7 @@ def slope_mesh(
     headroom = cell_size if headroom is None else headroom
 
     def arrays():
-        shape = _checked(height, angle, crest, cell_size, runout, headroom)
+        shape = _checked(height, angle, crest, cell_size, runout, headroom, depth)
         makers = {"crossed": _crossed, "fitted": _fitted, "gmsh": _unstructured}
         if kind not in makers:
             raise InputError(f"kind: got {kind!r}, expected one of {', '.join(makers)}")
@@ -77,18 +80,20 @@ def slope_mesh(
     return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
 
 
-def _checked(height, angle, crest, cell_size, runout, headroom):
+def _checked(height, angle, crest, cell_size, runout, headroom, depth):
     for name, value in (("height", height), ("crest", crest), ("cell_size", cell_size), ("runout", runout)):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"{name}: got {value!r} m, expected a positive length")
     if not (np.isfinite(headroom) and headroom >= 0):
         raise InputError(f"headroom: got {headroom!r} m, expected a length, zero or more")
+    if not (np.isfinite(depth) and depth >= 0):
+        raise InputError(f"depth: got {depth!r} m, expected a length, zero or more")
     if not 0 < angle <= 90:
         raise InputError(f"angle: got {angle!r} degrees, expected more than 0 and at most 90")
     if cell_size > min(height, crest):
         raise InputError(f"cell_size: got {cell_size!r} m, expected at most the height {height} m and crest {crest} m")
     slope_length = 0.0 if angle == 90 else height / math.tan(math.radians(angle))
-    return height, crest, crest + slope_length, cell_size, runout, headroom
+    return height, crest, crest + slope_length, cell_size, runout, headroom, depth
 
 
 def _multiple(name, value, cell_size):
@@ -101,7 +106,7 @@ def _multiple(name, value, cell_size):
     return count
 
 
-def _crossed(height, crest, base, size, runout, headroom):
+def _crossed(height, crest, base, size, runout, headroom, depth):
     _require_multiple("height", height, size)
     _require_multiple("crest", crest, size)
     run = base - crest
@@ -110,7 +115,7 @@ def _crossed(height, crest, base, size, runout, headroom):
             f"angle: got {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
             "degrees only, use kind='fitted' or 'gmsh'"
         )
-    return _fitted(height, crest, base, size, runout, headroom)
+    return _fitted(height, crest, base, size, runout, headroom, depth)
 
 
 def _require_multiple(name, value, cell_size):
@@ -125,7 +130,7 @@ def _angle(height, run):
     return math.degrees(math.atan2(height, run))
 
 
-def _fitted(height, crest, base, size, runout, headroom):
+def _fitted(height, crest, base, size, runout, headroom, depth):
     """Rectangles cut in four; under the slope there are as many columns as rows, so that it runs along diagonals."""
     run = base - crest
     if run > 0 and not 0.2 <= height / run <= 5:
@@ -143,11 +148,16 @@ def _fitted(height, crest, base, size, runout, headroom):
         ]
     )
     y = np.concatenate(
-        [np.linspace(0, height, rows + 1), height + size * np.arange(1, math.ceil(headroom / size - 1e-9) + 1)]
+        [
+            -size * np.arange(math.ceil(depth / size - 1e-9), 0, -1),
+            np.linspace(0, height, rows + 1),
+            height + size * np.arange(1, math.ceil(headroom / size - 1e-9) + 1),
+        ]
     )
     points, cells = _crossed_rectangles(x, y)
     centroids = points[cells].mean(axis=1)
-    soil = (centroids[:, 1] < height) & (centroids[:, 0] < crest + run * (1 - centroids[:, 1] / height))
+    above_toe = (centroids[:, 1] < height) & (centroids[:, 0] < crest + run * (1 - centroids[:, 1] / height))
+    soil = above_toe | (centroids[:, 1] < 0)
     facets, values = _tagged_edges(points, cells, soil, crest)
     return MeshArrays(points, cells, np.where(soil, SOIL, EMPTY).astype(np.int32), facets, values)
 
@@ -172,18 +182,21 @@ def _tagged_edges(points, cells, soil, crest):
     soil_sides = np.bincount(inverse.ravel(), weights=np.repeat(soil, 3))
     x, y = points[edges].mean(axis=1).T
     right, top = points.max(axis=0)
+    bottom = points[:, 1].min()
     outer = count == 1
     free = (soil_sides == 1) & (~outer | (y == top))
     level = points[edges[:, 0], 1] == points[edges[:, 1], 1]
     values = np.select(
-        [free & level & (x < crest), free, outer & (x == 0), outer & (y == 0), outer & (x == right), outer],
+        [free & level & (x < crest), free, outer & (x == 0), outer & (y == bottom), outer & (x == right), outer],
         [CREST, SLOPE, LEFT, BASE, RIGHT, TOP],
         0,
     ).astype(np.int32)
     return edges[values > 0], values[values > 0]
 
 
-def _unstructured(height, crest, base, size, runout, headroom):
+def _unstructured(height, crest, base, size, runout, headroom, depth):
+    if depth > 0:
+        raise InputError(f"depth: got {depth!r} m, expected 0 with kind='gmsh'; use kind='fitted'")
     with gmsh_session():
         try:
             _slope_geometry(height, crest, base, size, runout, headroom)

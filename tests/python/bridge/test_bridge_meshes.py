@@ -66,6 +66,27 @@ def test_slope_has_the_area_and_the_tags_of_its_outline(kind, angle, headroom):
         assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(length)
 
 
+@pytest.mark.parametrize("angle", [45, 63, 90])
+def test_ground_below_the_toe_of_a_slope_is_soil_over_the_whole_length(angle):
+    domain, cell_tags, facet_tags = bridge.slope_mesh(COMM, angle=angle, kind="fitted", runout=1.5, depth=0.7)
+    arrays = bridge.background_arrays(domain, cell_tags, facet_tags)
+    run, right = 1 / np.tan(np.radians(angle)), arrays["points"][:, 0].max()
+    assert areas(arrays)[arrays["cell_tags"] == bridge.SOIL].sum() == pytest.approx(1.1 + run / 2 + 0.7 * right)
+    lengths = {
+        bridge.LEFT: 1.8,
+        bridge.RIGHT: 1.8,
+        bridge.BASE: right,
+        bridge.SLOPE: np.hypot(1, run) + 1.5,
+        bridge.CREST: 1.1,
+    }
+    for tag, length in lengths.items():
+        ends = arrays["points"][arrays["facets"][arrays["facet_tags"] == tag]]
+        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(
+            length, abs=0.1001
+        )  # headroom of a cell
+        assert tag != bridge.BASE or np.all(ends[..., 1] == pytest.approx(-0.7))
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -81,6 +102,8 @@ def test_slope_has_the_area_and_the_tags_of_its_outline(kind, angle, headroom):
         ({"cell_size": 2.0}, "cell_size.*2.0"),
         ({"runout": 0.0}, "runout"),
         ({"headroom": float("nan")}, "headroom"),
+        ({"depth": -0.5}, "depth.*-0.5"),
+        ({"depth": 0.5, "kind": "gmsh"}, "depth.*0.5.*expected 0 with kind='gmsh'"),
         ({"kind": "square"}, "kind.*square"),
     ],
 )

@@ -23,6 +23,7 @@ SMALL = {
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
     "consolidation": "--days 20 --first-step 5 --growth 2 --frames 2",
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
+    "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3",
     "drawdown": "--cell-size 3 --elements P1 --days 4 --factor-times 1",
     "element_test": "--steps 5",
     "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",

@@ -1,0 +1,242 @@
+"""A slope in wide ground: particles everywhere against resting cells that turn into particles where the soil fails.
+
+The elasto-plastic equilibrium under the initial unit weight is found by finite elements. Then the unit weight is raised at once,
+and the slope fails: once with particles in all cells, once with cells that rest as the finite elements that they were.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import process_time
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common.figures import Pictures, save_figure
+from common.files import OutputError
+from common.movie import frame_of
+from common.options import add_count, add_number, check, study_parser
+from common.page import Page
+from common.plots import AXES, SHEAR_STRAIN, WIDTH, paper_style, save_history
+from common.ranks import run_study
+from common.results import open_results
+from common.scenes import scene_of
+from common.slope_case import GRAVITY, add_soil_options, soil_of
+from common.summary import write_summary
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+KINDS = {"particles": "particles everywhere", "coupled": "resting cells and particles"}
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_number(p, "--height", 1.0, "m", "height of the slope", above=0)
+    add_number(p, "--angle", 45.0, "degrees", "inclination of the slope", above=11, at_most=90)
+    add_number(p, "--width", 10.0, "-", "width of the ground, over the height of the slope", above=3)
+    add_number(p, "--depth", 5.0, "-", "depth of the ground below the crest, over the height of the slope", above=1)
+    add_number(p, "--cell-size", 0.1, "m", "side of the squares", above=0)
+    add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
+    add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    add_number(p, "--unit-weight", 60e3, "N/m3", "unit weight under which the slope fails", above=0)
+    add_soil_options(p, dilation_angle=0.0)
+    p.set_defaults(young=100e6)
+    add_number(p, "--damping", 0.1, "-", "local damping", at_least=0, below=1)
+    add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
+    add_count(p, "--frames", 40, "times of the history")
+    add_number(
+        p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
+    )
+    add_number(p, "--displacement", 0.1, "-", "displacement over the cell size above which it does", above=0)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    options = p.parse_args(arguments)
+    check(
+        p,
+        options.dilation_angle <= options.friction_angle,
+        lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, {options.friction_angle:g} degrees",
+    )
+    check(p, options.cell_size <= 0.5 * options.height,
+          lambda: f"--cell-size is {options.cell_size:g}, expected at most half of --height")  # fmt: skip
+    return options
+
+
+# --- 2. The ground, by finite elements and as a model -----------------------------------------------------------------
+
+
+def level_of(a: Namespace) -> float:
+    """Length of the level ground on each side of the slope [m], of whole cells."""
+    run = a.height / np.tan(np.radians(a.angle))
+    return a.cell_size * round(0.5 * (a.width * a.height - run) / a.cell_size)
+
+
+def ground(a: Namespace) -> tuple:
+    """The mesh with its tags: the slope in the middle of the ground."""
+    level = level_of(a)
+    return bridge.slope_mesh(
+        comm, a.height, a.angle, level, a.cell_size, "fitted", runout=level, depth=(a.depth - 1) * a.height
+    )
+
+
+def equilibrium(a: Namespace, mesh: tuple) -> bridge.QuasiStatic:
+    """Finite elements under the initial unit weight; raises InputError where the slope does not carry it."""
+    body, _, facet_tags = bridge.soil_mesh(*mesh, tag=bridge.SOIL)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.roller(bridge.RIGHT, (1, 0)), bridge.fixed(bridge.BASE)]
+    fem = bridge.QuasiStatic(body, soil_of(a), facet_tags, supports, degree=1, solver=bridge.Solver(tolerance=1e-10))
+    fem.solve(bridge.Load(unit_weight=a.initial_unit_weight))
+    if not fem.converged:
+        raise mpm.InputError(f"--initial-unit-weight is {a.initial_unit_weight:g} N/m3, which the slope does not carry")
+    return fem
+
+
+def model_of(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> mpm.Model:
+    """The ground in equilibrium under the initial unit weight, of particles or at rest, under the full one from here on."""
+    model = mpm.Model(bridge.background_mesh(*mesh), fem.laws[0])
+    model.seed(density=a.unit_weight / GRAVITY, per_cell=a.particles_per_cell, cell_tag=bridge.SOIL)
+    for side in (bridge.LEFT, bridge.RIGHT):
+        model.roller(side, normal=(1, 0))
+    model.fix(bridge.BASE)
+    model.set_gravity((0.0, -GRAVITY * a.initial_unit_weight / a.unit_weight))
+    bridge.initialise(model, fem, count_displacement=False, resting=resting)
+    model.set_gravity((0.0, -GRAVITY))
+    return model
+
+
+# --- 3. The slide ----------------------------------------------------------------------------------------------------
+
+
+def cells_near(model: mpm.Model, place: np.ndarray, reach: float) -> np.ndarray:
+    """Numbers over all ranks of the soil cells whose centres are near a place."""
+    mesh, n = model.mesh, model.mesh.owned_cells
+    centres = mesh.points[mesh.cells[:n]].mean(axis=1)
+    near = (np.linalg.norm(centres - place, axis=1) < reach) & (mesh.cell_tags[:n] == bridge.SOIL)
+    return np.concatenate(comm.allgather(mesh.global_cells[:n][near]))
+
+
+def displacement_of(model: mpm.Model, cells: np.ndarray, per_cell: int) -> float:
+    """Mean displacement [m] of the soil that was in some cells at the start: numbers of particles tell theirs."""
+    p = model.particles
+    rows = np.isin(p.id // per_cell, cells)
+    sums = comm.allreduce(np.append((p.mass[:, None] * p.displacement)[rows].sum(axis=0), p.mass[rows].sum()))
+    return float(np.linalg.norm(sums[:2]) / sums[2])
+
+
+def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> dict:
+    """Slide to the end; history, time and the last frame."""
+    model = model_of(a, mesh, fem, resting)
+    run = a.height / np.tan(np.radians(a.angle))
+    level = level_of(a)
+    places = {"crest": np.array([level, a.height]), "toe": np.array([level + run, 0.0])}
+    cells = {name: cells_near(model, place, 2 * a.cell_size) for name, place in places.items()}
+    conversion = mpm.Conversion(plastic_strain=a.plastic_strain, displacement=a.displacement)
+    rows, seconds, started = [(0.0, 0.0, 0.0, 0.0)], 0.0, process_time()
+    for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, conversion=conversion):
+        seconds += process_time() - started
+        moved = [displacement_of(model, cells[name], a.particles_per_cell) for name in ("crest", "toe")]
+        rows.append(
+            (report.time, *moved, report.converted_cells / max(1, report.converted_cells + report.resting_cells))
+        )
+        started = process_time()
+    if comm.rank == 0:
+        print(f"{KINDS['coupled' if resting else 'particles']}: crest {rows[-1][1]:.4f} m, toe {rows[-1][2]:.4f} m, "
+              f"{seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
+    p = model.particles
+    corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6)
+    frame = frame_of(
+        model,
+        report.time,
+        {"position": p.position, "shear_strain": p.plastic_strain, "resting": p.is_resting, "corners": corners},
+    )
+    return {
+        "history": np.array(rows),
+        "seconds": seconds,
+        "report": report,
+        "frame": frame,
+        "scene": scene_of(model, [bridge.SOIL]),
+    }
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def save_kinds(path: Path, run: dict) -> None:
+    """Resting cells as triangles and particles as points, coloured by plastic shear strain."""
+    frame, rest = run["frame"], run["frame"]["resting"].astype(bool)
+    strain = frame["shear_strain"]
+    norm = Normalize(0, max(1e-6, float(np.quantile(strain, 0.99))))
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(WIDTH, 0.62 * WIDTH), constrained_layout=True)
+        corners = frame["corners"].reshape(-1, 3, 2)[rest]
+        axes.add_collection(PolyCollection(corners, facecolor="#e9e2d8", edgecolor="#b8ab98", linewidth=0.25))
+        x, y = frame["position"][~rest].T
+        dots = axes.scatter(x, y, c=strain[~rest], s=1.2, lw=0, norm=norm, cmap=SHEAR_STRAIN.colours)
+        axes.set(aspect="equal", xlabel=AXES[0], ylabel=AXES[1], title=f"$t$ = {frame['time']:.2f} s")
+        axes.autoscale_view()
+        figure.colorbar(dots, ax=axes, shrink=0.7, label=SHEAR_STRAIN.label)
+        save_figure(figure, path)
+
+
+def drawn(runs: dict[str, dict], folder: Path) -> Pictures:
+    """Crest and toe over time for both, the converted part of the cells, and both kinds of cells at the end."""
+    time = runs["particles"]["history"][:, 0]
+    curves = {f"{name}, {KINDS[kind]}": run["history"][:, column] for column, name in ((1, "crest"), (2, "toe"))
+              for kind, run in runs.items()}  # fmt: skip
+    highest = max(curve.max() for curve in curves.values())
+    converted = 100 * runs["coupled"]["history"][:, 3]
+    return {
+        "displacement": lambda: save_history(folder / "displacement.png", time, curves, "Displacement [m]",
+                                             limits=(0, 1.08 * highest)),
+        "converted": lambda: save_history(folder / "converted.png", time, {"cells that have turned into particles": converted},
+                                          "Part of all cells [%]", limits=(0, max(1.0, 1.1 * converted.max()))),
+        "cells": lambda: save_kinds(folder / "cells.png", runs["coupled"]),
+    }  # fmt: skip
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    folder = open_results(a, comm)
+    mesh = ground(a)
+    fem = equilibrium(a, mesh)
+    runs = {kind: slide(a, mesh, fem, kind == "coupled") for kind in KINDS}
+    last = {kind: run["history"][-1] for kind, run in runs.items()}
+    report = runs["coupled"]["report"]
+    summary = {
+        **{f"{place}_displacement_m_{kind}": last[kind][column] for column, place in ((1, "crest"), (2, "toe")) for kind in KINDS},
+        "relative_difference_of_crest": abs(last["coupled"][1] / last["particles"][1] - 1),
+        "relative_difference_of_toe": abs(last["coupled"][2] / last["particles"][2] - 1),
+        "converted_fraction": last["coupled"][3],
+        "soil_cells": report.resting_cells + report.converted_cells,
+        **{f"slide_seconds_{kind}": run["seconds"] for kind, run in runs.items()},
+        "ratio_of_seconds": runs["coupled"]["seconds"] / runs["particles"]["seconds"],
+        "particle_steps": {kind: run["report"].particle_steps for kind, run in runs.items()},
+    }  # fmt: skip
+    captions = {
+        "displacement": "Displacement of the soil at crest and toe", "converted": "Cells that have turned into particles",
+        "cells": "Resting cells (triangles) and particles at the end",
+    }  # fmt: skip
+    write_summary(folder, a, summary, comm, Page(captions=captions), drawn(runs, folder))
+    if comm.rank == 0:
+        print(f"crest {summary['relative_difference_of_crest']:.1%} and toe {summary['relative_difference_of_toe']:.1%} apart, "
+              f"in {summary['ratio_of_seconds']:.0%} of the time; {summary['converted_fraction']:.0%} of the cells turned into "
+              f"particles; results in {folder}")  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)
