@@ -10,11 +10,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tomllib
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
+import tomllib
 from mpi4py import MPI
 
 import fenics_bridge as bridge
