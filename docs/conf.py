@@ -28,6 +28,9 @@ if MATHJAX.is_dir():
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+# Signatures show these names, not what they stand for.
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "Law", "Laws", "MeshTags", "OfPosition", "Surface")}
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 
