@@ -67,7 +67,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(
         p,
         options.dilation_angle <= options.friction_angle,
-        lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, {options.friction_angle:g} degrees",
+        lambda: f"--dilation-angle is {options.dilation_angle:g}, expected at most --friction-angle, "
+        f"{options.friction_angle:g} degrees",
     )
     check(p, options.cell_size <= 0.5 * options.height,
           lambda: f"--cell-size is {options.cell_size:g}, expected at most half of --height")  # fmt: skip
@@ -217,7 +218,11 @@ def main(arguments: list[str] | None = None) -> int:
     last = {kind: run["history"][-1] for kind, run in runs.items()}
     report = runs["coupled"]["report"]
     summary = {
-        **{f"{place}_displacement_m_{kind}": last[kind][column] for column, place in ((1, "crest"), (2, "toe")) for kind in KINDS},
+        **{
+            f"{place}_displacement_m_{kind}": last[kind][column]
+            for column, place in ((1, "crest"), (2, "toe"))
+            for kind in KINDS
+        },
         "relative_difference_of_crest": abs(last["coupled"][1] / last["particles"][1] - 1),
         "relative_difference_of_toe": abs(last["coupled"][2] / last["particles"][2] - 1),
         "converted_fraction": last["coupled"][3],
