@@ -18,6 +18,7 @@ from typing import Any
 
 from common.animation import film_frames, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
+from common.ensemble import Ensemble, further_members
 from common.figures import Pictures
 from common.files import OutputError
 from common.history import History
@@ -89,6 +90,7 @@ def parser() -> ArgumentParser:
     add_picture_options(p)
     add_number(p, "--rebalance", 1.2, "-", "repartition the mesh above this load imbalance: maximum over mean particles per rank",
                above=1)  # fmt: skip
+    add_count(p, "--ensemble", 1, "runs from starts that differ by round-off, whose mean and scatter are reported")
     add_checkpoint_options(p)
     add_site_option(p)
     add_strength_factor(p)
@@ -111,6 +113,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
             lambda: f"--integration is {options.integration}, expected particles with --paper",
         )
         options.initial, options.dt = "zero", 1e-4
+    check(p, options.ensemble == 1 or (options.restart is None and options.site is None),
+          lambda: f"--ensemble is {options.ensemble}, expected 1 with --restart or --site")  # fmt: skip
     check_scheme_options(p, options)
     check_restart(p, options, MAY_CHANGE)
     return options
@@ -259,6 +263,7 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
         "figure_4_shear_strain": "Accumulated plastic shear strain at the end",
         "figure_5_vertical_stress": "Vertical stress at the end", "figure_6_crest": "Displacement of the crest over time",
         "figure_7_excess_pore_pressure": "Excess pore pressure at the end",
+        "figure_8_ensemble": "Displacement of the crest in all runs of the ensemble",
     }  # fmt: skip
     facts = {
         "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",
@@ -307,11 +312,31 @@ def main(arguments: list[str] | None = None) -> int:
         loop["stopped"] = loop["stopped"] or files.failure
         clock["slide"] = perf_counter()
         summary = summarised(case, start, loop, history, clock)
+        ensemble = run_ensemble(case, history, loop, interrupt)
+        if ensemble is not None:
+            summary["ensemble"] = ensemble.summary()
         frames, scene = watch.frames(), case.scene()
-        write_summary(folder, a, summary, comm, page(case, frames, summary), drawn(a, scene, frames, history, folder))
+        pictures = drawn(a, scene, frames, history, folder)
+        if ensemble is not None and pictures:
+            pictures = {**pictures, **ensemble.pictures(folder)}
+        write_summary(folder, a, summary, comm, page(case, frames, summary), pictures)
     if comm.rank == 0:
         print_summary(summary, folder)
+        if ensemble is not None:
+            print(ensemble.text(), flush=True)
     return interrupt.exit_code or (1 if loop["stopped"] else 0)
+
+
+def run_ensemble(case: SlopeCase, history: History, loop: dict, interrupt: Interrupt) -> Ensemble | None:
+    """The further members that are asked for; None without, or where a member is missing. Collective."""
+    if case.args.ensemble == 1 or loop["stopped"]:
+        return None
+    try:
+        found = further_members(case, history, interrupt.requested)
+    except mpm.RunError as error:
+        loop["stopped"] = f"a member of the ensemble ended early: {error}"
+        return None
+    return None if interrupt.requested() else found
 
 
 def summarised(case: SlopeCase, start: dict, loop: dict, history: History, clock: dict[str, float]) -> dict:

@@ -124,3 +124,23 @@ def test_ctrl_c_ends_cleanly(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert not summary["finished_run"] and summary["time_s"] < 1000
     assert all((tmp_path / name).exists() for name in FILES)
+
+
+def test_an_ensemble_tells_how_far_results_scatter(tmp_path):
+    result = slope(tmp_path, "--ensemble", "3", "--initial", "zero", "--particles-per-cell", "3", "--time", "1", "--frames", "4",
+                   "--no-film")  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    ensemble = summary["ensemble"]
+    assert ensemble["members"] == 3 and "3 members" in result.stdout
+    assert (tmp_path / "figure_8_ensemble.png").stat().st_size > 0
+    for name in ("crest_displacement_m", "runout_m"):
+        mean, scatter = (ensemble[name][key] for key in ("mean", "standard_deviation"))
+        # Members begin with round-off between them, so they are neither equal nor far apart.
+        assert 0 < scatter < 0.05 * mean
+        assert abs(mean - summary[name]) < 3 * scatter
+
+
+def test_an_ensemble_does_not_go_with_a_restart(tmp_path):
+    result = slope(tmp_path, "--ensemble", "2", "--site", "meshes/embankment.toml")
+    assert result.returncode == 2 and "--ensemble is 2, expected 1" in result.stderr
