@@ -37,10 +37,6 @@ namespace model
 {
 using namespace contact;
 }
-namespace io
-{
-using namespace transfer;
-}
 namespace explicit_scheme
 {
 using namespace model;
@@ -52,6 +48,5 @@ using namespace explicit_scheme;
 namespace python
 {
 using namespace implicit;
-using namespace io;
-} // namespace python
+}
 } // namespace mpm

@@ -3,7 +3,6 @@
 /// NumPy arrays in and out, with errors that name the argument.
 
 #include "base/types.h"
-#include "io/series_file.h"
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -64,21 +63,5 @@ template <class T, class Allocator>
 py::array_t<T> copied(const std::vector<T, Allocator>& values)
 {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
-}
-
-/// A new array with a copy of a field, (n,) for numbers, (n, k) for vectors, tensors and states.
-template <class T>
-py::array_t<T> copied_field(const OutputField& field)
-{
-  const std::size_t width = field.columns.size();
-  std::vector<std::size_t> shape{field.rows};
-  if (width > 1 || field.name == "state")
-    shape.push_back(width);
-  py::array_t<T> array(shape);
-  T* out = array.mutable_data();
-  for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t row = 0; row < field.rows; ++row)
-      out[row * width + k] = static_cast<T>(field.columns[k][row]);
-  return array;
 }
 } // namespace mpm::python

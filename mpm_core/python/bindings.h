@@ -15,7 +15,6 @@ void bind_python_law(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_contacts(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
-void bind_io(pybind11::module_& m);
 void bind_checkpoints(pybind11::module_& m);
 
 /// The communicator at an address that mpi4py gives (`MPI._addressof(comm)`).

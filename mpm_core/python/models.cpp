@@ -222,7 +222,14 @@ void bind_model(py::module_& m, const std::string& suffix)
                     return entries;
                   })
       .def("column", &column<G>)
-      .def("single_precision", &single_precision<G>)
+      .def("copied_fields", &copied_fields<G>)
+      .def("require_fields",
+           [](const M& model, const std::vector<std::string>& particles, const std::vector<std::string>& nodes)
+           {
+             for_each_view(model.particles, particles, [](auto&&...) {});
+             for (const std::string& name : nodes)
+               require_nodal_field(model, name);
+           })
       .def("row_numbers", &row_numbers<G>)
       .def("find_rows", &find_rows<G>)
       .def("set_column", &set_column<G>)

@@ -13,6 +13,5 @@ PYBIND11_MODULE(_core, m)
   mpm::python::bind_models(m);
   mpm::python::bind_contacts(m);
   mpm::python::bind_implicit(m);
-  mpm::python::bind_io(m);
   mpm::python::bind_checkpoints(m);
 }

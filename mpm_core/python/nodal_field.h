@@ -2,8 +2,8 @@
 /// @file
 /// Nodal fields of a model by name.
 
-#include "io/series.h"
 #include "model/model.h"
+#include "python/field_views.h"
 
 namespace mpm::python
 {
@@ -48,7 +48,7 @@ void require_nodal_field(const Model<G>& model, const std::string& name)
 /// A nodal field of the last step, where it is.
 /// @throws InputError for a name that no nodal field has, and before the first step
 template <class G, int D = G::dim>
-OutputField nodal_field(const Model<G>& model, const std::string& name, std::size_t velocity_field = 0)
+FieldView nodal_field(const Model<G>& model, const std::string& name, std::size_t velocity_field = 0)
 {
   require_nodal_field(model, name);
   if (velocity_field >= model.fields.size())
@@ -57,13 +57,13 @@ OutputField nodal_field(const Model<G>& model, const std::string& name, std::siz
   const VelocityField<G>& nodes = model.fields[velocity_field];
   if (!model.ready)
     throw InputError("nodal values of '" + name + "' are there only after a step or a report");
-  OutputField found{name, nodes.nodes.size(), {}};
+  FieldView found{name, nodes.nodes.size(), {}};
   for_each_nodal_field(nodes,
                        [&](const Field& field, const double* first, std::size_t components, std::size_t bytes_apart)
                        {
                          if (field.name == name)
                            for (std::size_t k = 0; k < components; ++k)
-                             found.columns.push_back({first + k, bytes_apart / sizeof(double)});
+                             found.components.push_back({first + k, bytes_apart / sizeof(double)});
                        });
   return found;
 }

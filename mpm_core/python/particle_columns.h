@@ -2,9 +2,8 @@
 /// @file
 /// Fields of particles by name, as NumPy arrays.
 
-#include "io/particle_fields.h"
 #include "model/model.h"
-#include "python/arrays.h"
+#include "python/field_views.h"
 
 #include <pybind11/stl.h>
 
@@ -164,24 +163,22 @@ py::object column(const Model<G>& model, const std::string& name, const ChosenRo
   return copy;
 }
 
-/// Copies of fields by name, real ones in single precision; the position is always there.
-/// @throws InputError for a field that does not exist
+/// Copies of fields by name, real ones in single or double precision; the position is always there.
+/// @throws InputError for a field that does not exist, or that no particle carries
 template <class G, int D = G::dim>
-py::dict single_precision(const Model<G>& model, const std::vector<std::string>& names)
+py::dict copied_fields(const Model<G>& model, const std::vector<std::string>& names, bool single)
 {
-  const ParticleFields fields = particle_fields<D>(model.particles, names);
   py::dict copies;
-  copies["position"] = copied_field<float>(fields.position);
-  for (const OutputField& field : fields.fields)
-    copies[py::str(field.name)] = copied_field<float>(field);
-  for (const OutputIndexField& field : fields.index_fields)
-    copies[py::str(field.name)] = std::visit(
-        [](const auto& values) -> py::object
-        {
-          using T = typename std::remove_cvref_t<decltype(values)>::value_type;
-          return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
-        },
-        field.values);
+  for_each_view(model.particles, names,
+                [&](const std::string& name, const auto& view)
+                {
+                  if constexpr (std::is_same_v<std::remove_cvref_t<decltype(view)>, IndexView>)
+                    copies[py::str(name)] = copied_field(view);
+                  else if (single)
+                    copies[py::str(name)] = copied_field<float>(view);
+                  else
+                    copies[py::str(name)] = copied_field<double>(view);
+                });
   return copies;
 }
 

@@ -11,7 +11,7 @@ import mpm_core as mpm
 from mpm_core import InputError, RunError
 
 
-@pytest.mark.parametrize("some", [1, 200_000])  # in files that ranks put together in memory, and in longer ones
+@pytest.mark.parametrize("some", [1, 200_000])
 def test_shares_are_stored_by_rising_rank(comm, shared_path, some):
     # Rank r has r times some particles, so the first has none; in the second frame all have twice as many, in the third none has
     # any. In the last two there are as many as in the first, where other ranks have them, and the same again.
@@ -105,7 +105,7 @@ def test_wrong_fields_of_a_model_are_named_before_files_are_made(comm, shared_pa
     if comm.size > 1:
         names = ["mass"] if comm.rank == 0 else ["velocity"]
         wrong.append(
-            ({"mesh": mesh, "nodal_fields": names}, "fields are not the same on all ranks; here: .*;" + names[0])
+            ({"mesh": mesh, "nodal_fields": names}, "fields are not the same on all ranks; here: .*nodal " + names[0])
         )
     for arguments, message in wrong:
         with pytest.raises(InputError, match=message):
@@ -136,6 +136,8 @@ def test_a_model_is_written_on_after_one_of_its_files_could_not_be(comm, shared_
                 comm.barrier()
                 with pytest.raises(RunError, match=f"cannot (write|create) .*/{refused}/000002.h5"):
                     output.write()
+                if comm.rank == 0:
+                    (shared_path / refused / "000002.h5").rmdir()
             else:
                 output.write()
     for series in (refused, other):
@@ -143,8 +145,7 @@ def test_a_model_is_written_on_after_one_of_its_files_could_not_be(comm, shared_
             reader.read_points_cells()
             read = [reader.read_data(k) for k in range(reader.num_steps)]
         times = [time for time, *_ in read]
-        # A compressed file fails before any is named, so that neither has this frame.
-        expected = [0.01, 0.02, 0.04] if series == refused or compression else [0.01, 0.02, 0.03, 0.04]
+        expected = [0.01, 0.02, 0.04] if series == refused else [0.01, 0.02, 0.03, 0.04]
         np.testing.assert_allclose(times, expected)
         for time, data, _ in read:  # free fall
             assert data["velocity"][:, 1].min() == pytest.approx(-9.81 * time, rel=1e-5)

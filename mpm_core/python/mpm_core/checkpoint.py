@@ -7,10 +7,13 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from . import _core, partition
 from ._core import InputError, RunError
+from .checkpoint_file import Arrays, CheckpointFile, Column, write_file
 from .collective import collectively
 from .contact import require_surfaces, set_contacts
 from .description import parsed
@@ -20,11 +23,22 @@ from .step_control import StepControl
 if TYPE_CHECKING:
     from .model import Model
 
+_OWNED_CELLS = "owned_cells"
+"""Table of the cells that each rank owns, where the mesh has been repartitioned: a restart can then have the same partition."""
+
 
 def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
     text = collectively(model.comm, lambda: _text(_description(model), notes))
-    _core.save(model._core, os.fspath(path), text, model.repartitions > 0)
+    groups = _core.checkpoint_arrays(model._core)
+    if model.repartitions > 0:
+        groups["cells"][_OWNED_CELLS] = _own_cells(model).astype(np.float64)
+    write_file(os.fspath(path), model.comm, text, groups)
+
+
+def _own_cells(model: Model) -> NDArray[np.int64]:
+    """Numbers over all ranks of the cells that this rank owns."""
+    return model.mesh.global_cells[: model.mesh.owned_cells]
 
 
 def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
@@ -51,7 +65,8 @@ def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.CO
         Collective.
     """
     name = os.fspath(path)
-    return parsed(name, _core.checkpoint_description(MPI._addressof(comm), name))
+    with CheckpointFile(name, comm) as file:
+        return parsed(name, file.description())
 
 
 def restore(model: Model, path: str | os.PathLike[str]) -> None:
@@ -61,22 +76,56 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     here = _description(model)
     collectively(model.comm, lambda: _compare(name, there, here))
     collectively(model.comm, lambda: require_surfaces(model, there.get("contacts", [])))
-    if there.get("cuts") and there["ranks"] == model.comm.size:
-        cells = _core.checkpoint_cells(MPI._addressof(model.comm), name)
-        if not partition.is_partition(model, cells):
-            raise RunError(f"cannot read /cells/owned_cells in {name}: it has not each cell of the mesh once")
-        partition.take_partition(model, cells)
-        model.repartitions = there["cuts"]
-    for field in there.get("added_fields", []):
-        if field["name"] not in {known["name"] for known in model.particles.schedule()}:
-            model.add_field(**field)
-    before = _replace_contacts(model, there.get("contacts", []))
-    try:
-        _core.restore(model._core, name)
-    except RunError:
-        _replace_contacts(model, before)
-        raise
+    with CheckpointFile(name, model.comm) as file:
+        if there.get("cuts") and there["ranks"] == model.comm.size:
+            _take_partition(model, file, name)
+            model.repartitions = there["cuts"]
+        for field in there.get("added_fields", []):
+            if field["name"] not in {known["name"] for known in model.particles.schedule()}:
+                model.add_field(**field)
+        before = _replace_contacts(model, there.get("contacts", []))
+        try:
+            _core.restore(model._core, *_state(model, file), name)
+        except RunError:
+            _replace_contacts(model, before)
+            raise
     _take(model, there)
+
+
+def _take_partition(model: Model, file: CheckpointFile, path: str) -> None:
+    """Give the model's mesh the partition that it had in a run on as many ranks."""
+    array = f"cells/{_OWNED_CELLS}"
+    cells = file.rows(array, file.own_rows(_OWNED_CELLS, array))
+    numbers = np.where(np.abs(cells) < 2**53, cells, -1).astype(np.int64)  # also where it is no number
+    if not partition.is_partition(model, numbers):
+        raise RunError(f"cannot read /{array} in {path}: it has not each cell of the mesh once")
+    partition.take_partition(model, numbers)
+
+
+def _state(model: Model, file: CheckpointFile) -> tuple[Arrays, Arrays, Arrays, bool]:
+    """Particles, cells and totals for `_core.restore`, and whether each rank has the cells of the same rank of the file."""
+    comm, none = model.comm, np.empty(0, np.int64)
+    columns = {
+        field["name"]: Column(
+            field["components"], model._core.column(field["name"], none).dtype.kind == "i", field["optional"]
+        )
+        for field in model.particles.schedule()
+    }
+    widths = _core.checkpoint_widths(model._core)
+    n_ranks, n = file.length("ranks/rows_of_particles"), file.length("particles/id")
+    same = n_ranks == comm.size
+    if same:
+        particles = file.particles(columns, file.own_rows("particles", "particles/id"))
+        same = comm.allreduce(int(np.isin(particles["cell"], _own_cells(model)).all()), MPI.MIN) == 1
+    if same:
+        return (
+            particles,
+            file.cells(widths["cells"]),
+            file.totals(widths["ranks"], slice(comm.rank, comm.rank + 1)),
+            True,
+        )
+    equal_part = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
+    return file.particles(columns, equal_part), {}, file.totals(widths["ranks"], slice(0, n_ranks)), False
 
 
 def _replace_contacts(model: Model, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:

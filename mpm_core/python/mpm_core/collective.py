@@ -1,34 +1,52 @@
 """Errors that are raised on all ranks alike."""
 
+import os
 from collections.abc import Callable
 from typing import TypeVar
 
 from mpi4py import MPI
 
-from ._core import InputError
+from ._core import InputError, RunError
 
 T = TypeVar("T")
 
 
-def collectively(comm: MPI.Comm, work: Callable[[], T]) -> T:
+def collectively(comm: MPI.Comm, work: Callable[[], T], kind: type[Exception] = InputError) -> T:
     """Run ``work`` on each rank. An error of one rank is raised on all of them, so that no rank waits for another.
 
     Raises:
-        InputError: that of the lowest rank with an error; on several ranks the message names the rank.
+        kind: that of the lowest rank with an error; where the errors differ the message names the rank.
     """
     error: str | None = None
     result = None
     try:
         result = work()
-    except InputError as exc:
+    except kind as exc:
         error = str(exc)
     if comm.size == 1:
         if error is not None:
-            raise InputError(error)
+            raise kind(error)
         return result  # type: ignore[return-value]
     errors = comm.allgather(error)
     for rank, message in enumerate(errors):
         if message is not None:
             alike = all(other == message for other in errors)
-            raise InputError(message if alike else f"{message} (on rank {rank})")
+            raise kind(message if alike else f"{message} (on rank {rank})")
     return result  # type: ignore[return-value]
+
+
+def on_first_rank(comm: MPI.Comm, path: str | os.PathLike[str], work: Callable[[], object]) -> None:
+    """Run ``work``, which writes a file, on the first rank.
+
+    Raises:
+        RunError: on all ranks, with the path of the error, or the given one, and the reason why the system refused.
+    """
+    failure: str | None = None
+    if comm.rank == 0:
+        try:
+            work()
+        except OSError as error:
+            failure = f"cannot write {error.filename or os.fspath(path)}: {error.strerror}"
+    failure = comm.bcast(failure)
+    if failure is not None:
+        raise RunError(failure)

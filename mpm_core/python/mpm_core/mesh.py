@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .collective import collectively
-from .rows import found
+from .rows import found, requested
 
 Tag = int | str | Sequence[int | str]
 """A tag by its number or name, or several of them."""
@@ -137,7 +137,7 @@ class Mesh:
         """Number of each cell over all ranks, shape (cells,); it does not depend on the partition."""
         self.cell_numbers: int = 1 + comm.allreduce(int(self.global_cells.max(initial=-1)), MPI.MAX)
         """Highest number of a cell over all ranks, plus one."""
-        self._carriers: WeakKeyDictionary[Mesh, _core.RowCarrier] = WeakKeyDictionary()
+        self._places: WeakKeyDictionary[Mesh, tuple[NDArray[np.int64], NDArray[np.int64]]] = WeakKeyDictionary()
         self._tags = {
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
@@ -180,23 +180,24 @@ class Mesh:
         if other is self:
             return array
         rows = array.reshape(len(array), *array.shape[1:] or [1])
-        return self._carrier_from(other).carry(rows).reshape(len(self.points), *array.shape[1:])
+        if other not in self._places:
+            self._places[other] = self._places_of(other)
+        ranks, places = self._places[other]
+        return requested(self.comm, ranks, places, lambda asked: rows[asked[:, 0]]).reshape(-1, *array.shape[1:])
 
-    def _carrier_from(self, other: "Mesh") -> _core.RowCarrier:
-        """Transfer of nodal values from the same mesh under another partition to the nodes of this one. Collective."""
-        if other not in self._carriers:
-            known = np.unique(other.cells[: other.owned_cells])
-            ranks, rows = found(self.comm, other.global_nodes[known], known, self.global_nodes)
+    def _places_of(self, other: "Mesh") -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Ranks and rows, (nodes,) and (nodes, 1), at which the same mesh under another partition has these nodes. Collective."""
+        known = np.unique(other.cells[: other.owned_cells])
+        ranks, rows = found(self.comm, other.global_nodes[known], known, self.global_nodes)
 
-            def require_all() -> None:
-                if absent := self.global_nodes[ranks < 0].tolist():
-                    raise InputError(
-                        f"other is a mesh without node {absent[0]}, expected this mesh under another partition"
-                    )
+        def require_all() -> None:
+            if absent := self.global_nodes[ranks < 0].tolist():
+                raise InputError(
+                    f"other is a mesh without node {absent[0]}, expected this mesh under another partition"
+                )
 
-            collectively(self.comm, require_all)
-            self._carriers[other] = _core.RowCarrier(MPI._addressof(self.comm), ranks, rows)
-        return self._carriers[other]
+        collectively(self.comm, require_all)
+        return ranks, rows[:, None]
 
     def tags_of(self, kind: str, given: Tag) -> tuple[int, ...]:
         """The tags of cells or facets (``kind``) that are meant by a number, a name or a sequence of them.

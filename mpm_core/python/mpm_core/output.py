@@ -1,4 +1,4 @@
-"""Particles and background mesh over time, in HDF5 files that all ranks write together, with XDMF files beside them.
+"""Particles and background mesh over time, in HDF5 files with XDMF files beside them; the first rank writes for all.
 
 ParaView, VTK and meshio open the file ``PATH.xdmf``, also while the run goes on and after it was killed. Each frame is a file of
 its own in the folder ``PATH``, ``000012.h5`` and so on, with a dataset for each field, which h5py reads directly; the XDMF file
@@ -13,21 +13,22 @@ as they are. Names consist of letters, digits, ``_`` and ``-``.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from types import TracebackType
 from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
-from . import _core
-from ._core import InputError
+from ._core import Geometry, InputError, RunError
 from .collective import collectively
 from .model import Model
+from .series import Series, padded
 
-T = TypeVar("T")
-Fields = list[tuple[str, np.ndarray]]
+Arrays = Mapping[str, np.ndarray]
+T = TypeVar("T", bound="_Output")
 
 PARTICLE_FIELDS = (
     "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
@@ -37,12 +38,27 @@ PARTICLE_FIELDS = (
 NODAL_FIELDS = ("mass", "velocity", "internal_force")
 """Fields that are written of its nodes."""
 
-# What a rank hands over whose fields are refused.
-NO_FIELDS: tuple[Fields, Fields] = ([], [])
-NO_PARTICLES: tuple[np.ndarray, Fields, Fields] = (np.empty((0, 2)), [], [])
+
+class _Output:
+    """What outputs of one series have in common: a context manager that closes it."""
+
+    def __init__(self, series: Series) -> None:
+        self._series = series
+
+    def close(self) -> None:
+        """Nothing can be written after that."""
+        self._series.close()
+
+    def __enter__(self: T) -> T:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
-class ParticleOutput:
+class ParticleOutput(_Output):
     """Frames of particles; a context manager.
 
     Example:
@@ -67,8 +83,9 @@ class ParticleOutput:
     def __init__(
         self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
     ) -> None:
-        self._alone = comm.size == 1
-        self._series = _core.ParticleSeries(MPI._addressof(comm), os.fspath(path), float32, _level(compression))
+        super().__init__(Series(path, comm, "particles", float32, compression))
+        self._vertices: tuple[int, str] = (-1, "")  # as many as there are, and where they are stored
+        self._out_of_plane = "zz"
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
         """Write one frame, which is on disk when this returns.
@@ -85,24 +102,24 @@ class ParticleOutput:
                 expected.
             RunError: the frame cannot be written.
         """
-        found, failure = _tried(lambda: _particle_fields(fields), NO_PARTICLES)
-        self._series.write(float(time), *found, failure)
+        arrays, counts = _agreed(self._series.comm, lambda: _particle_fields(fields))
+        n, before = sum(counts), sum(counts[: self._series.comm.rank])
+        position = padded(arrays.pop("position"), self._series.real)
+        with self._series.frame(time) as frame:
+            stored, vertices = self._vertices
+            if stored != n:  # they are stored again only when their number changes
+                numbers = np.arange(before, before + len(position), dtype=_narrowest(n))
+                vertices = frame.add_data("vertices", numbers, counts)
+            points = frame.add_data("position", position, counts)
+            frame.add_grid("Polyvertex", vertices, n, 1, points)
+            # Named as a field as well: some readers give the points of the first frame only. It costs no space.
+            frame.describe_field("position", "Node", 3, points)
+            for name, values in arrays.items():
+                frame.add_field(name, "Node", values, counts, self._out_of_plane)
+        self._vertices = (n, vertices)
 
-    def close(self) -> None:
-        """Close the files; nothing can be written after that."""
-        self._series.close()
 
-    def __enter__(self) -> ParticleOutput:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None or self._alone:  # after an error other ranks may not come here; the files are good as they are
-            self.close()
-
-
-class MeshOutput:
+class MeshOutput(_Output):
     """The background mesh, written once, and frames of fields on its nodes and cells; a context manager.
 
     Args:
@@ -134,11 +151,21 @@ class MeshOutput:
         compression: int = 0,
         fixed: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        points, cells, fields = collectively(comm, lambda: (*_checked_mesh(points, cells), _real_fields(fixed or {})))
-        self._alone = comm.size == 1
-        self._series = _core.MeshSeries(
-            MPI._addressof(comm), os.fspath(path), float32, _level(compression), points, cells, fields
-        )
+        points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
+        series = Series(path, comm, "mesh", float32, compression)
+        super().__init__(series)
+        nodes, self._cells = comm.allgather(len(points)), comm.allgather(len(cells))
+        self._nodes = nodes
+        fields, _ = _agreed(comm, lambda: _real_fields(fixed or {}, len(cells)))
+        dim, first = points.shape[1], sum(nodes[: comm.rank])
+        numbers = (cells + first).astype(_narrowest(sum(nodes)))
+        with series.single() as frame:
+            topology = frame.add_data("cells", numbers, self._cells)
+            place = frame.add_data("points", padded(points, series.real), nodes)
+            frame.add_grid("Triangle" if dim == 2 else "Tetrahedron", topology, sum(self._cells), dim + 1, place)
+            for name, values in fields.items():
+                frame.add_field(name, "Cell", values, self._cells)
+        self._start = "".join(frame.text)
 
     def write(
         self,
@@ -157,21 +184,15 @@ class MeshOutput:
             InputError: a field is of another length or not numeric.
             RunError: the frame cannot be written.
         """
-        found, failure = _tried(lambda: (_real_fields(node_fields or {}), _real_fields(cell_fields or {})), NO_FIELDS)
-        self._series.write(float(time), *found, failure)
-
-    def close(self) -> None:
-        """Close the files; nothing can be written after that."""
-        self._series.close()
-
-    def __enter__(self) -> MeshOutput:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None or self._alone:  # after an error other ranks may not come here; the files are good as they are
-            self.close()
+        comm = self._series.comm
+        n, m = self._nodes[comm.rank], self._cells[comm.rank]
+        at_nodes, _ = _agreed(comm, lambda: _real_fields(node_fields or {}, n))
+        in_cells, _ = _agreed(comm, lambda: _real_fields(cell_fields or {}, m)) if cell_fields else ({}, [])
+        with self._series.frame(time, self._start) as frame:
+            for name, values in at_nodes.items():
+                frame.add_field(name, "Node", values, self._nodes)
+            for name, values in in_cells.items():
+                frame.add_field(name, "Cell", values, self._cells)
 
 
 class ModelOutput:
@@ -216,23 +237,28 @@ class ModelOutput:
     ) -> None:
         if particles is None and mesh is None:
             raise InputError("particles and mesh are None, expected a path for one of them at least")
-        self._model = model
-        self._start = self._cut = start = model.mesh
-        self._carrier: _core.RowCarrier | None = None
-        self._comm = MPI._addressof(start.comm)
-        self._fields = _core.model_fields(self._comm, model._core, list(particle_fields), list(nodal_fields))
-        own = slice(start.owned_cells)
-        tags = {"tag": start.cell_tags[own]}
+        self._model, self._start = model, model.mesh
+        self._fields, self._nodal = list(particle_fields), list(nodal_fields)
+        self._float32 = float32
+        start = model.mesh
+        _agreed(start.comm, self._checked_names)
         self._outputs: list[ParticleOutput | MeshOutput] = []
-        self._particles, self._mesh = None, None
         if particles is not None:
             particle_output = ParticleOutput(particles, start.comm, float32, compression)
-            self._particles = particle_output._series
+            if model.geometry == Geometry.AXISYMMETRIC:
+                particle_output._out_of_plane = "hoop"
             self._outputs.append(particle_output)
         if mesh is not None:
-            mesh_output = MeshOutput(mesh, start.comm, start.points, start.cells[own], float32, compression, tags)
-            self._mesh = mesh_output._series
-            self._outputs.append(mesh_output)
+            own = slice(start.owned_cells)
+            tags = {"tag": start.cell_tags[own]}
+            self._outputs.append(
+                MeshOutput(mesh, start.comm, start.points, start.cells[own], float32, compression, tags)
+            )
+
+    def _checked_names(self) -> dict[str, np.ndarray]:
+        """The names of all fields, if these exist."""
+        self._model._core.require_fields(self._fields, self._nodal)
+        return dict.fromkeys([*self._fields, *(f"nodal {name}" for name in self._nodal)], np.empty(0))
 
     def write(self, more: Mapping[str, np.ndarray] | None = None) -> None:
         """Write a frame of the model as it is now, which is on disk when this returns.
@@ -245,21 +271,23 @@ class ModelOutput:
                 since the particles were set, without which nodes have no values.
             RunError: the frame cannot be written.
         """
-        (real, whole), failure = (NO_FIELDS, "") if more is None else _tried(partial(_split_fields, more), NO_FIELDS)
-        if self._mesh is not None and self._model.mesh is not self._cut:
-            self._cut = self._model.mesh
-            self._carrier = None if self._cut is self._start else self._start._carrier_from(self._cut)
-        _core.write_model(
-            self._comm,
-            self._model._core,
-            self._fields,
-            self._particles,
-            self._mesh,
-            self._carrier,
-            real,
-            whole,
-            failure,
-        )
+        failures = []
+        for output in self._outputs:
+            try:
+                if isinstance(output, ParticleOutput):
+                    fields = self._model._core.copied_fields(self._fields, self._float32)
+                    output.write(self._model.time, {**fields, **(more or {})})
+                else:
+                    output.write(self._model.time, self._nodal_fields())
+            except RunError as failure:  # the other one may still be written
+                failures.append(failure)
+        if failures:
+            raise failures[0]
+
+    def _nodal_fields(self) -> dict[str, np.ndarray]:
+        """Nodal fields on the mesh as it was at the start. Collective."""
+        model = self._model
+        return {name: self._start.nodal_of(model.mesh, model.nodal(name)) for name in self._nodal}
 
     def close(self) -> None:
         """Close the files; nothing can be written after that."""
@@ -274,18 +302,40 @@ class ModelOutput:
             output.__exit__(*error)
 
 
-def _tried(work: Callable[[], T], otherwise: T) -> tuple[T, str]:
-    """What ``work`` gives, and no failure; or something else, and the message of its InputError, for all ranks to raise."""
+def _agreed(comm: MPI.Comm, check: Callable[[], Arrays]) -> tuple[dict[str, np.ndarray], list[int]]:
+    """Arrays of all ranks by name, whole numbers as wide as any rank needs; and the rows of the first array on each rank.
+
+    Raises:
+        InputError: on all ranks: that of `check` on any rank, or names or components that are not the same on all.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    error = None
     try:
-        return work(), ""
-    except InputError as error:
-        return otherwise, str(error)
+        arrays = dict(check())
+    except InputError as failure:
+        error = str(failure)
+    shapes = [f"{name}:{'x'.join(map(str, values.shape[1:]))}" for name, values in arrays.items()]
+    wide = {name for name, values in arrays.items() if values.dtype.kind == "i" and not _fits(values)}
+    n = len(next(iter(arrays.values()), ()))
+    errors, names, counts, wides = zip(*comm.allgather((error, shapes, n, wide)))
+    if failures := [one for one in errors if one is not None]:
+        raise InputError(failures[0])
+    if any(other != shapes for other in names):
+        raise InputError(f"fields are not the same on all ranks; here: {', '.join(shapes)}")
+    for name, values in arrays.items():
+        if values.dtype.kind == "i":
+            arrays[name] = values.astype(np.int64 if any(name in wide for wide in wides) else np.int32)
+    return arrays, list(counts)
 
 
-def _level(compression: int) -> int:
-    if compression not in range(10):
-        raise InputError(f"compression is {compression}, expected a whole number from 0 to 9")
-    return int(compression)
+def _fits(values: NDArray[np.integer]) -> bool:
+    """Whether whole numbers fit into 32 bits."""
+    limits = np.iinfo(np.int32)
+    return not values.size or bool(limits.min <= values.min() and values.max() <= limits.max)
+
+
+def _narrowest(largest: int) -> type[np.int32] | type[np.int64]:
+    return np.int64 if largest > np.iinfo(np.int32).max else np.int32
 
 
 def _numeric(name: str, values: np.ndarray) -> np.ndarray:
@@ -297,37 +347,40 @@ def _numeric(name: str, values: np.ndarray) -> np.ndarray:
     return array
 
 
-def _real_fields(fields: Mapping[str, np.ndarray]) -> Fields:
-    return [(name, np.ascontiguousarray(_numeric(name, values), np.float64)) for name, values in fields.items()]
+def _checked_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        raise InputError(f"name of a field is '{name}', expected letters, digits, _ and -")
+    return name
 
 
-def _particle_fields(
-    fields: Mapping[str, np.ndarray],
-) -> tuple[np.ndarray, Fields, Fields]:
-    """Position, real fields and fields of whole numbers."""
+def _checked_fields(fields: Arrays, n: int) -> dict[str, np.ndarray]:
+    """Arrays of n rows by name; all whole numbers of one component signed."""
+    arrays = {_checked_name(name): _numeric(name, values) for name, values in fields.items()}
+    for name, values in arrays.items():
+        if values.ndim == 2 and values.shape[1] < 1:
+            raise InputError(f"{name} has 0 components, expected at least 1")
+        if len(values) != n:
+            raise InputError(f"{name} has {len(values)} rows, expected {n}")
+        if values.dtype.kind in "ub":
+            arrays[name] = values.astype(np.int64)
+        elif values.dtype.kind == "i" and values.ndim == 2:
+            arrays[name] = values.astype(np.float64)
+    return arrays
+
+
+def _real_fields(fields: Arrays, n: int) -> dict[str, np.ndarray]:
+    return {name: values.astype(np.float64, copy=False) for name, values in _checked_fields(fields, n).items()}
+
+
+def _particle_fields(fields: Arrays) -> dict[str, np.ndarray]:
+    """The fields of particles, the position first."""
     if "position" not in fields:
         raise InputError(f"fields are {', '.join(fields) or 'none'}, expected 'position' among them")
     position = _numeric("position", fields["position"])
     if position.ndim != 2 or position.shape[1] not in (2, 3):
         raise InputError(f"position has shape {position.shape}, expected (n, 2) or (n, 3)")
     others = {name: values for name, values in fields.items() if name != "position"}
-    for name, values in others.items():
-        if len(_numeric(name, values)) != len(position):
-            raise InputError(f"{name} has {len(values)} rows, expected {len(position)} as position has")
-    return (np.ascontiguousarray(position, np.float64), *_split_fields(others))
-
-
-def _split_fields(
-    fields: Mapping[str, np.ndarray],
-) -> tuple[Fields, Fields]:
-    """Real fields and fields of whole numbers."""
-    others = {name: _numeric(name, values) for name, values in fields.items()}
-    whole = {name: values for name, values in others.items() if values.dtype.kind in "iub" and values.ndim == 1}
-    real = {name: values for name, values in others.items() if name not in whole}
-    return (
-        _real_fields(real),
-        [(name, np.ascontiguousarray(values, np.int64)) for name, values in whole.items()],
-    )
+    return {"position": position, **_checked_fields(others, len(position))}
 
 
 def _checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

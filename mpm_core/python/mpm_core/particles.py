@@ -104,7 +104,7 @@ class Particles:
             InputError: a name that no field has.
         """
         self._require_all("single")
-        return self._core.single_precision(names)
+        return self._core.copied_fields(names, True)
 
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.

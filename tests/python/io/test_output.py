@@ -248,7 +248,7 @@ def test_what_an_earlier_series_left_is_removed(tmp_path):
     assert sorted(p.name for p in (tmp_path / "particles").iterdir()) == ["000000.h5", "000001.h5", "notes.txt"]
 
 
-@pytest.mark.parametrize("some", [1, 20_000])  # in files that are put together in memory, and in longer ones
+@pytest.mark.parametrize("some", [1, 20_000])
 def test_the_same_frames_make_the_same_files(tmp_path, some):
     frames = [particle_fields(n * some, 2, seed=step) for step, n in enumerate((5, 5, 5, 4, 4))]
     for name in ("a", "b"):

@@ -26,8 +26,8 @@ def test_missing_folder_is_named(tmp_path):
         ParticleOutput(tmp_path / "nowhere" / "particles", COMM)
 
 
-@pytest.mark.parametrize("rows", [5000, 400_000])  # a file that is put together in memory, and a longer one
-@pytest.mark.parametrize("growing", [True, False])  # a file made by HDF5, or from the tables of the one before
+@pytest.mark.parametrize("rows", [5000, 400_000])
+@pytest.mark.parametrize("growing", [True, False])
 def test_a_file_that_cannot_be_written_is_named(tmp_path, growing, rows):
     # A limit on the size of files stands for a full disk, which a test cannot make without being root.
     script = f"""
@@ -69,7 +69,7 @@ def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, rows, options)
     frames = [{"position": rng.random((rows, 2)), "velocity": rng.random((rows, 2))} for _ in range(n)]
     with ParticleOutput(small_disk / "particles", COMM, **options) as output:
         written = 0
-        with pytest.raises(RunError, match=r"cannot write .*particles/.*\.h5: No space left on device"):
+        with pytest.raises(RunError, match=r"cannot write .*particles(/.*\.h5|\.xdmf): No space left on device"):
             for written, fields in enumerate(frames):
                 output.write(float(written), fields)
         assert written > 3
@@ -87,20 +87,17 @@ def test_a_full_disk_is_named_and_earlier_frames_stay(small_disk, rows, options)
 
 def test_a_description_that_cannot_be_renewed_leaves_all_as_it_was(tmp_path):
     aside = tmp_path / "particles.xdmf.part"
-    step = 0
     with ParticleOutput(tmp_path / "particles", COMM) as output:
         output.write(0.0, particle_fields(4, 2))
         aside.mkdir()
         with pytest.raises(RunError, match=f"cannot write {aside}: Is a directory"):
-            for step in range(1, 200):
-                output.write(float(step), particle_fields(4, 2))
-        assert step > 3 and len(list((tmp_path / "particles").iterdir())) == step
+            output.write(1.0, particle_fields(4, 2))
+        assert len(list((tmp_path / "particles").iterdir())) == 1
         aside.rmdir()
-        for later in (step, step + 1):
+        for later in (1, 2):
             output.write(float(later), particle_fields(4, 2))
     times = [float(t.get("Value")) for t in ElementTree.parse(tmp_path / "particles.xdmf").iter("Time")]
-    assert times == list(range(step + 2))
-    assert len(list((tmp_path / "particles").iterdir())) == step + 2
+    assert times == [0, 1, 2] and len(list((tmp_path / "particles").iterdir())) == 3
 
 
 GOOD = particle_fields(3, 2)

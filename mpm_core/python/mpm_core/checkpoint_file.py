@@ -1,0 +1,204 @@
+"""The file of a checkpoint. docs/checkpoints.md describes its layout."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ._core import RunError
+from .collective import collectively, on_first_rank
+from .hdf5 import RowsFile
+
+Arrays = dict[str, NDArray[Any]]
+T = TypeVar("T")
+FORMAT = 2
+"""1: checked by a stamp in its first 512 bytes, which is not read any more, and with the description as an attribute"""
+_MAY_LACK = ("energy_", "order_", "converted_", "gained_")
+"""Beginnings of the names of totals that older files do not have"""
+
+
+def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str, Arrays]) -> None:
+    """Write a checkpoint aside, wait until it is on the disk, and rename it; an older file stays until then.
+
+    Args:
+        groups: this rank's rows of arrays, in the groups ``particles``, ``cells`` and ``ranks``; those of ``ranks`` have one.
+
+    Raises:
+        RunError: on all ranks, with path and reason; nothing is left behind.
+
+    Note:
+        Collective.
+    """
+    aside = f"{path}.part"
+    file = RowsFile(aside, comm, checksums=True)
+    file.add_common("format", np.array([FORMAT]))
+    file.add_common("description", np.array([description.encode()]))
+    own = {"particles": len(groups["particles"]["id"]), **{name: len(a) for name, a in groups["cells"].items()}}
+    counts = comm.allgather(own)
+    for name, rows in groups["particles"].items():
+        file.add(f"particles/{name}", rows, [count["particles"] for count in counts])
+    for name, rows in groups["cells"].items():
+        file.add(f"cells/{name}", rows, [count[name] for count in counts])
+    for name, rows in {**groups["ranks"], **{f"rows_of_{k}": np.array([n]) for k, n in own.items()}}.items():
+        file.add(f"ranks/{name}", rows, [1] * comm.size)
+    file.close(durable=True)
+    on_first_rank(comm, path, lambda: _put_in_place(aside, path))
+
+
+def _put_in_place(aside: str, path: str) -> None:
+    try:
+        os.replace(aside, path)
+    except OSError:
+        os.unlink(aside)
+        raise
+    folder = os.open(os.path.dirname(path) or ".", os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)  # the name is on the disk too
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # some file systems cannot
+            raise
+    finally:
+        os.close(folder)
+
+
+class Column(NamedTuple):
+    """What an array of particles must be."""
+
+    width: int
+    whole: bool
+    optional: bool
+
+
+class CheckpointFile:
+    """A checkpoint opened by all ranks, each of which reads what it needs. What the file says of itself is not believed.
+
+    Raises:
+        RunError: on all ranks, here and in each method: the file or an array of it is not there, damaged, or of another kind.
+
+    Note:
+        Collective, as all methods are.
+    """
+
+    def __init__(self, path: str, comm: MPI.Comm) -> None:
+        self._path, self._comm = path, comm
+        self._file: Any = self._tried(None, self._opened)
+
+    def __enter__(self) -> CheckpointFile:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        with suppress(RuntimeError):
+            self._file.close()
+
+    def _tried(self, name: str | None, work: Callable[[], T]) -> T:
+        """Run what concerns an array of the file, or all of it."""
+
+        def run() -> T:
+            try:
+                return work()
+            except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as error:
+                what = f"checkpoint {self._path}" if name is None else f"/{name} in {self._path}"
+                reason = getattr(error, "strerror", None) or (str(error.args[0]) if error.args else str(error))
+                raise RunError(f"cannot read {what}: {reason}") from None
+
+        return collectively(self._comm, run, RunError)
+
+    def _opened(self) -> Any:
+        import h5py  # not where a run reads nothing
+
+        with open(self._path, "rb"):  # the system names what it refuses in plain words
+            pass
+        file = h5py.File(self._path, "r")
+        number = int(file["format"][0]) if "format" in file else 1 if file.userblock_size == 512 else 0
+        if number < 1 or "description" not in (file if number > 1 else file.attrs):
+            raise ValueError("it is not a checkpoint")
+        if number > FORMAT:
+            raise ValueError(f"it has format {number}, this program reads formats 1 to {FORMAT}")
+        return file
+
+    def description(self) -> bytes:
+        """The text of the description, as it is in the file."""
+
+        def read() -> bytes:
+            old = "format" not in self._file
+            text = self._file.attrs["description"] if old else self._file["description"][0]
+            if not isinstance(text, bytes):
+                raise ValueError("its description is no text")
+            return bytes(text)
+
+        return self._tried(None, read)
+
+    def _dataset(self, name: str) -> Any:
+        dataset = self._file[name]
+        claimed, stored = dataset.nbytes, dataset.id.get_storage_size()
+        if claimed > min(stored, os.path.getsize(self._path)):
+            raise ValueError(f"it has {len(dataset)} rows in {claimed} bytes, of which {stored} are stored")
+        return dataset
+
+    def length(self, name: str) -> int:
+        """Number of rows of an array."""
+        return self._tried(name, lambda: len(self._dataset(name)))
+
+    def names(self, group: str) -> set[str]:
+        """Names of the arrays of a group."""
+        return self._tried(group, lambda: set(self._file[group]))
+
+    def rows(self, name: str, rows: slice, width: int = 1, whole: bool = False) -> NDArray[Any]:
+        """This rank's rows of an array of real or whole numbers: (n,), or (n, width)."""
+
+        def read() -> NDArray[Any]:
+            dataset = self._dataset(name)
+            if dataset.dtype != (np.int64 if whole else np.float64):
+                raise ValueError(f"it has the type {dataset.dtype}")
+            if dataset.shape[1:] != (() if width == 1 else (width,)):
+                raise ValueError(f"it has the shape {dataset.shape}, expected {width} number(s) per row")
+            values = np.ascontiguousarray(dataset[rows])
+            if len(values) != rows.stop - rows.start:
+                raise ValueError(f"it has {len(dataset)} rows, expected {rows.stop} at least")
+            return values
+
+        return self._tried(name, read)
+
+    def own_rows(self, name: str, array: str) -> slice:
+        """The rows that the same rank of a run on as many ranks wrote of an array."""
+        counts = self.rows(f"ranks/rows_of_{name}", slice(0, self._comm.size), whole=True)
+        total = self.length(array)
+
+        def check() -> None:
+            if counts.min() < 0 or counts.max() > total or counts.sum() != total:
+                raise ValueError(f"it has the numbers {counts.min()} to {counts.max()}, but {array} has {total} rows")
+
+        self._tried(f"ranks/rows_of_{name}", check)
+        first = int(counts[: self._comm.rank].sum())
+        return slice(first, first + int(counts[self._comm.rank]))
+
+    def particles(self, columns: Mapping[str, Column], rows: slice) -> Arrays:
+        """Fields of the particles in some rows."""
+        there = self.names("particles")
+        return {
+            name: self.rows(f"particles/{name}", rows, column.width, column.whole)
+            for name, column in columns.items()
+            if column.width and (name in there or not column.optional)
+        }
+
+    def totals(self, widths: Mapping[str, int], rows: slice) -> Arrays:
+        """Totals of some ranks."""
+        there = self.names("ranks")
+        names = [name for name in widths if name in there or not name.startswith(_MAY_LACK)]
+        return {name: self.rows(f"ranks/{name}", rows, widths[name]) for name in names}
+
+    def cells(self, widths: Mapping[str, int]) -> Arrays:
+        """Tables of the cells of this rank."""
+        there = self.names("cells")
+        return {
+            name: self.rows(f"cells/{name}", self.own_rows(name, f"cells/{name}"), width)
+            for name, width in widths.items()
+            if name in there
+        }
