@@ -31,18 +31,22 @@ struct FieldView
 using IndexView = std::variant<std::span<const std::int64_t>, std::span<const std::int32_t>>;
 
 /// A new array with a copy of a field, (n,) for numbers, (n, k) for vectors, tensors and states.
+/// @param by_columns  components are stored one after another (Fortran's order) instead of rows
 template <class T>
-py::array_t<T> copied_field(const FieldView& field)
+py::array_t<T> copied_field(const FieldView& field, bool by_columns = false)
 {
-  const std::size_t width = field.components.size();
-  std::vector<std::size_t> shape{field.rows};
+  const std::size_t width = field.components.size(), n = field.rows;
+  std::vector<std::size_t> shape{n};
   if (width > 1 || field.name == "state")
     shape.push_back(width);
-  py::array_t<T> array(shape);
+  const std::size_t row_step = by_columns ? 1 : width, step = by_columns ? n : 1;
+  std::vector<std::size_t> strides{row_step * sizeof(T), step * sizeof(T)};
+  strides.resize(shape.size());
+  py::array_t<T> array(shape, strides);
   T* out = array.mutable_data();
   for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t row = 0; row < field.rows; ++row)
-      out[row * width + k] = static_cast<T>(field.components[k][row]);
+    for (std::size_t row = 0; row < n; ++row)
+      out[row * row_step + k * step] = static_cast<T>(field.components[k][row]);
   return array;
 }
 

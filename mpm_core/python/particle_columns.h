@@ -163,7 +163,7 @@ py::object column(const Model<G>& model, const std::string& name, const ChosenRo
   return copy;
 }
 
-/// Copies of fields by name, real ones in single or double precision; the position is always there.
+/// Copies of fields by name, real ones in single or double precision, column by column; the position is always there.
 /// @throws InputError for a field that does not exist, or that no particle carries
 template <class G, int D = G::dim>
 py::dict copied_fields(const Model<G>& model, const std::vector<std::string>& names, bool single)
@@ -175,9 +175,9 @@ py::dict copied_fields(const Model<G>& model, const std::vector<std::string>& na
                   if constexpr (std::is_same_v<std::remove_cvref_t<decltype(view)>, IndexView>)
                     copies[py::str(name)] = copied_field(view);
                   else if (single)
-                    copies[py::str(name)] = copied_field<float>(view);
+                    copies[py::str(name)] = copied_field<float>(view, true);
                   else
-                    copies[py::str(name)] = copied_field<double>(view);
+                    copies[py::str(name)] = copied_field<double>(view, true);
                 });
   return copies;
 }

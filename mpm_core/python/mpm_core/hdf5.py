@@ -40,6 +40,7 @@ class RowsFile:
         if comm.rank == 0:
             import h5py  # not where a run writes nothing
 
+            self._h5py = h5py
             try:
                 self._sink = _Sink(path, "w+")
             except OSError as refusal:
@@ -61,8 +62,15 @@ class RowsFile:
             counts: number of rows of each rank.
         """
         whole = _gathered(self._comm, rows, counts)
-        if self._file is not None and whole is not None:
-            self._file.create_dataset(name, data=whole, **(self._options if whole.size else {}))
+        if self._file is None or whole is None:
+            return
+        if self._options and whole.size:
+            self._file.create_dataset(name, data=whole, **self._options)
+            return
+        # As create_dataset does it, in a fifth of the time, which counts in frames of many small fields.
+        all_rows, space = self._h5py.h5s.ALL, self._h5py.h5s.create_simple(whole.shape)
+        kind = self._h5py.h5t.py_create(whole.dtype)
+        self._h5py.h5d.create(self._file.id, name.encode(), kind, space).write(all_rows, all_rows, whole)
 
     def close(self, durable: bool = False) -> None:
         """Close the file.

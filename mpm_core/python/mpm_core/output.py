@@ -324,7 +324,7 @@ def _agreed(comm: MPI.Comm, check: Callable[[], Arrays]) -> tuple[dict[str, np.n
         raise InputError(f"fields are not the same on all ranks; here: {', '.join(shapes)}")
     for name, values in arrays.items():
         if values.dtype.kind == "i":
-            arrays[name] = values.astype(np.int64 if any(name in wide for wide in wides) else np.int32)
+            arrays[name] = values.astype(np.int64 if any(name in wide for wide in wides) else np.int32, copy=False)
     return arrays, list(counts)
 
 

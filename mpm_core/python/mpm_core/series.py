@@ -69,8 +69,10 @@ class Series:
     def _replace_xdmf(self, text: str) -> None:
         aside = f"{self._xdmf}.part"
         try:
-            with open(aside, "w", encoding="utf-8") as file:
-                file.write(f"{_HEAD}{text}{_TAIL}")
+            with open(aside, "wb", buffering=0) as file:
+                content = f"{_HEAD}{text}{_TAIL}".encode()
+                os.posix_fallocate(file.fileno(), 0, len(content))  # else ext4 waits for the disk when it is renamed
+                file.write(content)
             os.replace(aside, self._xdmf)
         except OSError:
             with suppress(OSError):
