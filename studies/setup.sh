@@ -11,11 +11,11 @@ log=$build/setup.log
 
 # What a study needs. ninja, git and ffmpeg could be done without, but make it faster or nicer. OpenBLAS, without threads of its
 # own, factorises matrices some ten times as fast as the BLAS that is there by default.
-packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libhdf5-openmpi-dev libptscotch-dev libeigen3-dev pkg-config pybind11-dev
+packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libptscotch-dev libeigen3-dev pybind11-dev
   python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
-  python3-numpy libopenblas0-serial python3-matplotlib python3-pil python3-tqdm ffmpeg)
+  python3-numpy python3-h5py libopenblas0-serial python3-matplotlib python3-pil python3-tqdm ffmpeg)
 # What the tests need besides.
-test_packages=(gfortran python3-pytest python3-hypothesis python3-h5py python3-meshio python3-pandas python3-scipy python3-vtk9
+test_packages=(gfortran python3-pytest python3-hypothesis python3-meshio python3-pandas python3-scipy python3-vtk9
   chromium chromium-driver python3-selenium clang-format black mypy)
 docs_packages=(python3-sphinx python3-myst-parser python3-sphinx-rtd-theme libjs-mathjax)
 
@@ -122,8 +122,8 @@ installed_packages() { dpkg-query -W -f '${db:Status-Status} ${Package}\n' 2>/de
 install_missing() {
   [[ -z $python || $(readlink -f "$python") == /usr/bin/python3* ]] || return 0
   if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
-    [[ -n $python ]] || say "this system has no apt-get; needed are CMake, a C++20 compiler, MPI, parallel HDF5, Eigen, pybind11," \
-      "GoogleTest, and for Python: DOLFINx, gmsh, mpi4py, petsc4py, matplotlib"
+    [[ -n $python ]] || say "this system has no apt-get; needed are CMake, a C++20 compiler, MPI, Eigen, pybind11," \
+      "GoogleTest, and for Python: DOLFINx, gmsh, mpi4py, h5py, petsc4py, matplotlib"
     return 0
   fi
   local missing

@@ -190,7 +190,9 @@ def test_no_flipped_bit_gets_into_a_run(comm, checkpoint):
     assert found > 40
 
 
-@pytest.mark.parametrize("number, message", [(3, "it has format 3, this program reads formats 1 to 2"), (0, "no.* checkpoint")])
+@pytest.mark.parametrize(
+    "number, message", [(3, "it has format 3, this program reads formats 1 to 2"), (0, "no.* checkpoint")]
+)
 def test_another_format_is_named(comm, checkpoint, number, message):
     if comm.rank == 0:
         with h5py.File(checkpoint, "r+") as file:

@@ -13,21 +13,19 @@ as they are. Names consist of letters, digits, ``_`` and ``-``.
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ._core import Geometry, InputError, RunError
 from .collective import collectively
 from .model import Model
+from .output_checks import agreed, checked_mesh, narrowest, particle_fields, real_fields
 from .series import Series, padded
 
-Arrays = Mapping[str, np.ndarray]
 T = TypeVar("T", bound="_Output")
 
 PARTICLE_FIELDS = (
@@ -68,7 +66,7 @@ class ParticleOutput(_Output):
     Args:
         path: of the XDMF file and of the folder of frames, without suffix; the folder around them must exist. What an
             earlier series left there is removed.
-        comm: communicator whose ranks write together; must not be freed before the output is closed.
+        comm: communicator of the ranks that have rows; all call the methods.
         float32: store real numbers in single precision; in double precision if false.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
 
@@ -102,13 +100,13 @@ class ParticleOutput(_Output):
                 expected.
             RunError: the frame cannot be written.
         """
-        arrays, counts = _agreed(self._series.comm, lambda: _particle_fields(fields))
+        arrays, counts = agreed(self._series.comm, lambda: particle_fields(fields))
         n, before = sum(counts), sum(counts[: self._series.comm.rank])
         position = padded(arrays.pop("position"), self._series.real)
         with self._series.frame(time) as frame:
             stored, vertices = self._vertices
             if stored != n:  # they are stored again only when their number changes
-                numbers = np.arange(before, before + len(position), dtype=_narrowest(n))
+                numbers = np.arange(before, before + len(position), dtype=narrowest(n))
                 vertices = frame.add_data("vertices", numbers, counts)
             points = frame.add_data("position", position, counts)
             frame.add_grid("Polyvertex", vertices, n, 1, points)
@@ -125,7 +123,7 @@ class MeshOutput(_Output):
     Args:
         path: of the XDMF file and of the folder of frames, without suffix; the folder around them must exist. What an
             earlier series left there is removed.
-        comm: communicator whose ranks write together; must not be freed before the output is closed.
+        comm: communicator of the ranks that have rows; all call the methods.
         points: (n, 2) or (n, 3), nodes of this rank's cells, m. A node that several ranks give is stored once for each.
         cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
         float32: store real numbers in single precision; in double precision if false.
@@ -151,14 +149,14 @@ class MeshOutput(_Output):
         compression: int = 0,
         fixed: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        points, cells = collectively(comm, lambda: _checked_mesh(points, cells))
+        points, cells = collectively(comm, lambda: checked_mesh(points, cells))
         series = Series(path, comm, "mesh", float32, compression)
         super().__init__(series)
         nodes, self._cells = comm.allgather(len(points)), comm.allgather(len(cells))
         self._nodes = nodes
-        fields, _ = _agreed(comm, lambda: _real_fields(fixed or {}, len(cells)))
+        fields, _ = agreed(comm, lambda: real_fields(fixed or {}, len(cells)))
         dim, first = points.shape[1], sum(nodes[: comm.rank])
-        numbers = (cells + first).astype(_narrowest(sum(nodes)))
+        numbers = (cells + first).astype(narrowest(sum(nodes)))
         with series.single() as frame:
             topology = frame.add_data("cells", numbers, self._cells)
             place = frame.add_data("points", padded(points, series.real), nodes)
@@ -186,8 +184,8 @@ class MeshOutput(_Output):
         """
         comm = self._series.comm
         n, m = self._nodes[comm.rank], self._cells[comm.rank]
-        at_nodes, _ = _agreed(comm, lambda: _real_fields(node_fields or {}, n))
-        in_cells, _ = _agreed(comm, lambda: _real_fields(cell_fields or {}, m)) if cell_fields else ({}, [])
+        at_nodes, _ = agreed(comm, lambda: real_fields(node_fields or {}, n))
+        in_cells, _ = agreed(comm, lambda: real_fields(cell_fields or {}, m)) if cell_fields else ({}, [])
         with self._series.frame(time, self._start) as frame:
             for name, values in at_nodes.items():
                 frame.add_field(name, "Node", values, self._nodes)
@@ -241,7 +239,7 @@ class ModelOutput:
         self._fields, self._nodal = list(particle_fields), list(nodal_fields)
         self._float32 = float32
         start = model.mesh
-        _agreed(start.comm, self._checked_names)
+        agreed(start.comm, self._checked_names)
         self._outputs: list[ParticleOutput | MeshOutput] = []
         if particles is not None:
             particle_output = ParticleOutput(particles, start.comm, float32, compression)
@@ -300,100 +298,3 @@ class ModelOutput:
     def __exit__(self, *error: Any) -> None:
         for output in self._outputs:
             output.__exit__(*error)
-
-
-def _agreed(comm: MPI.Comm, check: Callable[[], Arrays]) -> tuple[dict[str, np.ndarray], list[int]]:
-    """Arrays of all ranks by name, whole numbers as wide as any rank needs; and the rows of the first array on each rank.
-
-    Raises:
-        InputError: on all ranks: that of `check` on any rank, or names or components that are not the same on all.
-    """
-    arrays: dict[str, np.ndarray] = {}
-    error = None
-    try:
-        arrays = dict(check())
-    except InputError as failure:
-        error = str(failure)
-    shapes = [f"{name}:{'x'.join(map(str, values.shape[1:]))}" for name, values in arrays.items()]
-    wide = {name for name, values in arrays.items() if values.dtype.kind == "i" and not _fits(values)}
-    n = len(next(iter(arrays.values()), ()))
-    errors, names, counts, wides = zip(*comm.allgather((error, shapes, n, wide)))
-    if failures := [one for one in errors if one is not None]:
-        raise InputError(failures[0])
-    if any(other != shapes for other in names):
-        raise InputError(f"fields are not the same on all ranks; here: {', '.join(shapes)}")
-    for name, values in arrays.items():
-        if values.dtype.kind == "i":
-            arrays[name] = values.astype(np.int64 if any(name in wide for wide in wides) else np.int32, copy=False)
-    return arrays, list(counts)
-
-
-def _fits(values: NDArray[np.integer]) -> bool:
-    """Whether whole numbers fit into 32 bits."""
-    limits = np.iinfo(np.int32)
-    return not values.size or bool(limits.min <= values.min() and values.max() <= limits.max)
-
-
-def _narrowest(largest: int) -> type[np.int32] | type[np.int64]:
-    return np.int64 if largest > np.iinfo(np.int32).max else np.int32
-
-
-def _numeric(name: str, values: np.ndarray) -> np.ndarray:
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiub":
-        raise InputError(f"{name} has dtype {array.dtype}, expected numbers")
-    if array.ndim not in (1, 2):
-        raise InputError(f"{name} has shape {array.shape}, expected (n,) or (n, k)")
-    return array
-
-
-def _checked_name(name: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        raise InputError(f"name of a field is '{name}', expected letters, digits, _ and -")
-    return name
-
-
-def _checked_fields(fields: Arrays, n: int) -> dict[str, np.ndarray]:
-    """Arrays of n rows by name; all whole numbers of one component signed."""
-    arrays = {_checked_name(name): _numeric(name, values) for name, values in fields.items()}
-    for name, values in arrays.items():
-        if values.ndim == 2 and values.shape[1] < 1:
-            raise InputError(f"{name} has 0 components, expected at least 1")
-        if len(values) != n:
-            raise InputError(f"{name} has {len(values)} rows, expected {n}")
-        if values.dtype.kind in "ub":
-            arrays[name] = values.astype(np.int64)
-        elif values.dtype.kind == "i" and values.ndim == 2:
-            arrays[name] = values.astype(np.float64)
-    return arrays
-
-
-def _real_fields(fields: Arrays, n: int) -> dict[str, np.ndarray]:
-    return {name: values.astype(np.float64, copy=False) for name, values in _checked_fields(fields, n).items()}
-
-
-def _particle_fields(fields: Arrays) -> dict[str, np.ndarray]:
-    """The fields of particles, the position first."""
-    if "position" not in fields:
-        raise InputError(f"fields are {', '.join(fields) or 'none'}, expected 'position' among them")
-    position = _numeric("position", fields["position"])
-    if position.ndim != 2 or position.shape[1] not in (2, 3):
-        raise InputError(f"position has shape {position.shape}, expected (n, 2) or (n, 3)")
-    others = {name: values for name, values in fields.items() if name != "position"}
-    return {"position": position, **_checked_fields(others, len(position))}
-
-
-def _checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    points = np.asarray(points)
-    cells = np.asarray(cells)
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InputError(f"points has shape {points.shape}, expected (n, 2) or (n, 3)")
-    if cells.ndim != 2 or cells.shape[1] != points.shape[1] + 1 or cells.dtype.kind not in "iu":
-        raise InputError(
-            f"cells has shape {cells.shape} and dtype {cells.dtype}, expected (m, {points.shape[1] + 1}) whole numbers"
-        )
-    if cells.size and not 0 <= cells.min() <= cells.max() < len(points):
-        raise InputError(
-            f"cells has node {max(cells.max(), -cells.min())}, expected numbers from 0 to {len(points) - 1}"
-        )
-    return np.ascontiguousarray(points, np.float64), np.ascontiguousarray(cells, np.int64)

@@ -70,11 +70,6 @@ def test_includes_of_the_core_name_their_floor(floor):
     assert not bare
 
 
-def test_only_io_includes_hdf5():
-    users = {floor for floor in MAY_SEE for source in sources(floor) if any("hdf5" in n for n in includes(source))}
-    assert users <= {"io"}
-
-
 def imported(module, path, modules):
     """Modules of a package that one of its modules imports when it runs, not only for its types."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
