@@ -19,11 +19,12 @@ from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
 from common.files import OutputError
-from common.options import add_choice, add_count, add_number, study_parser
+from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
-from common.results import ROOT, open_results
+from common.results import open_results
+from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY
 from dolfinx import fem
@@ -43,10 +44,8 @@ ELEMENTS = {"P2-P1": water.Element.TAYLOR_HOOD, "P1-P1": water.Element.STABILISE
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "fill.toml", metavar="FILE",
-                   help="TOML file of mesh, soils, water and pressures (default: meshes/fill.toml)")  # fmt: skip
-    add_number(p, "--cell-size", None, "m", "constant cell_size of the mesh (default: that of the site)", above=0)
-    add_choice(p, "--elements", "P1-P1", tuple(ELEMENTS), "quadratic displacement (P2-P1), or stabilised linear one")
+    elements = "P1-P1", tuple(ELEMENTS), "quadratic displacement (P2-P1), or stabilised linear one"
+    add_site_file(p, "fill", "soils, water and pressures", elements)
     add_number(p, "--days", 3000.0, "days", "time that is followed", above=0)
     add_number(p, "--first-step", 0.5, "days", "first step", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)

@@ -16,7 +16,7 @@ from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
 from common.water_site import DAY
-from common.water_slides import add_slide_options
+from common.water_slides import add_optional_slide
 from common.water_slope_runs import water_slope_study
 from common.water_slopes import add_water_slope_options, safety, steady_safety
 
@@ -29,7 +29,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_water_slope_options(p, "drawdown", days=60.0, suction=False)
-    add_slide_options(p)
+    add_optional_slide(p)
     return p
 
 

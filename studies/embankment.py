@@ -17,13 +17,11 @@ from common import site_slides
 from common.files import OutputError
 from common.interrupt import Interrupt
 from common.movie import Movie
-from common.options import add_count, add_number, add_switch, study_parser
-from common.output_options import add_picture_options
+from common.options import study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
-from common.schemes import add_pic
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
 from common.stage_plots import stage_pictures
@@ -49,14 +47,8 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_stage_options(p, "embankment", "P1")
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_strength_factor(p)
-    add_number(p, "--damping", 0.05, "-", "local damping of the slide", at_least=0, below=1)
-    add_pic(p, 0.1)
-    add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
-    add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
-    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
-    add_picture_options(p)
+    site_slides.add_slide_options(p, damping=0.05, pic=0.1)
     return p
 
 

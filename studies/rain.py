@@ -13,7 +13,7 @@ from common.files import OutputError
 from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
-from common.water_slides import add_slide_options
+from common.water_slides import add_optional_slide
 from common.water_slope_runs import water_slope_study
 from common.water_slopes import add_water_slope_options, safety
 
@@ -26,7 +26,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_water_slope_options(p, "rain", days=15.0, suction=True)
-    add_slide_options(p)
+    add_optional_slide(p)
     return p
 
 

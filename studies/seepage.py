@@ -18,12 +18,13 @@ from common.field_plots import save_curves
 from common.figures import Pictures
 from common.files import OutputError
 from common.flow_steps import FlowSteps
-from common.options import add_choice, add_count, add_number, study_parser
+from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
-from common.results import ROOT, open_results
+from common.results import open_results
 from common.seepage_plots import FlowPicture, flow_picture, save_flow
+from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, read_water_site
 from mpi4py import MPI
@@ -42,10 +43,7 @@ comm = MPI.COMM_WORLD
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    p.add_argument("--site", type=Path, default=ROOT / "meshes" / "dam.toml", metavar="FILE",
-                   help="TOML file of mesh, soils and boundaries (default: meshes/dam.toml)")  # fmt: skip
-    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
-    add_choice(p, "--elements", "P1", ("P1", "P2"), "linear or quadratic triangles")
+    add_site_file(p, "dam", "soils and boundaries", ("P1", ("P1", "P2"), "linear or quadratic triangles"))
     add_number(p, "--days", 60.0, "days", "time that is followed, where values at boundaries change", above=0)
     add_count(p, "--frames", 6, "pictures of the flow in time")
     return p

@@ -21,12 +21,14 @@ from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .movie import Movie, particle_frame
-from .options import add_number
+from .options import add_count, add_number, add_switch
+from .output_options import add_picture_options
 from .page import Page
 from .plots import DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, save_history, save_particles
 from .progress import Progress
 from .results import open_results
 from .scenes import scene_of
+from .schemes import add_pic
 from .site_file import read_site
 from .summary import write_summary
 
@@ -49,6 +51,18 @@ def add_strength_factor(parser: ArgumentParser) -> None:
         "by what the strength of all soils of a site is divided before the slide",
         at_least=1,
     )
+
+
+def add_slide_options(parser: ArgumentParser, damping: float, pic: float) -> None:
+    """Options of a slide of particles, with the defaults of local damping and PIC."""
+    p = parser
+    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_number(p, "--damping", damping, "-", "local damping of the slide", at_least=0, below=1)
+    add_pic(p, pic)
+    add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
+    add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
+    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
+    add_picture_options(p)
 
 
 @dataclass

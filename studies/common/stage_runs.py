@@ -11,20 +11,15 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 
-from .options import add_choice, add_number
-from .results import ROOT
 from .site_file import Site
+from .site_options import add_site_file
 from .stage_plots import StageFiles, stage_picture
 
 
 def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
     """Options of a site that is built in stages: its file, by default one of `meshes/`, its cells and elements."""
-    parser.add_argument("--site", type=Path, default=ROOT / "meshes" / f"{site}.toml", metavar="FILE",
-                        help=f"TOML file of mesh, soils, supports and stages (default: meshes/{site}.toml)")  # fmt: skip
-    add_number(parser, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
-    add_choice(
-        parser, "--elements", elements, ("P1", "P2"), "linear triangles, as the particles have them, or quadratic ones"
-    )
+    meaning = "linear triangles, as the particles have them, or quadratic ones"
+    add_site_file(parser, site, "soils, supports and stages", (elements, ("P1", "P2"), meaning))
 
 
 def carry_out(

@@ -20,11 +20,9 @@ from fenics_bridge.transfer.particle_forces import seepage_forces
 from .figures import Pictures
 from .interrupt import Interrupt
 from .movie import Movie
-from .options import add_choice, add_count, add_flag, add_number, add_switch
-from .output_options import add_picture_options
+from .options import add_choice, add_flag
 from .scenes import scene_of
-from .schemes import add_pic
-from .site_slides import slide, slide_pictures
+from .site_slides import add_slide_options, slide, slide_pictures
 from .slope_site import SlopeSite
 from .water_site import DAY
 from .water_slopes import Instant, lowest
@@ -34,19 +32,13 @@ HOLDING = 0.9
 """Part of the factor of safety by which the strength is divided in the equilibrium that particles take over"""
 
 
-def add_slide_options(parser: ArgumentParser) -> None:
+def add_optional_slide(parser: ArgumentParser) -> None:
     """Option ``--slide``, and those of the slide."""
     p = parser
     add_flag(p, "--slide", "where the slope fails, follow its slide by particles")
     add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
                "the slide begins at the first factor below 1 that was found, or at the lowest one")  # fmt: skip
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
-    add_number(p, "--damping", 0.0, "-", "local damping of the slide", at_least=0, below=1)
-    add_pic(p, 0.01)
-    add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
-    add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
-    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
-    add_picture_options(p)
+    add_slide_options(p, damping=0.0, pic=0.01)
 
 
 def slide_of(
@@ -55,7 +47,7 @@ def slide_of(
     """The slide of a slope that fails: entries of the summary, movies, pictures, exit code. Collective.
 
     Args:
-        a: options of `add_slide_options`.
+        a: options of `add_optional_slide`.
         instants: of which at least one has a factor below 1.
     """
     failing = [instant for instant in instants if instant.safety.value < 1.0]

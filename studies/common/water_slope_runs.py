@@ -34,7 +34,7 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     """Carry out a study of a slope and its water; returns its exit code. Collective.
 
     Args:
-        a: options, with those of `add_water_slope_options` and `add_slide_options`.
+        a: options, with those of `add_water_slope_options` and `add_optional_slide`.
         changing: boundary condition that the site must have.
         limits_of: function of options, site and steady flow at the beginning; returns factors of safety to compare with, by name.
 

@@ -21,10 +21,10 @@ from fenics_bridge import water
 from .field_files import FieldFiles
 from .flow_steps import FlowSteps
 from .history import History
-from .options import add_choice, add_count, add_number, add_switch
+from .options import add_count, add_number, add_switch
 from .progress import Progress
-from .results import ROOT
 from .seepage_plots import FlowPicture, flow_picture
+from .site_options import add_site_file
 from .slope_site import SlopeSite
 from .water_site import DAY
 
@@ -36,10 +36,8 @@ FIRST_STEP, TOLERANCE = 0.1, 0.005
 def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suction: bool) -> None:
     """Options of a slope and its water: the site's file, by default one of `meshes/`, its times, its elements."""
     p = parser
-    p.add_argument("--site", type=Path, default=ROOT / "meshes" / f"{site}.toml", metavar="FILE",
-                   help=f"TOML file of mesh, soils, supports and water (default: meshes/{site}.toml)")  # fmt: skip
-    add_number(p, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
-    add_choice(p, "--elements", "P2", ("P1", "P2"), "linear or quadratic triangles for the factor of safety")
+    elements = "P2", ("P1", "P2"), "linear or quadratic triangles for the factor of safety"
+    add_site_file(p, site, "soils, supports and water", elements)
     add_number(p, "--days", days, "days", "time that is followed", above=0)
     add_number(p, "--slower", 1.0, "-", "factor on the times of all tables of the site", above=0)
     add_count(p, "--factor-times", 6, "times, evenly over --days, at which the factor of safety is found, beside the beginning, "

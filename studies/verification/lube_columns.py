@@ -16,11 +16,10 @@ of the radius; PIC of 0.1 % in place of 0.6 % makes the columns with 31° run up
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from lube_runout import FRICTION, GRAVITY, GROUND, PIC_SHARE, REPOSE, SIDE
+from lube_runout import FRICTION, GRAVITY, PIC_SHARE, REPOSE, column
 from lube_runout import WIDTH as RADIUS
 from mpi4py import MPI
 
-import fenics_bridge as bridge
 import mpm_core as mpm
 
 HALF_SECTION = ("Radius $r / r_0$ [-] (half section, axis at the left)", "Height $z / r_0$ [-]")
@@ -44,18 +43,10 @@ def collapsed(ratio, cells, friction):
     """
     comm, cell = MPI.COMM_WORLD, RADIUS / cells
     # --- 1. The column on rough ground --------------------------------------------------------------------------------
-    reach = RADIUS * (1.6 + 1.5 * run_out(ratio))
-    counts = [round(reach / cell), round(1.05 * ratio * RADIUS / cell) + 1]
-    body = ((-1.0, -1.0), (RADIUS, ratio * RADIUS))
-    mesh = bridge.background_mesh(*bridge.box_mesh(comm, [cell * n for n in counts], counts, body=body))
     sand = mpm.MohrCoulomb(young=0.5e6, poisson=0.3, cohesion=0.0, friction_angle=friction)
-    model = mpm.Model(mesh, sand, geometry=mpm.Geometry.AXISYMMETRIC)
-    model.seed(density=2000.0, per_cell=6, cell_tag=bridge.BODY)
-    model.roller(SIDE, (1, 0))
-    model.fix(GROUND)
+    model = column(ratio, cells, RADIUS * (1.6 + 1.5 * run_out(ratio)), sand, geometry=mpm.Geometry.AXISYMMETRIC)
 
     # --- 2. Let go, until well after it has come to rest ------------------------------------------------------------
-    model.set_gravity((0.0, -GRAVITY))
     fall = np.sqrt(2 * ratio * RADIUS / GRAVITY)
     list(model.explicit(4 * fall + 2 * np.sqrt(RADIUS / GRAVITY), pic=PIC_SHARE))
 

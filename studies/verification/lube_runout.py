@@ -45,21 +45,27 @@ def layer_friction():
     return -layer.stress[3] / layer.stress[1]
 
 
+def column(ratio, cells, reach, sand, **options):
+    """A column as wide as WIDTH and `ratio` times as high, on rough ground as long as `reach` [m]; cells: over the width."""
+    cell = WIDTH / cells
+    counts = [round(reach / cell), round(1.05 * ratio * WIDTH / cell) + 1]
+    body = ((-1.0, -1.0), (WIDTH, ratio * WIDTH))
+    parts = bridge.box_mesh(MPI.COMM_WORLD, [cell * n for n in counts], counts, body=body)
+    model = mpm.Model(bridge.background_mesh(*parts), sand, **options)
+    model.seed(density=2000.0, per_cell=6, cell_tag=bridge.BODY)
+    model.roller(SIDE, (1, 0))
+    model.fix(GROUND)
+    model.set_gravity((0.0, -GRAVITY))
+    return model
+
+
 def run_out(ratio, cells, pic):
     """Run-out over the width; cells: over the width."""
     comm, cell = MPI.COMM_WORLD, WIDTH / cells
     # --- 1. The column on rough ground, against a smooth wall --------------------------------------------------------
-    reach = WIDTH * (2.0 + 1.6 * scaling(ratio))
-    counts = [round(reach / cell), round(1.05 * ratio * WIDTH / cell) + 1]
-    body = ((-1, -1), (WIDTH, ratio * WIDTH))
-    mesh = bridge.background_mesh(*bridge.box_mesh(comm, [cell * n for n in counts], counts, body=body))
-    model = mpm.Model(mesh, SAND)
-    model.seed(density=2000.0, per_cell=6, cell_tag=bridge.BODY)
-    model.roller(SIDE, (1, 0))
-    model.fix(GROUND)
+    model = column(ratio, cells, WIDTH * (2.0 + 1.6 * scaling(ratio)), SAND)
 
     # --- 2. Let go, until well after it has come to rest ------------------------------------------------------------
-    model.set_gravity((0.0, -GRAVITY))
     fall = np.sqrt(2 * ratio * WIDTH / GRAVITY)
     list(model.explicit(5 * fall + 2 * np.sqrt(WIDTH / GRAVITY), pic=pic))
 

@@ -179,6 +179,22 @@ def by_id(model, *names):
     return [gathered(getattr(model.particles, name))[order] for name in names]
 
 
+HANDED_OVER = ("stress", "state", "volume", "position", "deviatoric_strain")
+
+
+def handed_over(model, comm):
+    """Fields that particles take over, of all of them by rising id."""
+    return (by_id if comm is COMM else in_order)(model, *HANDED_OVER)
+
+
+def assert_same_hand_over(results, absolute):
+    """Out-of-balance ratios and fields on all ranks, and on one alone."""
+    (here, fields_here), (alone, fields_alone) = results
+    assert here == pytest.approx(alone, rel=1e-3, abs=absolute)
+    for mine, whole in zip(fields_here, fields_alone):
+        assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+
+
 @pytest.mark.parametrize(
     ("degree", "cell_size", "options"),
     [(2, 0.1, {}), (2, 0.05, {"smooth": True}), (1, 0.1, {"move": True}), (2, 0.05, {"move": True})],
@@ -193,12 +209,8 @@ def test_hand_over_between_different_partitions(degree, cell_size, options):
         report = bridge.initialise(model, fem, equilibrate=False, **options)
         if not options:
             assert report.unbalanced_ratio < 1e-10 and report.returned_fraction == 0
-        fields = ("stress", "state", "volume", "position", "deviatoric_strain")
-        results.append((report.unbalanced_ratio, by_id(model, *fields) if comm is COMM else in_order(model, *fields)))
-    (here, fields_here), (alone, fields_alone) = results
-    assert here == pytest.approx(alone, rel=1e-3, abs=1e-10)
-    for mine, whole in zip(fields_here, fields_alone):
-        assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+        results.append((report.unbalanced_ratio, handed_over(model, comm)))
+    assert_same_hand_over(results, 1e-10)
     fem = slope_model(dilation_angle=0.0, degree=degree)
     fem.solve(bridge.Load(unit_weight=18e3))
     report = bridge.initialise(slope_particles(18e3, cell_size=cell_size), fem, **options)
@@ -240,11 +252,7 @@ def test_axisymmetric_hand_over_between_different_partitions(degree, options):
         report = bridge.initialise(model, elements, equilibrate=False, **options)
         if degree == 1 and not options:
             assert report.unbalanced_ratio < 1e-8
-        fields = ("stress", "state", "volume", "position", "deviatoric_strain")
-        results.append((report.unbalanced_ratio, by_id(model, *fields) if comm is COMM else in_order(model, *fields)))
-    (here, fields_here), (alone, fields_alone) = results
-    assert here == pytest.approx(alone, rel=1e-3, abs=1e-8)
-    for mine, whole in zip(fields_here, fields_alone):
-        assert np.allclose(mine, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+        results.append((report.unbalanced_ratio, handed_over(model, comm)))
+    assert_same_hand_over(results, 1e-8)
     report = bridge.initialise(cylinder_particles(8, headroom=0.25), cylinder_fem(8, degree=degree), **options)
     assert report.equilibrated_ratio < 1e-3

@@ -130,7 +130,7 @@ def test_another_library_under_a_umat_is_refused(tmp_path):
 
 
 def test_a_law_is_described_as_in_older_checkpoints():
-    # As version 0.1.0 wrote it before laws told what they need; recorded, for old files cannot be written any more.
+    # As version 0.1.0 wrote it before laws declared what they need; recorded, for old files cannot be written any more.
     law = mpm.MohrCoulomb(young=2e5, poisson=0.3, cohesion=500.0, friction_angle=25.0, dilation_angle=5.0)
     assert _material(law) == (
         "MohrCoulomb(cohesion=500.0, dilation_angle=5.0, friction_angle=25.0, n_state=1, name='MohrCoulomb', "
