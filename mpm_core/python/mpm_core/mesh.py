@@ -11,6 +11,7 @@ from . import _core
 from ._core import InputError
 from .collective import collectively
 from .rows import found, requested
+from .views import mesh_text
 
 Tag = int | str | Sequence[int | str]
 """A tag by its number or name, or several of them."""
@@ -148,6 +149,9 @@ class Mesh:
             for kind, names in given.items()
         }
         """Tags by name, of cells ("cell") and of facets ("facet")."""
+
+    def __repr__(self) -> str:
+        return mesh_text(self)
 
     @property
     def owned_cells(self) -> int:

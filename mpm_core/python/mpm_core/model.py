@@ -33,6 +33,7 @@ from .resting import Conversion, checked_conversion, refuse_resting
 from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
+from .views import model_text
 
 CONVERSION = Conversion()
 """When resting cells turn into particles, unless a run says otherwise"""
@@ -58,6 +59,9 @@ class Model(Body):
     Note:
         Collective, as all methods are unless they say otherwise.
     """
+
+    def __repr__(self) -> str:
+        return model_text(self)
 
     # --- checkpoints ---------------------------------------------------------------------------------------------
 

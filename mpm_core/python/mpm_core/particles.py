@@ -11,6 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .mesh import floats
+from .views import particle_mesh, particle_table, particles_text
+
+SHOWN = ("position", "displacement", "velocity", "stress", "plastic_strain")
+"""Fields of tables and point meshes where nothing else is asked for."""
 
 
 class Particles:
@@ -27,6 +31,9 @@ class Particles:
     def __init__(self, core: Any, rows: NDArray[np.int64] | None = None) -> None:
         self._core = core
         self._rows = rows
+
+    def __repr__(self) -> str:
+        return particles_text(self)
 
     def __len__(self) -> int:
         return self._core.size if self._rows is None else len(self._rows)
@@ -105,6 +112,37 @@ class Particles:
         """
         self._require_all("single")
         return self._core.copied_fields(names, True)
+
+    def to_dataframe(self, *names: str) -> Any:
+        """The particles of this rank as a table of pandas, by their numbers.
+
+        Args:
+            names: fields, one column for each component: ``position_x``, ``stress_xx``; without any, position, displacement,
+                velocity, stress and plastic strain.
+
+        Returns:
+            pandas.DataFrame; its ``attrs["units"]`` has the unit of each column.
+
+        Raises:
+            AttributeError: a field that does not exist.
+            ImportError: pandas is not installed.
+
+        Example:
+            >>> model.particles.to_dataframe("velocity").describe()
+        """
+        return particle_table(self, names or SHOWN)
+
+    def to_meshio(self, *names: str) -> Any:
+        """The particles of this rank as points of a meshio.Mesh with fields, which ``pyvista.from_meshio`` takes as well.
+
+        Args:
+            names: fields, as for `to_dataframe`.
+
+        Raises:
+            AttributeError: a field that does not exist.
+            ImportError: meshio is not installed.
+        """
+        return particle_mesh(self, names or SHOWN)
 
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.

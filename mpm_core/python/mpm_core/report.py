@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .checks import renamed
+from .views import report_text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """State of a run at one time; sums are over all ranks. Energies in J, in plane strain per metre of thickness."""
+
+    def __repr__(self) -> str:
+        return report_text(self)
 
     time: float
     """Time [s]"""
@@ -80,7 +84,7 @@ class Report:
         return self.unbalanced_ratio <= tolerance and (work == 0 or self.kinetic_energy <= tolerance * work)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ImplicitReport(Report):
     """State of an implicit run; the last three attributes refer to the steps since the last report."""
 

@@ -1,0 +1,95 @@
+"""Meshes, models, particles and reports as a notebook shows them, and particles as pandas and meshio take them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+    from .particles import Particles
+    from .report import Report
+
+_AXES = {2: ("x", "y"), 3: ("x", "y", "z")}
+_TENSORS = {4: ("xx", "yy", "zz", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
+_KINDS = {2: "triangles", 3: "tetrahedra"}
+
+
+def mesh_text(mesh: Mesh) -> str:
+    """A mesh in words: cells and nodes of this rank, size, tags by name."""
+    dim, points = mesh.dim, mesh.points
+    size = " x ".join(f"{length:.4g} m" for length in np.ptp(points, axis=0)) if len(points) else "nothing"
+    names = {kind: {tag: name for name, tags in of.items() for tag in tags} for kind, of in mesh.names.items()}
+    tags = "; ".join(
+        f"{kind} tags "
+        + (", ".join(f"{tag} ({names[kind][tag]})" if tag in names[kind] else str(tag) for tag in sorted(known)))
+        for kind, known in mesh._tags.items()
+        if known
+    )
+    where = f" on rank {mesh.comm.rank} of {mesh.comm.size}" if mesh.comm.size > 1 else ""
+    return f"<Mesh: {mesh.owned_cells} {_KINDS[dim]} and {len(points)} nodes{where}, {size}; {tags}>"
+
+
+def particles_text(particles: Particles) -> str:
+    """Particles in words: their number on this rank, and fields with units."""
+    fields = ", ".join(f"{field['name']} [{field['unit']}]" for field in particles.schedule())
+    return f"<Particles: {len(particles)} on this rank; {fields}>"
+
+
+def model_text(model: Any) -> str:
+    """A model in words: geometry, time, particles of this rank, laws."""
+    geometry = model.geometry.name.lower().replace("_", " ")
+    laws = "".join(f"\n  law {number}: {law!r}" for number, law in enumerate(model.laws))
+    return (
+        f"<{type(model).__name__}: {geometry}, t = {model.time:g} s; {len(model.particles)} particles on this rank, "
+        f"{model.mesh.owned_cells} cells{laws}>"
+    )
+
+
+def report_text(report: Report) -> str:
+    """A report in words: time, steps, mass, energies, out-of-balance ratio."""
+    return (
+        f"<{type(report).__name__}: t = {report.time:g} s after {report.steps} steps, the last of {report.dt:.3g} s; "
+        f"{report.particles} particles, {report.mass:.6g} kg; kinetic energy {report.kinetic_energy:.4g} J, external work "
+        f"{report.external_work:.4g} J, plastic work {report.plastic_work:.4g} J; {report.plastic_fraction:.1%} yield, "
+        f"out-of-balance ratio {report.unbalanced_ratio:.2g}>"
+    )
+
+
+def _columns(name: str, values: np.ndarray, dim: int) -> dict[str, np.ndarray]:
+    """A field as columns with one number per particle."""
+    if values.ndim == 1:
+        return {name: values}
+    width = values.shape[1]
+    ends = _AXES[dim] if width == dim else _TENSORS.get(width, tuple(map(str, range(width))))
+    return {f"{name}_{end}": values[:, k] for k, end in enumerate(ends)}
+
+
+def particle_table(particles: Particles, names: Sequence[str]) -> Any:
+    """See `Particles.to_dataframe`."""
+    import pandas
+
+    units = {field["name"]: field["unit"] for field in particles.schedule()} | {
+        "displacement": "m",
+        "plastic_strain": "-",
+    }
+    dim, columns, unit_of = particles.position.shape[1], {}, {}
+    for name in names:
+        for column, values in _columns(name, getattr(particles, name), dim).items():
+            columns[column], unit_of[column] = values, units[name]
+    frame = pandas.DataFrame(columns, index=pandas.Index(particles.id, name="id"))
+    frame.attrs["units"] = unit_of
+    return frame
+
+
+def particle_mesh(particles: Particles, names: Sequence[str]) -> Any:
+    """See `Particles.to_meshio`."""
+    import meshio
+
+    position = particles.position
+    points = np.zeros((len(position), 3))
+    points[:, : position.shape[1]] = position
+    cells = [("vertex", np.arange(len(points))[:, None])]
+    return meshio.Mesh(points, cells, point_data={name: np.array(getattr(particles, name)) for name in names})
