@@ -37,10 +37,7 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
       for (int l = 0; l <= D; ++l)
       {
         const Index other = mesh.cells[c][l];
-        Vector<D> volumetric = mesh.shapes[c].gradient[l];
-        if constexpr (G::has_hoop)
-          volumetric[0] += hoop_gradient<G>(mesh.shapes[c]);
-        const Vector<D> change = product<D>(projector(system, other), volumetric);
+        const Vector<D> change = product<D>(projector(system, other), dilation_gradient<G>(mesh.shapes[c], l));
         for (int b = 0; b < D; ++b)
           writer.add(system.number[node], D * system.number[other] + b, weight * change[b]);
       }

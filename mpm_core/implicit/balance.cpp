@@ -27,7 +27,7 @@ template <class G>
 TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& step, const TrialCount<G::dim>& count)
 {
   constexpr int D = G::dim;
-  std::array<double, 6> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed
+  std::array<double, 8> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed; water
   for (std::size_t i = 0; i < step.residual.size(); ++i)
   {
     const NodalForces<D>& f = step.forces[i];
@@ -37,11 +37,17 @@ TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& st
     sums[1] += dot<D>(f.external, f.external);
     sums[2] += dot<D>(f.internal, f.internal);
     sums[3] += dot<D>(f.inertia, f.inertia);
+    if (step.pore.flows)
+      sums[step.pore.held[i] ? 7 : 6] += step.pore.unit * step.pore.unit * step.pore.content[i] * step.pore.content[i];
   }
   sums[4] = static_cast<double>(count.plastic);
   sums[5] = static_cast<double>(count.failed);
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, exchange.comm);
-  return {std::sqrt(sums[0]), std::sqrt(std::max({sums[1], sums[2], sums[3]})), static_cast<std::int64_t>(sums[4]),
+  const double scale = std::max({sums[1], sums[2], sums[3]});
+  // Volumes of water times the unit of pressure count as forces: a volumetric strain weighs as much as its stress.
+  const double water_scale = std::max(scale, sums[7]);
+  const double residual = water_scale > 0 ? std::max(sums[0], sums[6] * (scale > 0 ? scale / water_scale : 1)) : 0;
+  return {std::sqrt(residual), std::sqrt(scale > 0 ? scale : water_scale), static_cast<std::int64_t>(sums[4]),
           static_cast<std::int64_t>(sums[5])};
 }
 

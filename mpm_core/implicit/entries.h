@@ -80,13 +80,37 @@ public:
 
   void add_unprojected(Index row, Index column, const Matrix<D>& block)
   {
-    const GlobalIndex first_row = D * _system.number[row], first_column = D * _system.number[column];
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
-        _writer.add(first_row + i, first_column + j, block[i][j]);
+        _writer.add(place(row, i), place(column, j), block[i][j]);
   }
 
+  /// Takes memory for more blocks with pressures; must come before they are added.
+  void expect_coupled(std::size_t more) { _writer.expect(more * (2 * D + 1)); }
+
+  /// Adds the forces by the pressure of a column, P_row `forces`; the volume of water of a row by the displacement of
+  /// a column, `volumes` P_column; and that by its pressure.
+  void add_coupled(Index row, Index column, const Vector<D>& forces, const Vector<D>& volumes, double by_pressure)
+  {
+    const Vector<D> f = product<D>(projector(_system, row), forces);
+    const Vector<D> v = product<D>(projector(_system, column), volumes); // P is symmetric
+    for (int i = 0; i < D; ++i)
+    {
+      _writer.add(place(row, i), place(column, D), f[i]);
+      _writer.add(place(row, D), place(column, i), v[i]);
+    }
+    _writer.add(place(row, D), place(column, D), by_pressure);
+  }
+
+  /// Takes memory for more entries of pressures alone; must come before they are added.
+  void expect_pressures(std::size_t more) { _writer.expect(more); }
+
+  /// Adds the volume of water of a row by the pressure of a column.
+  void add_pressure(Index row, Index column, double value) { _writer.add(place(row, D), place(column, D), value); }
+
 private:
+  GlobalIndex place(Index node, int component) const { return _system.unknowns * _system.number[node] + component; }
+
   const ImplicitSystem<D>& _system;
   Writer _writer;
 };

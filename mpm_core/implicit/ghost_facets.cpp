@@ -85,6 +85,8 @@ void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const Cell
   // In axial symmetry both are those of one radian, at the cell's radius.
   const double area = D * cell_volume<G>(mesh.shapes[c]) * norm<D>(mesh.shapes[c].gradient[k]);
   const double h = D * volumes / (2 * area);
+  facet.area = area;
+  facet.size = h;
   facet.stiffness = options.stiffness * both.shear / both.volume * h * area;
   facet.mass = options.mass * both.mass / both.volume * h * h * h * area;
 }

@@ -36,6 +36,8 @@ struct GhostFacet
   std::array<double, D + 2> fraction;
   double stiffness; ///< |F| gamma_K G h
   double mass;      ///< |F| gamma_M rho h^3
+  double area;      ///< |F|
+  double size;      ///< h
 };
 
 /// The stabilised facets of this rank's owned cells.

@@ -7,6 +7,9 @@
 #include "implicit/ghost.h"
 #include "implicit/inertia.h"
 #include "implicit/internal_force.h"
+#include "implicit/pore_preparation.h"
+#include "implicit/pore_update.h"
+#include "implicit/pore_water.h"
 #include "implicit/preparation.h"
 #include "implicit/stages.h"
 #include "implicit/supported.h"
@@ -48,6 +51,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   field.velocity = field.start_velocity;
   impose_supports(step, field);
   begin_first_stage(field, step);
+  start_pore_water(model, step);
   step.forces.assign(field.nodes.size(), {});
   step.external =
       external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_fraction);
@@ -78,14 +82,18 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   const auto count = try_stresses(mesh, material_points(model), field, tangents, step);
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
+  if (step.pore.flows)
+    update(step.halos.nodes, step.pore.rate);
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);
   add_internal_forces(mesh, step, step.forces);
+  add_pore_forces(mesh, step, step.forces);
   add_ghost_forces(field, step, step.forces);
   add_inertia_forces(field, step, exchange.owned, step.forces);
   sum_shared(exchange, step.forces);
   balance(field, step);
+  find_water_balance(mesh, exchange, field, step); // (W2)
 
   for (std::size_t i = 0; i < step.forces.size(); ++i)
     field.nodes[i].internal = step.forces[i].internal;
@@ -106,6 +114,7 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
   add_ghost_entries(step, stiffness);
   add_inertia_entries(field, step, system.owned, stiffness);
   add_support_entries(system, stiffness);
+  add_pore_entries(mesh, step, stiffness);
   if (!step.options.nmd)
     return;
   volumetric_force_entries(mesh, step, system, tangent.volumetric_force);
@@ -166,6 +175,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const double pic = pic_fraction(model, step);
   find_velocity_change(field, pic, step.dt);
   const auto start = model.particles;
+  update_pore_water(model, step);
   particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step),
                         options.hold_positions}); // (18), (20), stresses
   agree_on_failure(model);
@@ -175,6 +185,8 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
     return false;
   }
   add_work(field, step, model.exchange.owned, model.totals);
+  if (model.water)
+    add_inflow(step.pore, model.exchange.owned, *model.water);
   model.last.dt = step.dt;
   model.energy.ahead = 0; // velocities and stresses are of one time
   migrate_particles(model);

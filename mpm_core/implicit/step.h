@@ -3,6 +3,7 @@
 /// An implicit step under way, as plain data.
 
 #include "implicit/ghost_facets.h"
+#include "implicit/pore_step.h"
 #include "transfer/cell_strain.h"
 
 #include <limits>
@@ -41,6 +42,16 @@ std::array<std::array<double, n_gradient<G>>, D> gradient_rows(const CellShape<D
   return rows;
 }
 
+/// Derivative of the volumetric strain of a cell by the displacement of vertex k.
+template <class G, int D = G::dim>
+Vector<D> dilation_gradient(const CellShape<D>& shape, int k)
+{
+  Vector<D> gradient = shape.gradient[k];
+  if constexpr (G::has_hoop)
+    gradient[0] += hoop_gradient<G>(shape);
+  return gradient;
+}
+
 /// Derivatives of sum V sigma over the particles of a cell.
 template <class G>
 struct CellTangent
@@ -69,7 +80,7 @@ template <int D>
 struct NodalForces
 {
   Vector<D> external; ///< f_ext (15)
-  Vector<D> internal; ///< f_int (14)
+  Vector<D> internal; ///< f_int (14), pore pressures included
   Vector<D> ghost;    ///< of the ghost penalty
   Vector<D> inertia;  ///< M (v1 - v0) / dt, with what local damping adds to it
 };
@@ -106,6 +117,7 @@ struct ImplicitStep
   std::vector<GhostFacet<D>> ghosts;    ///< stabilised facets
   Halos halos;                          ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
+  PoreStep<D> pore;                  ///< flow of the pore water; nothing in it without water
   std::vector<double> elastic;       ///< stiffness of each node, sum V (K + 4G/3) |grad N|^2; this rank's part [N/m]
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
   std::optional<Failure<D>> failure; ///< of the last trial, where it failed

@@ -49,6 +49,7 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
   int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
+  system.unknowns = step.pore.flows ? D + 1 : D;
   const RowSlice rows = row_slice(exchange.comm, owned.size());
   system.total = rows.total;
   std::vector<std::array<double, 2>> sums(step.active.size()); // number, stiffness; whole numbers are exact

@@ -3,7 +3,7 @@
 /// The nodes of the linear system of a Newton iteration: who has which rows.
 ///
 /// Unknowns are the corrections of the displacement increment u at active nodes, D for each, in the order of the nodes'
-/// numbers. Supported directions are projected out of rows and columns, P J P + s (1 - P), whatever their angle.
+/// numbers; where water flows, that of the pressure increment over its unit follows those of its node. Supported directions are projected out of rows and columns, P J P + s (1 - P), whatever their angle.
 
 #include "implicit/step.h"
 
@@ -21,6 +21,7 @@ struct ImplicitSystem
   std::vector<Matrix<D>> projectors;        ///< P = 1 - sum d d^T of each support
   std::vector<double> diagonal;             ///< per node: elastic stiffness, the scale of its entries [N/m]
   GlobalIndex total = 0;                    ///< nodes over all ranks
+  int unknowns = D;                         ///< of each node
 };
 
 /// Numbers the active nodes of the step: consecutive on each rank.

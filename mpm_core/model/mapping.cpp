@@ -1,6 +1,7 @@
 #include "model/mapping.h"
 
 #include "model/integration.h"
+#include "model/pore_forces.h"
 
 #include <algorithm>
 #include <utility>
@@ -43,6 +44,7 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   field.integration.averaged_of_cell.clear();
   if (!field.integration.averaged_by_law.empty())
     average_forces(mesh, exchange, runs, field);
+  add_pore_forces(mesh, particles, runs, field);
 }
 
 template <class G>
@@ -51,6 +53,8 @@ void map_to_nodes(Model<G>& model)
   for (VelocityField<G>& field : model.fields)
   {
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
+    if (model.water)
+      add_surface_pressures(model.mesh, *model.water, field);
     sum_shared(model.exchange, field.nodes);
   }
 }

@@ -6,6 +6,7 @@
 #include "contact/contact.h"
 #include "materials/laws/law.h"
 #include "model/energy.h"
+#include "model/pore_water.h"
 #include "model/velocity_field.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
@@ -100,6 +101,7 @@ struct Model
   std::vector<VelocityField<G>> fields = std::vector<VelocityField<G>>(1);
   std::vector<Index> field_of_law;  ///< number of the velocity field of the particles that follow each law
   std::vector<Contact<D>> contacts; ///< with rigid surfaces
+  std::optional<PoreWater> water;   ///< in the pores of the soil
   std::vector<Index> outflow_tags;
   Vector<D> gravity{};     ///< [m/s2]
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]

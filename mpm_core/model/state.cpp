@@ -91,6 +91,8 @@ void for_each_number(M& model, F&& f)
   f("energy_start_external_work", Kind::sum, model.energy.external_start);
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
+  if (model.water)
+    f("water_inflow", Kind::sum, model.water->inflow);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
     for_each_number("contact_" + std::to_string(k) + "_", model.contacts[k], f);
   f("sorts", Kind::own, model.totals.sorts);

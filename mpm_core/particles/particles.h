@@ -39,6 +39,8 @@ struct Particles
   OptionalColumns<D * D> velocity_gradient;
   OptionalColumns<D> resting_displacement;
   OptionalColumns<D * D> displacement_gradient;
+  OptionalColumns<1> pore_pressure, porosity, conductivity; ///< of water in the soil
+  OptionalColumns<D> pressure_gradient;
   std::vector<Index> material;
   std::vector<Index> cell;
   std::vector<AddedField> added; ///< fields that the run has declared for itself
@@ -74,6 +76,11 @@ void for_each_field(P& particles, F&& f)
     particles.resting_displacement);
   f(Field{"displacement_gradient", "-", "Gradient of the displacement in a resting cell since it began to rest"},
     particles.displacement_gradient);
+  f(Field{"pore_pressure", "Pa", "Pressure of the pore water, compression positive", settable},
+    particles.pore_pressure);
+  f(Field{"pressure_gradient", "Pa/m", "Gradient of the pore pressure", settable}, particles.pressure_gradient);
+  f(Field{"porosity", "-", "Volume of the pores over that of the soil", settable}, particles.porosity);
+  f(Field{"conductivity", "m/s", "Hydraulic conductivity", settable}, particles.conductivity);
   f(Field{"material", "-", "Number of the law"}, particles.material);
   f(Field{"cell", "-", "Number of the cell on this rank that holds the particle"}, particles.cell);
   for (auto& added : particles.added)

@@ -1,4 +1,5 @@
 #include "explicit/run.h"
+#include "implicit/pore_water.h"
 #include "implicit/relaxation.h"
 #include "implicit/stages.h"
 #include "implicit/supported.h"
@@ -31,6 +32,49 @@ py::dict as_dict(const Implicit<G>& implicit, const TrialReport& report)
 }
 
 py::tuple places(const CooEntries& entries) { return py::make_tuple(copied(entries.rows), copied(entries.columns)); }
+
+/// Vectors at this rank's nodes of the system, each followed by a number where pressures are unknowns.
+template <class G>
+py::array_t<double> unknowns(const Implicit<G>& implicit, const std::vector<Vector<G::dim>>& vectors,
+                             const std::vector<double>& numbers, double factor)
+{
+  if (!implicit.step.pore.flows)
+    return copied(owned_values<G::dim>(implicit.system, vectors));
+  std::vector<double> values;
+  for (Index node : implicit.system.owned)
+  {
+    values.insert(values.end(), vectors[node].begin(), vectors[node].end());
+    values.push_back(implicit.step.pore.held[node] ? 0 : factor * numbers[node]);
+  }
+  return copied(values);
+}
+
+/// The opposite, for the iterate. Pressures that are prescribed, and supported velocities, become what they must be.
+template <class G, int D = G::dim>
+void set_unknowns(Implicit<G>& implicit, const py::array& array)
+{
+  const auto n = implicit.system.owned.size();
+  const auto width = static_cast<std::size_t>(implicit.system.unknowns);
+  check_array<double>("iterate", array, {static_cast<py::ssize_t>(n * width)});
+  const auto in = values<double>(array);
+  std::vector<double> vectors;
+  auto& pore = implicit.step.pore;
+  if (pore.flows)
+    std::ranges::fill(pore.rate, 0.0);
+  for (std::size_t k = 0; k < n; ++k)
+  {
+    vectors.insert(vectors.end(), &in[k * width], &in[k * width] + D);
+    if (pore.flows)
+      pore.rate[implicit.system.owned[k]] = pore.unit * in[k * width + D];
+  }
+  Model<G>& model = implicit.model;
+  set_nodal<D>(model.exchange, implicit.system, vectors, model.fields.front().velocity);
+  impose_supports(implicit.step, model.fields.front());
+  if (!pore.flows)
+    return;
+  sum_shared(model.exchange, pore.rate);
+  impose_pressures(implicit.step.dt, pore);
+}
 
 /// Coordinates of this rank's nodes of the system, (n, D).
 template <class G, int D = G::dim>
@@ -110,15 +154,14 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
       .def_property_readonly("owned_nodes", [](const I& i) { return i.system.owned.size(); })
       .def_property_readonly("total_nodes", [](const I& i) { return i.system.total; })
       .def_property_readonly("points", &owned_points<G>)
-      .def_property_readonly("residual", [](const I& i) { return copied(owned_values<D>(i.system, i.step.residual)); })
+      .def_property_readonly("unknowns", [](const I& i) { return i.system.unknowns; })
+      .def_property_readonly("residual", [](const I& i)
+                             { return unknowns<G>(i, i.step.residual, i.step.pore.content, i.step.pore.unit); })
       .def_property(
-          "velocity", [](const I& i) { return copied(owned_values<D>(i.system, i.model.fields.front().velocity)); },
-          [](I& i, const py::array& array)
-          {
-            check_array<double>("velocity", array, {static_cast<py::ssize_t>(i.system.owned.size() * D)});
-            set_nodal<D>(i.model.exchange, i.system, values<double>(array), i.model.fields.front().velocity);
-            impose_supports(i.step, i.model.fields.front());
-          })
+          "iterate",
+          [](const I& i)
+          { return unknowns<G>(i, i.model.fields.front().velocity, i.step.pore.rate, 1 / i.step.pore.unit); },
+          &set_unknowns<G>)
       .def("stiffness_places", [](const I& i) { return places(i.tangent.stiffness); })
       .def("stiffness_values", [](const I& i) { return copied(i.tangent.stiffness.values); })
       .def("volumetric_force_places", [](const I& i) { return places(i.tangent.volumetric_force); })

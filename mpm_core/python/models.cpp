@@ -172,6 +172,7 @@ void bind_model(py::module_& m, const std::string& suffix)
              set_supports(model, requests);
            })
       .def("set_partition", &set_partition<G>)
+      .def_readwrite("water", &M::water)
       .def_readwrite("outflow_tags", &M::outflow_tags)
       .def_readwrite("gravity", &M::gravity)
       .def_readwrite("gravity_ramp", &M::gravity_ramp)
@@ -299,6 +300,20 @@ dimensions.)")
       .value("PLANE_STRAIN", Geometry::plane_strain)
       .value("AXISYMMETRIC", Geometry::axisymmetric)
       .value("SOLID", Geometry::solid);
+  py::class_<PoreWater>(m, "PoreWater")
+      .def(py::init<>())
+      .def_readwrite("unit_weight", &PoreWater::unit_weight)
+      .def_readwrite("modulus", &PoreWater::modulus)
+      .def_readwrite("kozeny_carman", &PoreWater::kozeny_carman)
+      .def_readwrite("drained_surface", &PoreWater::drained_surface)
+      .def_readwrite("inflow", &PoreWater::inflow)
+      .def("set_conditions",
+           [](PoreWater& water, const std::vector<std::tuple<Index, double, double, bool, bool>>& conditions)
+           {
+             water.conditions.clear();
+             for (const auto& [tag, value, slope, held, presses] : conditions)
+               water.conditions.push_back({tag, value, slope, held, presses});
+           });
   py::enum_<StressUpdate>(m, "StressUpdate")
       .value("MODIFIED_LAST", StressUpdate::modified_last)
       .value("LAST", StressUpdate::last)

@@ -137,7 +137,8 @@ bool is_scalar(const Field& field, const Columns& columns)
   else if constexpr (is_optional<Columns>)
     return columns.columns.size() == 1;
   else
-    return std::is_same_v<std::remove_cvref_t<decltype(columns_of(columns)[0])>, Columns>;
+    return std::is_same_v<Columns, OptionalColumns<1>> ||
+           std::is_same_v<std::remove_cvref_t<decltype(columns_of(columns)[0])>, Columns>;
 }
 
 /// A copy of a field, of all particles or of the chosen ones.

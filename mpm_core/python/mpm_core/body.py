@@ -13,10 +13,10 @@ from . import _core, partition
 from ._core import Geometry, InputError
 from .checks import positive, renamed
 from .collective import collectively
-from .conditions import Conditions
 from .mesh import Mesh, Tag, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
+from .pore_water import PoreWater
 from .resting import RestingCells, refuse_resting
 from .space import SpaceWatch
 from .triangles import Triangles
@@ -43,7 +43,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body(Conditions, RestingCells):
+class Body(PoreWater, RestingCells):
     """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
@@ -76,6 +76,7 @@ class Body(Conditions, RestingCells):
         self._core = getattr(_core, f"Model{suffix}")(mesh._core, self.laws, fields, MPI._addressof(self.comm))
         self._velocity_fields = fields or [0] * len(self.laws)
         self._space_watch: SpaceWatch | None = None
+        self._water_conditions = []
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0

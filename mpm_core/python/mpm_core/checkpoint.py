@@ -83,11 +83,13 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         for field in there.get("added_fields", []):
             if field["name"] not in {known["name"] for known in model.particles.schedule()}:
                 model.add_field(**field)
-        before = _replace_contacts(model, there.get("contacts", []))
+        before, water = _replace_contacts(model, there.get("contacts", [])), _water(model)
+        _take_water(model, there.get("water"))
         try:
             _core.restore(model._core, *_state(model, file), name)
         except RunError:
             _replace_contacts(model, before)
+            _take_water(model, water)
             raise
     _take(model, there)
 
@@ -191,6 +193,7 @@ def _description(model: Model) -> dict[str, Any]:
         "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
         "contacts": model._contacts,
+        "water": _water(model),
         "implicit": None if model._control is None else vars(model._control),
     }
 
@@ -200,6 +203,27 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
     own = {field["name"] for field in type(model._core).default_particle_schedule()}
     keys = ("name", "unit", "meaning", "components", "initial")
     return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
+
+
+_WATER = ("unit_weight", "modulus", "kozeny_carman", "drained_surface")
+
+
+def _water(model: Model) -> dict[str, Any] | None:
+    """Properties and boundary conditions of the pore water."""
+    water = model._core.water
+    if water is None:
+        return None
+    values = {name: getattr(water, name) for name in _WATER}
+    return {**values, "modulus": repr(water.modulus), "conditions": [list(one) for one in model._water_conditions]}
+
+
+def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
+    water = None if entry is None else _core.PoreWater()
+    for name in _WATER if entry is not None else ():
+        setattr(water, name, float(entry[name]) if name == "modulus" else entry[name])
+    model._core.water = water
+    if entry is not None:
+        model._set_water_conditions([tuple(one) for one in entry["conditions"]])
 
 
 _NEWER = ("needs_cell_size",)

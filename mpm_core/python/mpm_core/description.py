@@ -118,6 +118,30 @@ def _is_history(value: Any) -> bool:
     )
 
 
+def _is_water(value: Any) -> bool:
+    if value is None:
+        return True
+    numbers = {"unit_weight", "modulus"}
+    return (
+        isinstance(value, dict)
+        and set(value) == numbers | {"kozeny_carman", "drained_surface", "conditions"}
+        and _is_number(value["unit_weight"])
+        and isinstance(value["modulus"], str)
+        and all(isinstance(value[key], bool) for key in ("kozeny_carman", "drained_surface"))
+        and _are(_is_water_condition, value["conditions"])
+    )
+
+
+def _is_water_condition(value: Any) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 5
+        and _is_tag(value[0])
+        and _are(_is_number, value[1:3])
+        and all(isinstance(one, bool) for one in value[3:])
+    )
+
+
 def _is_control(value: Any) -> bool:
     if value is None:
         return True
@@ -128,7 +152,7 @@ def _is_control(value: Any) -> bool:
     )
 
 
-_OPTIONAL = ("added_fields", "contacts", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
+_OPTIONAL = ("added_fields", "contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
 _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),
@@ -144,6 +168,7 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
     "contacts": (lambda v: _are(_is_contact, v), "a list of contacts with rigid surfaces"),
+    "water": (_is_water, "null, or the properties of the pore water"),
     "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),
     "velocity_fields": (lambda v: _are(_is_count, v), "a list of whole numbers from 0 on"),
     "cuts": (_is_count, "a whole number from 0 on"),

@@ -27,7 +27,7 @@ RTOL = 1e-6
 
 
 class Tangent:
-    """J = d (f_int + inertia) / du of an implicit step.
+    """J = d (f_int + inertia) / du of an implicit step; with pore water also by pressures, and the balance of the water by both.
 
     With nodal mixed discretisation J = K + K_p G, where G gives the nodes' averaged volumetric strain: the product grows the
     stencil to two rings. Where mean stresses are averaged too, J = K + K_p G + G^T (L + H G), over three rings.
@@ -43,8 +43,9 @@ class Tangent:
     """
 
     def __init__(self, step: Any, comm: MPI.Comm, dim: int, prefix: str) -> None:
-        nodes, dofs = step.owned_nodes, step.owned_nodes * dim
-        self._stiffness = coo_matrix(comm, (dofs, dofs), (dim, dim), step.stiffness_places())
+        n = step.unknowns
+        nodes, dofs = step.owned_nodes, step.owned_nodes * n
+        self._stiffness = coo_matrix(comm, (dofs, dofs), (n, n), step.stiffness_places())
         self._averaged = comm.allreduce(len(step.volumetric_force_values())) > 0
         self._product: PETSc.Mat | None = None
         if self._averaged:
@@ -55,12 +56,13 @@ class Tangent:
             self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, dim), step.mean_stress_places())
             self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
-        direct = step.total_nodes <= DIRECT_LIMIT[dim]
+        coupled = n > dim  # multigrid of one kind does not solve for displacements and pressures together
+        direct = coupled or step.total_nodes <= DIRECT_LIMIT[dim]
         alone = step.total_nodes <= ALONE_LIMIT[dim]
         self._options = direct_options(comm.size, alone) if direct else multigrid_options(dim, RTOL)
         self._comm = comm
         self._ksp = new_solver(comm, prefix)
-        self._near_null_space = rigid_body_motions(step.points, comm)
+        self._near_null_space = None if coupled else rigid_body_motions(step.points, comm)
         self.iterations = 0
         """Krylov iterations of the last solution."""
         self.failure = ""
@@ -84,7 +86,8 @@ class Tangent:
             self.matrix = self._strain.transposeMatMult(work)
             self.matrix.setBlockSize(self._stiffness.getBlockSize())
             self.matrix.axpy(1.0, self._product, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        self.matrix.setNearNullSpace(self._near_null_space)
+        if self._near_null_space is not None:
+            self.matrix.setNearNullSpace(self._near_null_space)
         self._ksp.setOperators(self.matrix)
         with defaults(self._prefix, self._options):
             self._ksp.setFromOptions()

@@ -26,6 +26,7 @@ from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_
 from .mesh import floats
 from .newton import Newton
 from .partition import rebalance_threshold
+from .pore_water import refuse_water
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
@@ -248,6 +249,7 @@ class Model(Body):
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, a law failed; with the place. Energy does not add up.
         """
+        refuse_water(self, "the explicit scheme")
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
@@ -325,6 +327,7 @@ class Model(Body):
         """
         refuse_contacts(self, "the implicit scheme")
         refuse_resting(self, "the implicit scheme")
+        self._check_water()
         options, longest, times, steps, threshold, limit, wanted = collectively(
             self.comm,
             lambda: (

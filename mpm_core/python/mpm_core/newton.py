@@ -190,9 +190,9 @@ class _StepSystem:
     def start(self) -> float:
         residual = self._trial(tangents=True)
         if residual == float("inf"):  # v0 carried on over the whole step is too much; begin at rest
-            self._step.velocity = np.zeros_like(self._step.velocity)
+            self._step.iterate = np.zeros_like(self._step.iterate)
             residual = self._trial(tangents=True)
-        self._base, self._last = self._step.velocity, residual
+        self._base, self._last = self._step.iterate, residual
         return residual
 
     def correction(self) -> bool:
@@ -208,14 +208,14 @@ class _StepSystem:
         return True
 
     def move(self, fraction: float) -> float:
-        self._step.velocity = self._base + fraction * self._correction
+        self._step.iterate = self._base + fraction * self._correction
         return self._trial(tangents=fraction == 1.0 and not self._ends_next())
 
     def work(self) -> float:
         return self._solver.sum(float(self._step.residual @ self._correction))
 
     def keep(self) -> None:
-        self._base = self._step.velocity
+        self._base = self._step.iterate
         self._reduction, self._last = self._residual / self._last, self._residual
 
     def _ends_next(self) -> bool:

@@ -44,7 +44,7 @@ class RelaxationSolver:
         options = self._options
         report = step.start_relaxation(options.kind)
         if report["failed"]:  # v0 carried on over the whole step is too much; begin at rest
-            step.velocity = np.zeros_like(step.velocity)
+            step.iterate = np.zeros_like(step.iterate)
             report = step.start_relaxation(options.kind)
         solution = Solution([relative(report)])
         done = 0

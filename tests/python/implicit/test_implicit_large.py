@@ -37,7 +37,7 @@ def test_rigid_rotation_turns_stresses_and_keeps_their_size():
     step = _core.ImplicitStep2(model._core)
     step.start(_core.ImplicitOptions(), dt)
     arm = step.points - 0.5
-    step.velocity = (2 * np.tan(angle / 2) / dt * np.c_[-arm[:, 1], arm[:, 0]]).ravel()
+    step.iterate = (2 * np.tan(angle / 2) / dt * np.c_[-arm[:, 1], arm[:, 0]]).ravel()
     assert step.trial()["failed"] == 0
     assert step.finish() == ""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

@@ -80,8 +80,8 @@ def test_tangent_in_axial_symmetry_is_the_derivative_of_the_residual(options):
 def check_tangent(dim, law, options):
     dt = 0.02
     step, rng = started_step(dim, law, **options)
-    v = step.velocity + 0.3 * free(step, dim, rng.normal(0.0, 1.0, len(step.velocity)))
-    step.velocity = v
+    v = step.iterate + 0.3 * free(step, dim, rng.normal(0.0, 1.0, len(step.iterate)))
+    step.iterate = v
     report = step.trial(tangents=True)
     assert report["failed"] == 0
     assert (report["plastic"] > 30) == (law is PLASTIC)
@@ -92,7 +92,7 @@ def check_tangent(dim, law, options):
         h = 1e-7
         forces = []
         for side in (1, -1):
-            step.velocity = v + side * h / dt * direction
+            step.iterate = v + side * h / dt * direction
             step.trial()
             forces.append(step.residual)
         difference = (forces[1] - forces[0]) / (2 * h)

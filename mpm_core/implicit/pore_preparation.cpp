@@ -1,0 +1,240 @@
+#include "implicit/pore_preparation.h"
+
+#include "implicit/pore_water.h"
+#include "model/integration.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm
+{
+namespace
+{
+/// Of the pressure projection over the least factor that does for uniaxial strain.
+constexpr double projection_margin = 4;
+
+/// What the particles of a run say of the water: sums of V times ...
+template <int D>
+struct PoreSums
+{
+  double volume = 0;     ///< 1
+  double pressure = 0;   ///< p
+  double mobility = 0;   ///< k / gamma_w
+  double compliance = 0; ///< 1 / M + n / K_w, the compliance of the soil without drainage
+};
+
+/// Means over the particles around a node; plain doubles.
+struct NodalWater
+{
+  double volume, pressure, mobility, compliance;
+};
+
+double longest_edge_squared(const auto& points, const auto& cell)
+{
+  double longest = 0;
+  for (std::size_t k = 0; k < cell.size(); ++k)
+    for (std::size_t l = 0; l < k; ++l)
+    {
+      double squared = 0;
+      for (std::size_t a = 0; a < points[cell[k]].size(); ++a)
+        squared += std::pow(points[cell[k]][a] - points[cell[l]][a], 2);
+      longest = std::max(longest, squared);
+    }
+  return longest;
+}
+
+/// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
+template <class G, int D = G::dim>
+void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
+                  double modulus, double factor, PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
+{
+  const Vector<D> x = at<D>(particles.position, p);
+  const auto n = shape_functions<D>(mesh.shapes[run.cell], x);
+  const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
+  const double storage = particles.porosity[0][p] / water.modulus;
+  const double mobility = particles.conductivity[0][p] / water.unit_weight, compliance = 1 / modulus + storage;
+  sums.volume += volume;
+  sums.pressure += volume * pressure;
+  sums.mobility += volume * mobility;
+  sums.compliance += volume * compliance;
+  for (int k = 0; k <= D; ++k)
+  {
+    const Index node = mesh.cells[run.cell][k];
+    double there = pressure;
+    for (int a = 0; a < D; ++a)
+      there += particles.pressure_gradient[a][p] * (mesh.points[node][a] - x[a]);
+    cell.mean[k] += volume * n[k];
+    for (int l = 0; l <= D; ++l)
+      cell.capacity[k][l] += volume * storage * n[k] * n[l];
+    const double weight = volume * n[k];
+    NodalWater& sum = nodes[node];
+    sum.volume += weight;
+    sum.pressure += weight * there;
+    sum.mobility += weight * mobility;
+    sum.compliance += weight * compliance;
+  }
+}
+
+/// The projection of a linear pressure has the cell matrix V (delta_kl - 1/(D+1)) / ((D+1) (D+2)), whatever the shape.
+template <int D>
+void add_projection(const PoreSums<D>& sums, double edge_squared, double dt, PoreCell<D>& cell)
+{
+  const double margin = 1.5 * sums.compliance - 6 * dt * sums.mobility / edge_squared;
+  const double factor = projection_margin * std::max(0.0, margin) / (D + 2);
+  for (int k = 0; k <= D; ++k)
+    for (int l = 0; l <= D; ++l)
+      cell.capacity[k][l] += factor * ((k == l ? 1.0 : 0.0) - 1.0 / (D + 1));
+}
+
+/// Sums over the particles of all cells, this rank's part of those over nodes too.
+template <class G, int D = G::dim>
+std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& step)
+{
+  const VelocityField<G>& field = model.fields.front();
+  const Mesh<D>& mesh = model.mesh;
+  std::vector<NodalWater> nodes(mesh.points.size(), NodalWater{});
+  step.pore.cells.assign(static_cast<std::size_t>(mesh.owned_cells), PoreCell<D>{});
+  std::vector<PoreSums<D>> sums(step.pore.cells.size());
+  for (const Run& run : model.order.runs)
+  {
+    const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
+    const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    for (Index p = run.first; p < run.last; ++p)
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, step.pore.cells[run.cell],
+                      sums[static_cast<std::size_t>(run.cell)], nodes);
+  }
+  for (Index c : step.cells)
+  {
+    PoreCell<D>& cell = step.pore.cells[c];
+    const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
+    cell.pressure = of_cell.pressure;
+    cell.flux = step.dt * of_cell.mobility;
+    add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
+  }
+  return nodes;
+}
+
+/// Weights of the ghost penalty on the pressure increment, as those on the displacement: of its flow, and of its
+/// storage in the place of the mass.
+template <class G, int D = G::dim>
+void weigh_ghosts(const std::vector<NodalWater>& nodes, ImplicitStep<G>& step)
+{
+  const GhostOptions& options = step.options.ghost;
+  step.pore.ghosts.assign(step.ghosts.size(), 0.0);
+  for (std::size_t f = 0; f < step.ghosts.size(); ++f)
+  {
+    const GhostFacet<D>& facet = step.ghosts[f];
+    double mobility = 0, compliance = 0;
+    for (int k = 0; k < D; ++k) // those on the facet, which both ranks have
+    {
+      mobility += nodes[facet.nodes[k]].mobility / D;
+      compliance += nodes[facet.nodes[k]].compliance / D;
+    }
+    const double h = facet.size;
+    step.pore.ghosts[f] =
+        facet.area * h * (options.stiffness * step.dt * mobility + options.mass * h * h * compliance);
+  }
+}
+
+/// Nodes whose pressure is prescribed, on any rank's facets, and that pressure.
+template <class G, int D = G::dim>
+void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<G>& step)
+{
+  const Mesh<D>& mesh = model.mesh;
+  PoreStep<D>& pore = step.pore;
+  pore.held.assign(mesh.points.size(), 0);
+  pore.prescribed.assign(mesh.points.size(), 0.0);
+  for (const PressureCondition& condition : model.water->conditions)
+  {
+    if (!condition.held)
+      continue;
+    std::vector<double> on_facet(mesh.points.size(), 0.0);
+    for (Index c = 0; c < mesh.n_cells(); ++c)
+      for (int k = 0; k <= D; ++k)
+        if (mesh.facet_tags[c][k] == condition.facet_tag)
+          for (Index node : facet_nodes<D>(mesh.cells[c], k))
+            on_facet[node] = 1;
+    sum_shared(exchange, on_facet.data(), 1);
+    for (std::size_t i = 0; i < on_facet.size(); ++i)
+      if (on_facet[i] > 0 && step.active[i])
+      {
+        pore.held[i] = 1;
+        pore.prescribed[i] = pressure_at(condition, mesh.points[i][D - 1]);
+      }
+  }
+}
+
+/// Whether nothing determines the pressure: none is prescribed, and a uniform change of it does no work on the
+/// displacements that supports leave free.
+/// @note Collective
+template <class G, int D = G::dim>
+bool pressure_is_free(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                      const ImplicitStep<G>& step)
+{
+  std::vector<Vector<D>> work(mesh.points.size(), Vector<D>{});
+  for (Index c : step.cells)
+    for (int k = 0; k <= D; ++k)
+      for (int a = 0; a < D; ++a)
+        work[mesh.cells[c][k]][a] += field.moments[c].volume * dilation_gradient<G>(mesh.shapes[c], k)[a];
+  sum_shared(exchange, work);
+  std::array<double, 3> largest{}; // held, work, that which supports leave
+  const auto note = [&](std::size_t entry)
+  {
+    for (const Vector<D>& w : work)
+      largest[entry] = std::max(largest[entry], norm<D>(w));
+  };
+  note(1);
+  for (Support<D> support : field.supports)
+  {
+    support.value.fill(0);
+    impose<D>(support, work[static_cast<std::size_t>(support.node)]);
+  }
+  note(2);
+  largest[0] = std::ranges::any_of(step.pore.held, [](unsigned char held) { return held != 0; }) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, largest.data(), 3, MPI_DOUBLE, MPI_MAX, exchange.comm);
+  return largest[0] == 0 && largest[2] <= 1e-10 * largest[1];
+}
+} // namespace
+
+template <class G>
+void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
+{
+  auto& pore = step.pore;
+  pore.cells.clear();
+  pore.flows = false;
+  if (!model.water)
+    return;
+  std::vector<NodalWater> nodes = sum_particles(model, step);
+  if (step.options.at_rest)
+    return;
+  sum_shared(model.exchange, nodes);
+  pore.start.assign(nodes.size(), 0.0);
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (NodalWater& node = nodes[i]; node.volume > 0)
+    {
+      pore.start[i] = node.pressure / node.volume;
+      node.mobility /= node.volume;
+      node.compliance /= node.volume;
+    }
+  update(step.halos.nodes, pore.start);
+  weigh_ghosts(nodes, step);
+  pore.flows = true;
+  pore.gravity = gravity_at(model, model.time + step.dt);
+  pore.density = model.water->unit_weight / standard_gravity;
+  pore.unit = 0;
+  for (const Law& law : model.laws)
+    pore.unit = std::max(pore.unit, p_wave_modulus(law));
+  pore.rate.assign(nodes.size(), 0.0);
+  hold_pressures(model, model.exchange, step);
+  impose_pressures(step.dt, pore);
+  if (std::isinf(model.water->modulus) &&
+      pressure_is_free(model.mesh, model.exchange, model.fields.front(), step))
+    throw InputError("no pore pressure is prescribed, the water is incompressible and supports are all around: the "
+                     "pressure is undetermined; prescribe one by hold_pore_pressure(), or let water be compressible");
+}
+
+#define INSTANTIATE(G) template void start_pore_water(Model<G>&, ImplicitStep<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

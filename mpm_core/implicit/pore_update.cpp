@@ -1,0 +1,128 @@
+#include "implicit/pore_update.h"
+
+#include "base/eigen.h"
+
+#include <cmath>
+
+namespace mpm
+{
+namespace
+{
+/// Linear pressures of a cell: increment at its centre, its gradient, and that of the pressure at the end as the
+/// cell has moved.
+template <int D>
+struct CellPressure
+{
+  double increment = 0;
+  Vector<D> of_increment{}, at_end{};
+};
+
+/// grad p at the end: F^-T times that over the cell as it was, F = 1 + grad u.
+template <class G>
+Vector<G::dim> in_moved_cell(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                             Index cell, const Vector<G::dim>& gradient)
+{
+  constexpr int D = G::dim;
+  if (step.options.hold_positions)
+    return gradient;
+  Matrix<D> f{};
+  for (int a = 0; a < D; ++a)
+  {
+    f[a][a] = 1;
+    for (int b = 0; b < D; ++b)
+      for (int k = 0; k <= D; ++k)
+        f[a][b] += step.dt * field.velocity[mesh.cells[cell][k]][a] * mesh.shapes[cell].gradient[k][b];
+  }
+  const Eigen::Matrix<double, D, 1> old = Eigen::Map<const Eigen::Matrix<double, D, 1>>(gradient.data());
+  const Eigen::Matrix<double, D, 1> now = as_eigen<D>(f).transpose().inverse() * old;
+  Vector<D> moved;
+  for (int a = 0; a < D; ++a)
+    moved[a] = now[a];
+  return moved;
+}
+
+template <class G, int D = G::dim>
+CellPressure<D> cell_pressure(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                              Index cell)
+{
+  const PoreStep<D>& pore = step.pore;
+  CellPressure<D> pressure;
+  Vector<D> at_end{};
+  for (int k = 0; k <= D; ++k)
+  {
+    const Index node = mesh.cells[cell][k];
+    const double increment = step.dt * pore.rate[node];
+    pressure.increment += increment / (D + 1);
+    for (int a = 0; a < D; ++a)
+    {
+      pressure.of_increment[a] += increment * mesh.shapes[cell].gradient[k][a];
+      at_end[a] += (pore.start[node] + increment) * mesh.shapes[cell].gradient[k][a];
+    }
+  }
+  pressure.at_end = in_moved_cell(mesh, field, step, cell, at_end);
+  return pressure;
+}
+
+/// Kozeny and Carman's factor of the conductivity.
+double kozeny_carman(double porosity) { return porosity * porosity * porosity / ((1 - porosity) * (1 - porosity)); }
+
+template <int D>
+void grow_pores(Particles<D>& particles, Index first, Index last, double growth, bool follows)
+{
+  for (Index p = first; p < last; ++p)
+  {
+    const double before = particles.porosity[0][p], after = 1 - (1 - before) / growth;
+    particles.porosity[0][p] = after;
+    if (follows)
+      particles.conductivity[0][p] *= kozeny_carman(after) / kozeny_carman(before);
+  }
+}
+
+template <int D>
+void add_increments(Particles<D>& particles, const Run& run, const Vector<D>& centre, const CellPressure<D>& pressure)
+{
+  for (Index p = run.first; p < run.last; ++p)
+  {
+    double increment = pressure.increment;
+    for (int a = 0; a < D; ++a)
+    {
+      increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
+      particles.pressure_gradient[a][p] = pressure.at_end[a];
+    }
+    particles.pore_pressure[0][p] += increment;
+  }
+}
+} // namespace
+
+template <class G>
+void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
+{
+  if (!model.water)
+    return;
+  const auto& mesh = model.mesh;
+  for (const Run& run : model.order.runs)
+  {
+    if (step.pore.flows)
+      add_increments<G::dim>(model.particles, run, mesh.shapes[run.cell].centre,
+                             cell_pressure(mesh, model.fields.front(), step, run.cell));
+    if (!step.options.hold_positions)
+      grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,
+                         model.water->kozeny_carman);
+  }
+}
+
+template <int D>
+void add_inflow(const PoreStep<D>& pore, std::span<const unsigned char> owned, PoreWater& water)
+{
+  for (std::size_t i = 0; i < pore.content.size() && pore.flows; ++i)
+    if (owned[i] && pore.held[i])
+      water.inflow += pore.content[i];
+}
+
+template void add_inflow(const PoreStep<2>&, std::span<const unsigned char>, PoreWater&);
+template void add_inflow(const PoreStep<3>&, std::span<const unsigned char>, PoreWater&);
+#define INSTANTIATE(G) template void update_pore_water(Model<G>&, const ImplicitStep<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

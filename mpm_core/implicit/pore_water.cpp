@@ -1,0 +1,199 @@
+#include "implicit/pore_water.h"
+
+#include <algorithm>
+
+namespace mpm
+{
+namespace
+{
+/// Acceleration of a cell's water: that of its particles, less gravity.
+template <class G, int D = G::dim>
+Vector<D> relative_acceleration(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                                Index cell)
+{
+  Vector<D> acceleration;
+  for (int a = 0; a < D; ++a)
+    acceleration[a] = -step.pore.gravity[a];
+  if (step.options.quasi_static)
+    return acceleration;
+  double volume = 0;
+  for (double mean : step.pore.cells[cell].mean)
+    volume += mean;
+  for (int k = 0; k <= D; ++k)
+    for (int a = 0; a < D; ++a)
+    {
+      const Index node = mesh.cells[cell][k];
+      const double gained = end_velocity(step, field, node, a) - step.stage.start[node][a];
+      acceleration[a] += step.pore.cells[cell].mean[k] / volume * gained / step.stage.dt;
+    }
+  return acceleration;
+}
+
+/// Gradient of the pressure at the end less what the weight and the inertia of the water balance [Pa/m].
+template <class G, int D = G::dim>
+Vector<D> driving_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step, Index cell)
+{
+  Vector<D> gradient = relative_acceleration(mesh, field, step, cell);
+  for (double& component : gradient)
+    component *= step.pore.density;
+  for (int k = 0; k <= D; ++k)
+  {
+    const Index node = mesh.cells[cell][k];
+    const double pressure = step.pore.start[node] + step.dt * step.pore.rate[node];
+    for (int a = 0; a < D; ++a)
+      gradient[a] += pressure * mesh.shapes[cell].gradient[k][a];
+  }
+  return gradient;
+}
+
+template <int D>
+double volume_strain(const CellStrain<D>& strain)
+{
+  return strain.increment[0] + strain.increment[1] + strain.increment[2]; // also where volumes do not change
+}
+
+template <class G, int D = G::dim>
+void add_ghost_content(const ImplicitStep<G>& step, std::vector<double>& content)
+{
+  for (std::size_t f = 0; f < step.ghosts.size(); ++f)
+  {
+    const GhostFacet<D>& facet = step.ghosts[f];
+    double jump = 0;
+    for (int k = 0; k < D + 2; ++k)
+      jump += facet.jump[k] * step.dt * step.pore.rate[facet.nodes[k]];
+    for (int k = 0; k < D + 2; ++k)
+      content[facet.nodes[k]] += facet.fraction[k] * facet.jump[k] * step.pore.ghosts[f] * jump;
+  }
+}
+} // namespace
+
+template <class G, int D>
+void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces)
+{
+  if (step.pore.cells.empty())
+    return;
+  for (Index c : step.cells)
+  {
+    const PoreCell<D>& cell = step.pore.cells[c];
+    double pressure = cell.pressure;
+    for (int k = 0; k <= D && step.pore.flows; ++k)
+      pressure += cell.mean[k] * step.dt * step.pore.rate[mesh.cells[c][k]];
+    for (int k = 0; k <= D; ++k)
+    {
+      const Vector<D> dilation = dilation_gradient<G>(mesh.shapes[c], k);
+      for (int a = 0; a < D; ++a)
+        forces[mesh.cells[c][k]].internal[a] -= pressure * dilation[a];
+    }
+  }
+}
+
+template <class G, int D>
+void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                        ImplicitStep<G>& step)
+{
+  PoreStep<D>& pore = step.pore;
+  if (!pore.flows)
+    return;
+  pore.content.assign(mesh.points.size(), 0.0);
+  for (Index c : step.cells)
+  {
+    const PoreCell<D>& cell = pore.cells[c];
+    const auto& nodes = mesh.cells[c];
+    const Vector<D> drive = driving_gradient(mesh, field, step, c);
+    for (int k = 0; k <= D; ++k)
+    {
+      double& content = pore.content[nodes[k]];
+      content += cell.mean[k] * volume_strain(step.strains[c]);
+      content += cell.flux * dot<D>(mesh.shapes[c].gradient[k], drive);
+      for (int l = 0; l <= D; ++l)
+        content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]];
+    }
+  }
+  add_ghost_content(step, pore.content);
+  sum_shared(exchange, pore.content);
+}
+
+namespace
+{
+/// Derivatives of the water balance of vertex k of a cell by displacement and pressure of vertex l; see (W4).
+template <class G, int D = G::dim>
+void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, int k, int l, BlockWriter<D>& tangent)
+{
+  const PoreStep<D>& pore = step.pore;
+  const PoreCell<D>& cell = pore.cells[c];
+  const CellShape<D>& shape = mesh.shapes[c];
+  const Index row = mesh.cells[c][k], column = mesh.cells[c][l];
+  const double unit = pore.unit;
+  double volume = 0;
+  for (double mean : cell.mean)
+    volume += mean;
+  const double inertia = step.options.quasi_static ? 0
+                                                   : cell.flux * pore.density * cell.mean[l] /
+                                                         (volume * step.stage.weight * step.stage.dt * step.dt);
+  Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
+  for (int a = 0; a < D; ++a)
+  {
+    forces[a] *= pore.held[column] ? 0 : -unit * cell.mean[l];
+    volumes[a] = pore.held[row] ? 0 : -unit * (cell.mean[k] * volumes[a] + inertia * shape.gradient[k][a]);
+  }
+  double by_pressure = -unit * unit * (cell.capacity[k][l] + cell.flux * dot<D>(shape.gradient[k], shape.gradient[l]));
+  if (pore.held[row] || pore.held[column])
+    by_pressure = row == column ? -unit * cell.mean[k] : 0;
+  tangent.add_coupled(row, column, forces, volumes, by_pressure);
+}
+
+/// The ghost penalty of the pressures.
+template <class G, int D = G::dim>
+void add_ghost_pressures(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+{
+  const PoreStep<D>& pore = step.pore;
+  std::size_t rows = 0;
+  for (const GhostFacet<D>& facet : step.ghosts)
+    rows +=
+        static_cast<std::size_t>(std::ranges::count_if(facet.fraction, [](double fraction) { return fraction != 0; }));
+  tangent.expect_pressures(rows * (D + 2));
+  for (std::size_t f = 0; f < step.ghosts.size(); ++f)
+  {
+    const GhostFacet<D>& facet = step.ghosts[f];
+    for (int k = 0; k < D + 2; ++k)
+      for (int l = 0; l < D + 2 && facet.fraction[k] != 0; ++l)
+      {
+        const bool held = pore.held[facet.nodes[k]] || pore.held[facet.nodes[l]];
+        const double weight = held ? 0 : -pore.unit * pore.unit * pore.ghosts[f] * facet.fraction[k];
+        tangent.add_pressure(facet.nodes[k], facet.nodes[l], weight * facet.jump[k] * facet.jump[l]);
+      }
+  }
+}
+} // namespace
+
+template <class G, int D>
+void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+{
+  if (!step.pore.flows)
+    return;
+  tangent.expect_coupled(step.cells.size() * (D + 1) * (D + 1));
+  for (Index c : step.cells)
+    for (int k = 0; k <= D; ++k)
+      for (int l = 0; l <= D; ++l)
+        add_cell_block(mesh, step, c, k, l, tangent);
+  add_ghost_pressures(step, tangent);
+}
+
+template <int D>
+void impose_pressures(double dt, PoreStep<D>& pore)
+{
+  for (std::size_t i = 0; i < pore.held.size(); ++i)
+    if (pore.held[i])
+      pore.rate[i] = (pore.prescribed[i] - pore.start[i]) / dt;
+}
+
+template void impose_pressures(double, PoreStep<2>&);
+template void impose_pressures(double, PoreStep<3>&);
+#define INSTANTIATE(G)                                                                                                 \
+  template void add_pore_forces(const Mesh<G::dim>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);       \
+  template void find_water_balance(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);     \
+  template void add_pore_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, BlockWriter<G::dim>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

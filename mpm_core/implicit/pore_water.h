@@ -1,0 +1,37 @@
+#pragma once
+/// @file
+/// The pore water of an implicit step: forces of its pressure, the balance of its volume, and their tangent.
+///
+/// With effective stress sigma' (tension positive) and pore pressure p (compression positive; Biot 1941),
+///
+///     div(sigma' - p I) + rho (g - a) = 0,    div v + n / K_w dp/dt + div q = 0,
+///     q = -(k / gamma_w) (grad p - rho_w (g - a)),
+///
+/// backward Euler takes the second equation over the step. Both are sums over particles with the cells' linear shape
+/// functions; gradients and volumes are those of the start. A polynomial pressure projection of the increment (Bochev
+/// and Dohrmann 2006; White and Borja 2008) keeps pressures from oscillating, with the factor that
+/// `fenics_bridge.water.Consolidation` has.
+
+#include "implicit/entries.h"
+
+namespace mpm
+{
+/// Adds the forces of the pore pressures under the iterate to the internal ones; this rank's part.
+template <class G, int D = G::dim>
+void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces);
+
+/// `pore.content` of the iterate: zero at the solution where no pressure is prescribed.
+/// @pre the step's strains belong to the iterate
+/// @note Collective
+template <class G, int D = G::dim>
+void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
+                        ImplicitStep<G>& step);
+
+/// The blocks of displacement and pressure, of pressure and displacement, and of pressures alone.
+template <class G, int D = G::dim>
+void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent);
+
+/// Makes the iterate have the prescribed pressures.
+template <int D>
+void impose_pressures(double dt, PoreStep<D>& pore);
+} // namespace mpm

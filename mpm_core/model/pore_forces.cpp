@@ -1,0 +1,86 @@
+#include "model/pore_forces.h"
+
+#include "model/integration.h"
+
+namespace mpm
+{
+template <class G, int D>
+void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const std::vector<Run>& runs,
+                     VelocityField<G>& field)
+{
+  if (!particles.pore_pressure.present)
+    return;
+  for (const Run& run : runs)
+  {
+    double sum = 0;
+    for (Index p = run.first; p < run.last; ++p)
+      sum += particles.volume[p] * particles.pore_pressure[0][p];
+    Working<G> stress{};
+    for (int k : normal_component<G>)
+      stress[k] = -sum * integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    for (int k = 0; k <= D; ++k)
+    {
+      const Vector<D> force = internal_force<G>(stress, mesh.shapes[run.cell], k);
+      for (int a = 0; a < D; ++a)
+        field.nodes[mesh.cells[run.cell][k]].internal[a] += force[a];
+    }
+  }
+}
+
+namespace
+{
+/// Integral of N_i N_j over a facet of unit measure, with weights r_m of its vertices; in axial symmetry their radii.
+template <int D>
+double product_integral(int i, int j, const std::array<double, D>& r)
+{
+  constexpr double whole = D == 2 ? 24 : 60; // (D + 2)! / (D - 1)!
+  double sum = 0;
+  for (int m = 0; m < D; ++m)
+  {
+    const int equal = (i == j) + (j == m) + (i == m);
+    sum += r[m] * (equal == 3 ? 6 : equal == 1 ? 2 : 1) / whole;
+  }
+  return sum;
+}
+
+/// Forces of a pressure on the facet of a cell opposite to vertex k.
+template <class G, int D = G::dim>
+void press(const Mesh<D>& mesh, const PressureCondition& condition, Index cell, int k, Array<NodeSums<D>>& nodes)
+{
+  const auto corners = facet_nodes<D>(mesh.cells[cell], k);
+  const CellShape<D>& shape = mesh.shapes[cell];
+  std::array<double, D> pressure, weight;
+  for (int i = 0; i < D; ++i)
+  {
+    pressure[i] = pressure_at(condition, mesh.points[corners[i]][D - 1]);
+    weight[i] = thickness<G>(mesh.points[corners[i]]);
+  }
+  for (int i = 0; i < D; ++i)
+  {
+    double sum = 0;
+    for (int j = 0; j < D; ++j)
+      sum += pressure[j] * product_integral<D>(i, j, weight);
+    for (int a = 0; a < D; ++a) // the inward normal times the area is D V grad N_k
+      nodes[corners[i]].traction[a] += sum * D * shape.volume * shape.gradient[k][a];
+  }
+}
+} // namespace
+
+template <class G>
+void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, VelocityField<G>& field)
+{
+  for (const PressureCondition& condition : water.conditions)
+    for (Index c = 0; c < mesh.owned_cells && condition.presses; ++c)
+      for (int k = 0; k <= G::dim && field.moments[c].volume > 0; ++k)
+        if (mesh.facet_tags[c][k] == condition.facet_tag)
+          press<G>(mesh, condition, c, k, field.nodes);
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, VelocityField<G>&);                          \
+  template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const std::vector<Run>&,                \
+                                VelocityField<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm

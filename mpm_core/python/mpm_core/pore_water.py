@@ -1,0 +1,222 @@
+"""Water in the pores of a body's soil, and its boundary conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._core import InputError
+from .checks import positive
+from .collective import collectively
+from .conditions import Conditions
+from .mesh import Tag, floats
+from .parameter_fields import Field
+from .particles import Particles
+
+WaterCondition: TypeAlias = tuple[int, float, float, bool, bool]
+"""Facet tag; pressure at height 0 [Pa] and its increase with height [Pa/m]; whether the pore water has it; whether it presses on
+the soil"""
+
+
+class PoreWater(Conditions):
+    """The pore water of a body; see `Model`."""
+
+    particles: Particles
+    _water_conditions: list[WaterCondition]
+
+    def add_water(
+        self,
+        *,
+        porosity: Field,
+        conductivity: Field,
+        unit_weight: float = 9810.0,
+        modulus: float = 2.2e9,
+        kozeny_carman: bool = False,
+        drained_surface: bool = False,
+    ) -> None:
+        """Fill the pores of all particles with water, which from then on flows in implicit steps.
+
+        Stresses of the particles are then effective stresses, and their density is that of the saturated soil. Pore pressures
+        begin at zero, see `set_pore_pressure`. A boundary without a condition is impervious, see `hold_pore_pressure`.
+
+        Args:
+            porosity: volume of the pores over that of the soil [-], in (0, 1); it follows the volume of the particles.
+            conductivity: hydraulic conductivity k [m/s], positive. Both: a number; an array, shape (n,), in the order of
+                ``particles``; a function of positions, shape (n, D); or {cell tag or name: number}.
+            unit_weight: of water [N/m3].
+            modulus: bulk modulus of water [Pa]; may be infinite.
+            kozeny_carman: let the conductivity follow the porosity as n^3 / (1 - n)^2.
+            drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh.
+
+        Raises:
+            InputError: on all ranks, for values out of these ranges, or a model without particles.
+        """
+
+        def checked() -> tuple[Any, NDArray, NDArray]:
+            water = _core.PoreWater()
+            water.unit_weight = positive("unit_weight", unit_weight, "N/m3")
+            if not modulus > 0:
+                raise InputError(f"modulus is {modulus} Pa, expected a positive number, or infinity")
+            water.modulus, water.kozeny_carman = float(modulus), bool(kozeny_carman)
+            water.drained_surface = bool(drained_surface)
+            n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
+            _require_pores(n, k)
+            return water, n, k
+
+        if self.comm.allreduce(len(self.particles)) == 0:
+            raise InputError("the model has no particles, expected them before add_water()")
+        water, n, k = collectively(self.comm, checked)
+        self._core.water = water
+        self.particles.set("porosity", n)
+        self.particles.set("conductivity", k)
+        self.particles.set("pore_pressure", np.zeros(len(n)))
+        self.particles.set("pressure_gradient", np.zeros((len(n), self.mesh.dim)))
+        self._set_water_conditions([])
+
+    def _values(self, name: str, given: Field) -> NDArray[np.float64]:
+        """Values of all particles of this rank: (n,)."""
+        position = self.particles.position
+        if isinstance(given, dict):
+            tags, values = self.mesh.cell_tags[self.particles.cell], np.full(len(position), np.nan)
+            for key, value in given.items():
+                values[np.isin(tags, self.mesh.tags_of("cell", key))] = float(value)
+            if np.isnan(values).any():
+                raise InputError(f"{name} has no value for the cell tag {tags[np.isnan(values)][0]}")
+            return values
+        found = given(position) if callable(given) else given
+        return np.array(np.broadcast_to(np.asarray(found, dtype=np.float64), len(position)))
+
+    def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
+        """Give the particles pore pressures: those at the nodes, and linear in each cell.
+
+        Args:
+            pressure: [Pa], compression positive: a number, or a function of positions, shape (n, D), that returns shape (n,).
+
+        Raises:
+            InputError: on all ranks, for a model without water, or pressures that are not finite.
+        """
+        self._require_water()
+
+        def at_nodes() -> NDArray[np.float64]:
+            points = self.mesh.points
+            found = pressure(points) if callable(pressure) else pressure
+            return floats("pressure", np.broadcast_to(np.asarray(found, dtype=float), len(points)), (len(points),))
+
+        corners = self.mesh.cells[self.particles.cell]
+        values = collectively(self.comm, at_nodes)[corners]
+        x, position = self.mesh.points[corners], self.particles.position
+        gradient = np.linalg.solve(x[:, 1:] - x[:, :1], (values[:, 1:] - values[:, :1])[..., None])[..., 0]
+        self.particles.set("pore_pressure", values[:, 0] + np.einsum("pa,pa->p", gradient, position - x[:, 0]))
+        self.particles.set("pressure_gradient", gradient)
+
+    def hold_pore_pressure(
+        self, facet_tag: Tag, pressure: float | None = None, *, level: float | None = None, presses: bool | None = None
+    ) -> None:
+        """Prescribe the pore pressure at the nodes on facets with a tag, where water then enters or leaves. A further call changes it.
+
+        Args:
+            facet_tag: by number or name.
+            pressure: [Pa], the same at all nodes; 0 where water leaves freely.
+            level: height of standing water [m] along the last axis instead: hydrostatic pressure below it, zero above.
+            presses: whether this pressure also loads the surface of the soil, as a total stress, which standing water does; by
+                default with ``level``.
+
+        Raises:
+            InputError: on all ranks, for a model without water, an unknown tag, both of pressure and level or none of them, or a
+                number that is not finite.
+        """
+        self._require_water()
+
+        def checked() -> tuple[list[int], float, float, bool]:
+            if (pressure is None) == (level is None):
+                raise InputError(f"pressure is {pressure} and level is {level}, expected one of them")
+            tags = self.mesh.tags_of("facet", facet_tag)
+            if pressure is not None:
+                return tags, float(floats("pressure", pressure, ())), 0.0, bool(presses)
+            weight = self._core.water.unit_weight
+            return tags, weight * float(floats("level", level, ())), -weight, presses is None or bool(presses)
+
+        tags, value, slope, loads = collectively(self.comm, checked)
+        self._replace(tags, True, (value, slope, True, loads))
+
+    def press_surface(self, facet_tag: Tag, pressure: float) -> None:
+        """Load the soil at facets with a tag by a pressure, as a total stress at their nodes. A further call changes it.
+
+        Unlike those of `traction`, its forces do not move with the particles; they act wherever soil is behind the facets.
+
+        Args:
+            facet_tag: by number or name.
+            pressure: [Pa], compression positive.
+
+        Raises:
+            InputError: on all ranks, for a model without water, an unknown tag, or a pressure that is not finite.
+        """
+        self._require_water()
+        tags, value = collectively(
+            self.comm, lambda: (self.mesh.tags_of("facet", facet_tag), float(floats("pressure", pressure, ())))
+        )
+        self._replace(tags, False, (value, 0.0, False, True))
+
+    def _replace(self, tags: list[int], held: bool, values: tuple[float, float, bool, bool]) -> None:
+        """Replace the conditions at facets with these tags, of the pore water or of loads."""
+        kept = [one for one in self._water_conditions if one[0] not in tags or one[3] != held]
+        self._set_water_conditions([*kept, *((tag, *values) for tag in tags)])
+
+    def seal(self, facet_tag: Tag) -> None:
+        """Make facets with a tag impervious again.
+
+        Raises:
+            InputError: no pore pressure is prescribed there.
+        """
+
+        def remaining() -> list[WaterCondition]:
+            tags = self.mesh.tags_of("facet", facet_tag)
+            if not {one[0] for one in self._water_conditions if one[3]} >= set(tags):
+                raise InputError(f"facet_tag {facet_tag!r} has no prescribed pore pressure")
+            return [one for one in self._water_conditions if one[0] not in tags or not one[3]]
+
+        self._set_water_conditions(collectively(self.comm, remaining))
+
+    def water_volume(self) -> float:
+        """Volume of the pores [m3], per metre or per radian in two dimensions. Collective."""
+        self._require_water()
+        return self.comm.allreduce(float(self.particles.porosity @ self.particles.volume))
+
+    def water_inflow(self) -> float:
+        """Water that has entered the soil since `add_water` [m3], as `water_volume`; negative where it left. Collective."""
+        self._require_water()
+        return self.comm.allreduce(self._core.water.inflow)
+
+    def _set_water_conditions(self, conditions: list[WaterCondition]) -> None:
+        water = self._core.water
+        water.set_conditions(conditions)
+        self._core.water, self._water_conditions = water, conditions
+
+    def _require_water(self) -> None:
+        if self._core.water is None:
+            raise InputError("the model has no pore water, expected add_water() before")
+
+    def _check_water(self) -> None:
+        """Refuse particles without pores, such as those seeded after `add_water`. Collective."""
+        if self._core.water is not None:
+            p = self.particles
+            collectively(self.comm, lambda: _require_pores(p.porosity, p.conductivity))
+
+
+def _require_pores(porosity: NDArray, conductivity: NDArray) -> None:
+    bad = ~((porosity > 0) & (porosity < 1))
+    if bad.any():
+        raise InputError(f"porosity is {porosity[bad][0]}, expected more than 0 and less than 1 in all particles")
+    bad = ~((conductivity > 0) & np.isfinite(conductivity))
+    if bad.any():
+        raise InputError(f"conductivity is {conductivity[bad][0]} m/s, expected positive numbers in all particles")
+
+
+def refuse_water(body: PoreWater, scheme: str) -> None:
+    """Raises InputError where a scheme would leave the flow of the pore water out."""
+    if body._core.water is not None:
+        raise InputError(f"the model has pore water, whose flow {scheme} does not know; use implicit()")
