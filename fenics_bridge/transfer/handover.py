@@ -13,7 +13,8 @@ from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
-from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
+from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
+from fenics_bridge.water.consolidation import Consolidation
 
 _BALANCED, _MOST_STEPS = 5e-4, 60
 """Out-of-balance ratio to reach, and largest number of steps: near collapse each one leaves a fraction of it."""
@@ -61,7 +62,8 @@ def initialise(
 
     Args:
         model: model with particles.
-        fem: finite elements, solved and converged; the meshes and their partitions may differ.
+        fem: finite elements, solved and converged; the meshes and their partitions may differ. Where particles have pore water
+            (`Model.add_water`) a `water.Consolidation` as it is, whose pore pressures they take too; `equilibrate` keeps these.
         count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
         move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
             Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
@@ -91,7 +93,7 @@ def initialise(
         model.rest()
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
-    if isinstance(fem, QuasiStatic):
+    if isinstance(fem, (QuasiStatic, Consolidation)):
         number = np.rint(search.values(fem.material_function())[:, 0]).astype(int)
         outside = int(np.sum(number < 0))
         agree(
@@ -115,7 +117,7 @@ def _take_stress_and_state(model, fem, search, smooth):
     """Give the particles stress and state of the finite elements at their positions; returns the number of returned stresses."""
     particles = model.particles
     stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
-    if isinstance(fem, QuasiStatic):
+    if isinstance(fem, (QuasiStatic, Consolidation)):
         values = search.values(fem.state_function())
         state[:, : values.shape[1]] = values
     returned = _returned(model.laws, particles.material, stress, state)
@@ -124,6 +126,9 @@ def _take_stress_and_state(model, fem, search, smooth):
     particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
     for name in ("velocity", "velocity_gradient") if model.resting_cells.any() else ("velocity",):
         particles.set(name, np.zeros_like(getattr(particles, name)))
+    if isinstance(fem, Consolidation):
+        particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
+        particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
     return returned
 
 
@@ -162,6 +167,9 @@ def _require_usable(model, fem, move):
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
+    wet = model._core.water is not None
+    agree(model.comm, None if wet == isinstance(fem, Consolidation) else f"fem: is a {type(fem).__name__}, expected a water.Consolidation "
+          "where particles have pore water (Model.add_water), and another one where they have none")  # fmt: skip
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 

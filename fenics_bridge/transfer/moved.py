@@ -30,6 +30,11 @@ def volume_change(displacement: fem.Function) -> fem.Function:
     return cell_function(domain, ufl.as_vector([change]), 1, "volume change")
 
 
+def cell_gradient(function: fem.Function) -> fem.Function:
+    """Gradient of a scalar function that is linear in each cell: a function that is constant in each cell."""
+    return cell_function(function.function_space.mesh, ufl.grad(function), 0, "gradient")
+
+
 def held_volumes(domain: Mesh, displacement: fem.Function, geometry: Geometry | None = None) -> NDArray[np.float64]:
     """Volume of the moved body in each cell of another mesh that this rank owns.
 

@@ -302,6 +302,19 @@ class Consolidation:
         """State variables of the law as a function that is constant in each cell."""
         return self.points.cell_function(self.points.state, "state", 0)
 
+    def deviatoric_strain_function(self) -> fem.Function:
+        """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
+        return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
+
+    def material_function(self) -> fem.Function:
+        """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
+        return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)
+
+    @property
+    def laws(self) -> list[Any]:
+        """The laws as a list, in the order in which they were given."""
+        return self._laws
+
     def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Values at points, whichever ranks have the points and their cells.
 

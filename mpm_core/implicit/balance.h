@@ -10,7 +10,8 @@ namespace mpm::implicit
 template <class G>
 void balance(const VelocityField<G>& field, ImplicitStep<G>& step);
 
-/// Norms of the residual, that of the water included, and of the forces at work, and what the trial counted, over all ranks.
+/// Norms of the residual, that of the water included, and of the forces at work, and what the trial counted, over all
+/// ranks.
 /// @note Collective
 template <class G>
 TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& step, const TrialCount<G::dim>& count);

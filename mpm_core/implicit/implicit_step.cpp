@@ -186,7 +186,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   }
   add_work(field, step, model.exchange.owned, model.totals);
   if (model.water)
-    add_inflow(step.pore, model.exchange.owned, *model.water);
+    add_inflow(model.mesh, step, model.exchange.owned, *model.water);
   model.last.dt = step.dt;
   model.energy.ahead = 0; // velocities and stresses are of one time
   migrate_particles(model);

@@ -1,12 +1,13 @@
 #include "implicit/pore_preparation.h"
 
+#include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
 #include "model/integration.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -109,6 +110,7 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
     cell.pressure = of_cell.pressure;
     cell.flux = step.dt * of_cell.mobility;
+    cell.compliance = of_cell.compliance;
     add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
   }
   return nodes;
@@ -131,8 +133,7 @@ void weigh_ghosts(const std::vector<NodalWater>& nodes, ImplicitStep<G>& step)
       compliance += nodes[facet.nodes[k]].compliance / D;
     }
     const double h = facet.size;
-    step.pore.ghosts[f] =
-        facet.area * h * (options.stiffness * step.dt * mobility + options.mass * h * h * compliance);
+    step.pore.ghosts[f] = facet.area * h * (options.stiffness * step.dt * mobility + options.mass * h * h * compliance);
   }
 }
 
@@ -169,7 +170,7 @@ void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<
 /// @note Collective
 template <class G, int D = G::dim>
 bool pressure_is_free(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
-                      const ImplicitStep<G>& step)
+                      const ImplicitStep<G>& step, bool drained)
 {
   std::vector<Vector<D>> work(mesh.points.size(), Vector<D>{});
   for (Index c : step.cells)
@@ -190,7 +191,7 @@ bool pressure_is_free(const Mesh<D>& mesh, NodeExchange& exchange, const Velocit
     impose<D>(support, work[static_cast<std::size_t>(support.node)]);
   }
   note(2);
-  largest[0] = std::ranges::any_of(step.pore.held, [](unsigned char held) { return held != 0; }) ? 1 : 0;
+  largest[0] = drained || std::ranges::any_of(step.pore.held, [](unsigned char held) { return held != 0; }) ? 1 : 0;
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), 3, MPI_DOUBLE, MPI_MAX, exchange.comm);
   return largest[0] == 0 && largest[2] <= 1e-10 * largest[1];
 }
@@ -208,6 +209,12 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   if (step.options.at_rest)
     return;
   sum_shared(model.exchange, nodes);
+  if (model.water->drained_surface)
+  {
+    std::vector<double> filled(nodes.size());
+    std::ranges::transform(nodes, filled.begin(), [](const NodalWater& node) { return node.volume; });
+    drain_surface(model.mesh, model.exchange, filled, step);
+  }
   pore.start.assign(nodes.size(), 0.0);
   for (std::size_t i = 0; i < nodes.size(); ++i)
     if (NodalWater& node = nodes[i]; node.volume > 0)
@@ -228,7 +235,7 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   hold_pressures(model, model.exchange, step);
   impose_pressures(step.dt, pore);
   if (std::isinf(model.water->modulus) &&
-      pressure_is_free(model.mesh, model.exchange, model.fields.front(), step))
+      pressure_is_free(model.mesh, model.exchange, model.fields.front(), step, model.water->drained_surface))
     throw InputError("no pore pressure is prescribed, the water is incompressible and supports are all around: the "
                      "pressure is undetermined; prescribe one by hold_pore_pressure(), or let water be compressible");
 }
@@ -237,4 +244,4 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

@@ -5,7 +5,7 @@
 #include "implicit/step.h"
 #include "model/model.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Sums over cells, the pressures of the nodes at the start, and the pressures prescribed at the end; the first iterate
 /// keeps the others. Nothing where the model has no water; without unknowns where the step gives it no time.
@@ -13,4 +13,4 @@ namespace mpm
 /// @note Collective
 template <class G>
 void start_pore_water(Model<G>& model, ImplicitStep<G>& step);
-} // namespace mpm
+} // namespace mpm::implicit

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -111,18 +111,29 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
   }
 }
 
-template <int D>
-void add_inflow(const PoreStep<D>& pore, std::span<const unsigned char> owned, PoreWater& water)
+template <class G>
+void add_inflow(const Mesh<G::dim>& mesh, const ImplicitStep<G>& step, std::span<const unsigned char> owned,
+                PoreWater& water)
 {
-  for (std::size_t i = 0; i < pore.content.size() && pore.flows; ++i)
+  const auto& pore = step.pore;
+  if (!pore.flows)
+    return;
+  for (std::size_t i = 0; i < pore.content.size(); ++i)
     if (owned[i] && pore.held[i])
       water.inflow += pore.content[i];
+  for (Index c : step.cells)
+    for (const auto& row : pore.cells[c].outflow)
+      for (std::size_t l = 0; l < row.size(); ++l)
+      {
+        const Index node = mesh.cells[c][l];
+        water.inflow -= row[l] * (pore.start[node] + step.dt * pore.rate[node]);
+      }
 }
 
-template void add_inflow(const PoreStep<2>&, std::span<const unsigned char>, PoreWater&);
-template void add_inflow(const PoreStep<3>&, std::span<const unsigned char>, PoreWater&);
-#define INSTANTIATE(G) template void update_pore_water(Model<G>&, const ImplicitStep<G>&);
+#define INSTANTIATE(G)                                                                                                 \
+  template void update_pore_water(Model<G>&, const ImplicitStep<G>&);                                                  \
+  template void add_inflow(const Mesh<G::dim>&, const ImplicitStep<G>&, std::span<const unsigned char>, PoreWater&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

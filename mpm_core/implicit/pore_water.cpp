@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mpm
+namespace mpm::implicit
 {
 namespace
 {
@@ -106,7 +106,8 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
       content += cell.mean[k] * volume_strain(step.strains[c]);
       content += cell.flux * dot<D>(mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
-        content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]];
+        content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]] +
+                   cell.outflow[k][l] * (pore.start[nodes[l]] + step.dt * pore.rate[nodes[l]]);
     }
   }
   add_ghost_content(step, pore.content);
@@ -136,7 +137,9 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, i
     forces[a] *= pore.held[column] ? 0 : -unit * cell.mean[l];
     volumes[a] = pore.held[row] ? 0 : -unit * (cell.mean[k] * volumes[a] + inertia * shape.gradient[k][a]);
   }
-  double by_pressure = -unit * unit * (cell.capacity[k][l] + cell.flux * dot<D>(shape.gradient[k], shape.gradient[l]));
+  double by_pressure =
+      -unit * unit *
+      (cell.capacity[k][l] + cell.outflow[k][l] + cell.flux * dot<D>(shape.gradient[k], shape.gradient[l]));
   if (pore.held[row] || pore.held[column])
     by_pressure = row == column ? -unit * cell.mean[k] : 0;
   tangent.add_coupled(row, column, forces, volumes, by_pressure);
@@ -196,4 +199,4 @@ template void impose_pressures(double, PoreStep<3>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::implicit

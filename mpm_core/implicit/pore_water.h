@@ -14,7 +14,7 @@
 
 #include "implicit/entries.h"
 
-namespace mpm
+namespace mpm::implicit
 {
 /// Adds the forces of the pore pressures under the iterate to the internal ones; this rank's part.
 template <class G, int D = G::dim>
@@ -34,4 +34,4 @@ void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWri
 /// Makes the iterate have the prescribed pressures.
 template <int D>
 void impose_pressures(double dt, PoreStep<D>& pore);
-} // namespace mpm
+} // namespace mpm::implicit

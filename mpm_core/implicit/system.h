@@ -3,7 +3,8 @@
 /// The nodes of the linear system of a Newton iteration: who has which rows.
 ///
 /// Unknowns are the corrections of the displacement increment u at active nodes, D for each, in the order of the nodes'
-/// numbers; where water flows, that of the pressure increment over its unit follows those of its node. Supported directions are projected out of rows and columns, P J P + s (1 - P), whatever their angle.
+/// numbers; where water flows, that of the pressure increment over its unit follows those of its node. Supported
+/// directions are projected out of rows and columns, P J P + s (1 - P), whatever their angle.
 
 #include "implicit/step.h"
 

@@ -2,7 +2,7 @@
 
 #include "model/integration.h"
 
-namespace mpm
+namespace mpm::model
 {
 template <class G, int D>
 void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const std::vector<Run>& runs,
@@ -77,10 +77,10 @@ void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, Vel
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, VelocityField<G>&);                          \
+  template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, VelocityField<G>&);                       \
   template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const std::vector<Run>&,                \
                                 VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-} // namespace mpm
+} // namespace mpm::model

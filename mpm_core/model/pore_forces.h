@@ -5,7 +5,7 @@
 #include "model/pore_water.h"
 #include "model/velocity_field.h"
 
-namespace mpm
+namespace mpm::model
 {
 /// Adds the internal forces of pore pressures, -B^T sum V_p p_p, to those of the stresses of a field; this rank's part.
 /// Nothing where particles have no pore pressure.
@@ -18,4 +18,4 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const s
 /// rank's part. On facets between filled cells those from both sides cancel.
 template <class G>
 void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, VelocityField<G>& field);
-} // namespace mpm
+} // namespace mpm::model

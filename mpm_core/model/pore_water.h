@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace mpm
+namespace mpm::model
 {
 /// A pressure on tagged facets: value + slope x_D with the last coordinate; where it has a slope, at least zero.
 struct PressureCondition
@@ -20,9 +20,9 @@ struct PressureCondition
 
 struct PoreWater
 {
-  double unit_weight = 9810;   ///< gamma_w [N/m3]
-  double modulus = 2.2e9;      ///< K_w [Pa], may be infinite
-  bool kozeny_carman = false;  ///< whether the conductivity follows the porosity n as n^3 / (1 - n)^2
+  double unit_weight = 9810;    ///< gamma_w [N/m3]
+  double modulus = 2.2e9;       ///< K_w [Pa], may be infinite
+  bool kozeny_carman = false;   ///< whether the conductivity follows the porosity n as n^3 / (1 - n)^2
   bool drained_surface = false; ///< whether the pressure is zero at the free surface, wherever that is
   std::vector<PressureCondition> conditions;
   double inflow = 0; ///< water that has entered at the nodes of this rank since the start [m3]
@@ -36,4 +36,4 @@ inline double pressure_at(const PressureCondition& condition, double height)
   const double pressure = condition.value + condition.slope * height;
   return condition.slope == 0 || pressure > 0 ? pressure : 0;
 }
-} // namespace mpm
+} // namespace mpm::model

@@ -1,4 +1,4 @@
-"""Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by two kinds of elements.
+"""Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by two kinds of elements and by particles.
 
 Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains at its
 top. Between the rigid plates of Mandel's slab, and inside of Cryer's ball, the pressure first rises above its value at once, as
@@ -6,14 +6,16 @@ the soil at the drained surface consolidates and gives way: flow without deforma
 plates is prescribed, and the force on them comes out. The ball is axisymmetric. A strip load lies on a layer that is
 so deep and wide that it stands for a half-plane.
 
-Quadratic displacement with linear pressure (Taylor-Hood), and linear displacement and pressure with the polynomial pressure
-projection; backward Euler with steps that grow with the time.
+Quadratic displacement with linear pressure (Taylor-Hood), linear displacement and pressure with the polynomial pressure
+projection, and implicit particles with the latter's nodes, three per cell, but for the slab, whose plates slide on it as they move;
+backward Euler with steps that grow with the time.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from _case import Check, Result, run_alone
+from _particle_body import ParticleBody
 from _plots import save_comparison
 from common.consolidation_theory import (
     ball_pressure,
@@ -35,7 +37,8 @@ YOUNG, MOBILITY, LOAD = 10e6, 1e-12, 10e3  # Pa, k / gamma_w [m2/(Pa s)], Pa
 WEIGHT = 1e-3
 """Of the pore water [N/m3]: next to nothing, as in the closed forms"""
 LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
-NAMES = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1"}
+PARTICLES = "particles"
+NAMES = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1", PARTICLES: "particles"}
 
 
 class Body:
@@ -61,6 +64,14 @@ class Body:
         if not reports[-1].converged:
             raise mpm.RunError(f"no step from a time factor of {start:.3g}: {reports[-1].reason}")
 
+    def advance(self, dt):
+        """One step of dt [s]."""
+        self.model.advance(dt)
+
+    def drain(self, tags):
+        """Let water leave at these parts of the surface, and nowhere else."""
+        self.model.boundary = [water.Head(tag, 0.0) for tag in tags]
+
     def at(self, point):
         """Displacement [m], and pore pressure [Pa], at a point."""
         own = np.array([point]) if comm.rank == 0 else np.empty((0, len(point)))
@@ -68,10 +79,18 @@ class Body:
         return comm.bcast((there["displacement"], there["pressure"][:, 0]))
 
 
+def body_of(mesh, supports, drained, load, element, poisson, length, geometry=None):
+    """A Body, or a ParticleBody."""
+    if element != PARTICLES:
+        return Body(mesh, supports, drained, load, element, poisson, length, geometry)
+    law = mpm.LinearElastic(young=YOUNG, poisson=poisson)
+    return ParticleBody(mesh, supports, drained, load, law, MOBILITY, length, geometry, WEIGHT)
+
+
 def layer(element, n):
     mesh = bridge.box_mesh(comm, (0.2, 1.0), (2, n))
     supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
-    return Body(mesh, supports, (TOP,), bridge.Load(pressure={TOP: LOAD}), element, 0.3, 1.0)
+    return body_of(mesh, supports, (TOP,), bridge.Load(pressure={TOP: LOAD}), element, 0.3, 1.0)
 
 
 def slab(element, n, poisson):
@@ -89,7 +108,7 @@ def ball(element, n):
     mesh = bridge.read_mesh(ROOT / "meshes" / "ball.geo", comm, parameters={"cell_size": 1.0 / n})
     supports = [bridge.roller("axis", (1, 0)), bridge.roller("equator", (0, 1))]
     load = bridge.Load(pressure={"surface": LOAD})
-    return Body(mesh, supports, ("surface",), load, element, 0.2, 1.0, bridge.Geometry.AXISYMMETRIC)
+    return body_of(mesh, supports, ("surface",), load, element, 0.2, 1.0, bridge.Geometry.AXISYMMETRIC)
 
 
 def strip(element, size, poisson):
@@ -104,7 +123,7 @@ def strip(element, size, poisson):
     }
     mesh = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
     supports = [bridge.roller("axis", (1, 0)), bridge.roller("far", (1, 0)), bridge.fixed("base")]
-    return Body(mesh, supports, (), bridge.Load(pressure={"footing": LOAD}), element, poisson, 1.0)
+    return body_of(mesh, supports, (), bridge.Load(pressure={"footing": LOAD}), element, poisson, 1.0)
 
 
 # --- checks --------------------------------------------------------------------------------------------------------
@@ -155,15 +174,15 @@ def ball_checks(element, n, tolerance):
 
 def strip_checks(element, size, tolerance):
     body, name, checks, poisson = strip(element, size, 0.2), NAMES[element], [], 0.2
-    body.model.advance(1e-7 * body.period)
+    body.advance(1e-7 * body.period)
     for depth in (0.5, 1.0, 2.0):
         _, p = body.at((0.0, -depth))
         checks.append(Check(f"strip, pressure at once {depth:g} m below its middle over the load, {name}",
                             strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance,
                             scale=1.0))  # fmt: skip
     at_once = dip(body)
-    body.model.boundary = [water.Head("surface", 0.0), water.Head("footing", 0.0)]
-    body.model.advance(1e8 * body.period)
+    body.drain(("surface", "footing"))
+    body.advance(1e8 * body.period)
     checks.append(Check(f"strip, settlement at once over the final one, ν = 0.2, {name}", 1 / (2 * (1 - poisson)),
                         "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0))  # fmt: skip
     return checks
@@ -178,7 +197,7 @@ def run(quick: bool, folder) -> Result:
     checks, slabs, balls = [], {}, {}
     for element, name in NAMES.items():
         checks += layer_checks(element, 20 if quick else 40, 0.015)
-        for poisson in (0.0,) if quick else (0.0, 0.2):
+        for poisson in () if element == PARTICLES else (0.0,) if quick else (0.0, 0.2):
             found, curve = slab_checks(element, 12 if quick else 24, poisson, 0.02 if quick else 0.015)
             checks, slabs[f"slab, ν = {poisson:g}, {name}"] = checks + found, curve
         found, balls[f"ball, ν = 0.2, {name}"] = ball_checks(element, 10 if quick else 20, 0.03 if quick else 0.02)

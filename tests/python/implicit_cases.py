@@ -46,8 +46,9 @@ def linear_elastic_solution(points, cells, law, weight, held):
 
 
 def tangent(step, dim):
-    """J of an assembled implicit step on one rank; with nodal mixed discretisation the product is added."""
-    nodes, dofs = step.total_nodes, step.total_nodes * dim
+    """J of an assembled implicit step on one rank; with nodal mixed discretisation the product is added, with pore water J has
+    the pressures too."""
+    nodes, dofs = step.total_nodes, step.total_nodes * step.unknowns
 
     def matrix(places, values, shape):
         return sp.csr_matrix((values, places), shape=shape)

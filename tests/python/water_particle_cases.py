@@ -54,6 +54,13 @@ class Column:
             dt *= growth
         return reports
 
+    def base(self):
+        """Pressure at the base over the load, from the particles there and their gradients."""
+        p = self.model.particles
+        low = p.position[:, -1] == p.position[:, -1].min()
+        there = p.pore_pressure[low] - p.pressure_gradient[low, -1] * p.position[low, -1]
+        return there.mean() / self.load
+
     def degree(self):
         """Water that left over that of the final settlement."""
         return -self.model.water_inflow() / (self.area * self.load / self.oedometer)

@@ -218,12 +218,16 @@ def _water(model: Model) -> dict[str, Any] | None:
 
 
 def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
-    water = None if entry is None else _core.PoreWater()
-    for name in _WATER if entry is not None else ():
+    model._core.water, model._water_conditions = None, []
+    if entry is None:
+        return
+    water = _core.PoreWater()
+    for name in _WATER:
         setattr(water, name, float(entry[name]) if name == "modulus" else entry[name])
     model._core.water = water
-    if entry is not None:
-        model._set_water_conditions([tuple(one) for one in entry["conditions"]])
+    model._set_water_conditions(
+        [(tag, value, slope, held, loads) for tag, value, slope, held, loads in entry["conditions"]]
+    )
 
 
 _NEWER = ("needs_cell_size",)

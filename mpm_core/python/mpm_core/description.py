@@ -152,7 +152,17 @@ def _is_control(value: Any) -> bool:
     )
 
 
-_OPTIONAL = ("added_fields", "contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance", "implicit", "notes")
+_OPTIONAL = (
+    "added_fields",
+    "contacts",
+    "water",
+    "geometry",
+    "velocity_fields",
+    "cuts",
+    "left_imbalance",
+    "implicit",
+    "notes",
+)
 _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),

@@ -328,6 +328,12 @@ class Model(Body):
         refuse_contacts(self, "the implicit scheme")
         refuse_resting(self, "the implicit scheme")
         self._check_water()
+        if nmd:
+            refuse_water(self, "nodal mixed discretisation")
+        if second_order:
+            refuse_water(self, "the scheme of second order")
+        if isinstance(solver, Relaxation):
+            refuse_water(self, "relaxation")
         options, longest, times, steps, threshold, limit, wanted = collectively(
             self.comm,
             lambda: (

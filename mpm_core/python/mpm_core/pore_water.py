@@ -25,6 +25,7 @@ the soil"""
 class PoreWater(Conditions):
     """The pore water of a body; see `Model`."""
 
+    laws: list[Any]
     particles: Particles
     _water_conditions: list[WaterCondition]
 
@@ -65,6 +66,10 @@ class PoreWater(Conditions):
             water.drained_surface = bool(drained_surface)
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             _require_pores(n, k)
+            if any(isinstance(law, _core.Undrained) for law in self.laws):
+                raise InputError(
+                    "laws has an Undrained one, whose pores hold water already; expected laws of effective stress"
+                )
             return water, n, k
 
         if self.comm.allreduce(len(self.particles)) == 0:
@@ -131,14 +136,14 @@ class PoreWater(Conditions):
         """
         self._require_water()
 
-        def checked() -> tuple[list[int], float, float, bool]:
+        def checked() -> tuple[tuple[int, ...], float, float, bool]:
             if (pressure is None) == (level is None):
                 raise InputError(f"pressure is {pressure} and level is {level}, expected one of them")
             tags = self.mesh.tags_of("facet", facet_tag)
             if pressure is not None:
                 return tags, float(floats("pressure", pressure, ())), 0.0, bool(presses)
-            weight = self._core.water.unit_weight
-            return tags, weight * float(floats("level", level, ())), -weight, presses is None or bool(presses)
+            weight, height = self._core.water.unit_weight, float(floats("level", 0.0 if level is None else level, ()))
+            return tags, weight * height, -weight, presses is None or bool(presses)
 
         tags, value, slope, loads = collectively(self.comm, checked)
         self._replace(tags, True, (value, slope, True, loads))
@@ -161,7 +166,7 @@ class PoreWater(Conditions):
         )
         self._replace(tags, False, (value, 0.0, False, True))
 
-    def _replace(self, tags: list[int], held: bool, values: tuple[float, float, bool, bool]) -> None:
+    def _replace(self, tags: tuple[int, ...], held: bool, values: tuple[float, float, bool, bool]) -> None:
         """Replace the conditions at facets with these tags, of the pore water or of loads."""
         kept = [one for one in self._water_conditions if one[0] not in tags or one[3] != held]
         self._set_water_conditions([*kept, *((tag, *values) for tag in tags)])
@@ -219,4 +224,6 @@ def _require_pores(porosity: NDArray, conductivity: NDArray) -> None:
 def refuse_water(body: PoreWater, scheme: str) -> None:
     """Raises InputError where a scheme would leave the flow of the pore water out."""
     if body._core.water is not None:
-        raise InputError(f"the model has pore water, whose flow {scheme} does not know; use implicit()")
+        raise InputError(
+            f"the model has pore water, whose flow {scheme} does not know; use implicit() by Newton's method"
+        )

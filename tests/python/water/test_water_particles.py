@@ -44,16 +44,14 @@ def test_particles_at_centroids_are_the_stabilised_finite_elements(law, modulus)
 # --- Terzaghi ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("dim, cells, tolerance", [(2, 20, 0.006), (3, 8, 0.02)])
+@pytest.mark.parametrize("dim, cells, tolerance", [(2, 20, 0.006), (3, 12, 0.02)])
 def test_a_loaded_column_consolidates_as_terzaghi_has_it(dim, cells, tolerance):
-    column, low = Column(cells, dim), 1.0 / cells
+    column = Column(cells, dim)
     for factor in (0.05, 0.2, 0.5) if dim == 2 else (0.2, 0.5):  # the front has to cross some cells first
         reports = column.follow(factor)
         assert max(report.iterations for report in reports) == 1
-        p = column.model.particles
         assert column.degree() == pytest.approx(terzaghi_degree(factor), abs=tolerance)
-        base = p.pore_pressure[p.position[:, -1] < low].mean() / column.load
-        assert base == pytest.approx(terzaghi_base(factor), abs=tolerance)
+        assert column.base() == pytest.approx(terzaghi_base(factor), abs=tolerance)
 
 
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 0.1, 1.0, 10.0])

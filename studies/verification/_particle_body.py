@@ -1,0 +1,68 @@
+"""A body of weightless soil and water as implicit particles, with the problems that finite elements solve beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+
+
+class ParticleBody:
+    """Three particles per cell, in small displacements, drained at parts of the surface; loads are pressures on facets.
+
+    period: length^2 / c_v [s], of the oedometric modulus
+    """
+
+    def __init__(self, mesh, supports, drained, load, law, mobility, length, geometry=None, weight=1e-3):
+        """mesh, supports, load: as for `water.Consolidation`; drained: tags; mobility: k / gamma_w [m2/(Pa s)]
+        weight: of the pore water [N/m3]
+        """
+        domain, _, facet_tags = mesh
+        self.law, self.period = law, length**2 / (mobility * law.p_wave_modulus)
+        self.model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law, geometry=geometry)
+        self.model.seed(density=2000.0, per_cell=3)
+        bridge.apply_supports(self.model, supports)
+        self.model.add_water(porosity=0.4, conductivity=mobility * weight, modulus=np.inf, unit_weight=weight)
+        self.drain(drained)
+        for tag, pressure in load.pressure.items():
+            self.model.press_surface(tag, pressure)
+        self._moved = np.zeros(self.model.mesh.points.shape)
+
+    def drain(self, tags):
+        """Let water leave at these parts of the surface."""
+        for tag in tags:
+            self.model.hold_pore_pressure(tag, 0.0)
+
+    def follow(self, factor, first=1e-4, growth=1.1):
+        """Go to a time factor, with steps that grow with the time."""
+        start = self.model.time
+        dt = max(first * self.period, 0.08 * start)
+        while self.model.time < factor * self.period * (1 - 1e-9):
+            self.advance(min(dt, factor * self.period - self.model.time))
+            dt = min(dt * growth, 0.04 * self.period)
+
+    def advance(self, dt):
+        """One step of dt [s]."""
+        before = self.model.time
+        list(self.model.implicit(before + dt, dt=dt, quasi_static=True, small_displacements=True))
+        self._moved += (self.model.time - before) * self.model.nodal("velocity")
+
+    def at(self, point):
+        """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point; on all ranks."""
+        mesh, p, point = self.model.mesh, self.model.particles, np.asarray(point, dtype=float)
+        (cell,) = mesh.cells_of(point[None])
+        found = None
+        if 0 <= cell < mesh.owned_cells:
+            corners = mesh.cells[cell]
+            edges = mesh.points[corners[1:]] - mesh.points[corners[0]]
+            inner = np.linalg.solve(edges.T, point - mesh.points[corners[0]])
+            rows = p.cell == cell
+            pressure = p.pore_pressure[rows] + np.einsum(
+                "pa,pa->p", p.pressure_gradient[rows], point - p.position[rows]
+            )
+            found = np.append(1 - inner.sum(), inner)[None] @ self._moved[corners], pressure.mean()[None]
+        return next(each for each in comm.allgather(found) if each is not None)

@@ -1,0 +1,78 @@
+"""Soil and pore water coupled on several ranks: the same as on one, and restarts to the last bit."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope
+
+import mpm_core as mpm
+
+FIELDS = (
+    "position",
+    "velocity",
+    "stress",
+    "volume",
+    "state",
+    "pore_pressure",
+    "pressure_gradient",
+    "porosity",
+    "conductivity",
+)
+
+
+def wet_slope(comm, owners_of=bands):
+    """A block that slides on an incline, whose water drains at its free surface and at its left side."""
+    model = sliding_slope(comm, owners_of)
+    model.add_water(porosity=0.4, conductivity=1e-4, modulus=2.2e8, kozeny_carman=True, drained_surface=True)
+    model.set_pore_pressure(lambda x: 9810.0 * (0.4 - x[:, 1]))
+    model.hold_pore_pressure(1, level=0.3)
+    return model
+
+
+def slide(model, until=0.1):
+    *_, report = model.implicit(until, dt=0.02, every=0.02, since=0.0)
+    return report
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_wet_slide_is_the_same_on_any_partition(comm, owners_of):
+    model, alone = wet_slope(comm, owners_of), wet_slope(MPI.COMM_SELF)
+    report, expected = slide(model), slide(alone)
+    assert report.iterations == expected.iterations and report.plastic_fraction > 0
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-7)
+    assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-6)
+    assert model.water_inflow() != 0
+
+
+def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path):
+    path = comm.bcast(str(tmp_path / "wet.h5"))
+    model = wet_slope(comm)
+    slide(model, 0.04)
+    model.save(path)
+    slide(model)
+    again = wet_slope(comm)
+    again.hold_pore_pressure(2, 0.0)
+    again.restore(path)
+    assert again._water_conditions == model._water_conditions
+    slide(again)
+    for name, values in all_by_id(model, FIELDS).items():
+        np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)
+    assert again.water_inflow() == model.water_inflow()
+
+
+def test_repartition_keeps_the_conditions_of_the_water(comm):
+    model, alone = wet_slope(comm), wet_slope(MPI.COMM_SELF)
+    slide(model, 0.04)
+    model.rebalance()
+    slide(model), slide(alone, 0.04), slide(alone)
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-7)
+
+
+def test_mistakes_of_one_rank_are_errors_on_all(comm):
+    model = wet_slope(comm)
+    with pytest.raises(mpm.InputError, match="porosity is 2.0"):
+        model.add_water(porosity=lambda x: np.full(len(x), 2.0), conductivity=1e-6)
+    model.particles.set("conductivity", np.full(len(model.particles), -1.0 if comm.rank == 0 else 1e-6))
+    if comm.allreduce(len(model.particles) if comm.rank == 0 else 0):
+        with pytest.raises(mpm.InputError, match="conductivity is -1.0"):
+            slide(model)

@@ -1,0 +1,74 @@
+"""From finite elements of soil and pore water to particles: in equilibrium at once, pressures included."""
+
+import numpy as np
+import pytest
+from consolidation_cases import BASE, LEFT, RIGHT, TOP
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+SOIL = mpm.MohrCoulomb(young=5e6, poisson=0.3, cohesion=3e3, friction_angle=25.0, dilation_angle=5.0)
+LEVEL, WEIGHT = 1.5, 19e3
+
+
+def consolidating(element=water.Element.STABILISED):
+    """A layer under water and a pressure on its top that it has carried for a while, and particles in its place."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (8, 4))
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    fem = water.Consolidation(
+        domain, SOIL, water.PorousSoil(1e-8, porosity=0.4), facet_tags, supports, [water.Reservoir(TOP, LEVEL)],
+        load=bridge.Load(unit_weight=WEIGHT, pressure={TOP: 20e3}), element=element,
+    )  # fmt: skip
+    at_rest = bridge.k0_stress(fem.points.coordinates(), surface=1.0, unit_weight=WEIGHT - 9810.0, k0=0.4)
+    fem.initialise(at_rest, pore_pressure=lambda x: 9810.0 * (LEVEL - x[:, 1]))
+    assert fem.run(2e4, 1e3)[-1].converged
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), SOIL)
+    model.seed(density=WEIGHT / 9.81, per_cell=3)
+    model.roller(LEFT, (1, 0))
+    model.roller(RIGHT, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    return fem, model
+
+
+def wet(model):
+    model.add_water(porosity=0.4, conductivity=1e-8)
+    model.hold_pore_pressure(TOP, level=LEVEL)
+    model.press_surface(TOP, 20e3)
+
+
+def test_particles_take_over_in_equilibrium_and_go_on_as_the_elements_do():
+    fem, model = consolidating()
+    wet(model)
+    excess = fem.pressure.x.array.max() - 9810.0 * LEVEL
+    assert excess > 2e3
+    result = bridge.initialise(model, fem, equilibrate=False)
+    assert result.unbalanced_ratio < 1e-9
+    for dt in (2e3, 2e3, 4e3):
+        assert fem.advance(dt).converged
+        list(model.implicit(model.time + dt, dt=dt, quasi_static=True, small_displacements=True))
+    there = fem.evaluate_at(model.particles.position)["pressure"][:, 0]
+    # three particles carry the storage of a cell by another rule than one point
+    np.testing.assert_allclose(model.particles.pore_pressure, there, rtol=0, atol=2e-3 * excess)
+
+
+def test_equilibration_leaves_the_pressures():
+    fem, model = consolidating(water.Element.TAYLOR_HOOD)
+    wet(model)
+    result = bridge.initialise(model, fem)
+    assert result.equilibrated_ratio < 5e-4
+    there = fem.evaluate_at(model.particles.position)["pressure"][:, 0]
+    np.testing.assert_allclose(model.particles.pore_pressure, there, rtol=1e-12)
+
+
+def test_dry_particles_are_refused():
+    fem, model = consolidating()
+    with pytest.raises(mpm.InputError, match="expected a water.Consolidation where particles have pore water"):
+        bridge.initialise(model, fem)
+    wet(model)
+    elastic = bridge.QuasiStatic(fem.domain, SOIL, fem._facet_tags, [bridge.fixed(BASE)])
+    elastic.solve(bridge.Load(unit_weight=1e3))
+    with pytest.raises(mpm.InputError, match="is a QuasiStatic"):
+        bridge.initialise(model, elastic)
