@@ -54,6 +54,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight, compliance = 1 / modulus + storage;
+  cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
   sums.volume += volume;
   sums.pressure += volume * pressure;
   sums.mobility += volume * mobility;

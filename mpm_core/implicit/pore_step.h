@@ -13,6 +13,7 @@ struct PoreCell
   double pressure;                ///< sum V p at the start [N m]
   double flux;                    ///< sum V k dt / gamma_w [m5/Pa]
   double compliance;              ///< sum V (1 / M + n / K_w), of the soil without drainage [m3/Pa]
+  double grains;                  ///< largest 1 - n of its particles: a volume below that has no pores
   std::array<double, D + 1> mean; ///< W_k = sum V N_k [m3]
   /// Volume of water by the pressure increments: storage, and the pressure projection [m3/Pa]
   std::array<std::array<double, D + 1>, D + 1> capacity;

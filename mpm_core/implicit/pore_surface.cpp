@@ -9,6 +9,17 @@ namespace
 {
 constexpr double penalty = 100;
 
+/// Filled fraction up to which a node at an empty cell is at the surface, though the cells below may be a little too
+/// full; above it the cell is a gap between particles within the soil.
+constexpr double most_at_surface = 0.7;
+
+/// What the cells around a node say; plain doubles.
+struct Around
+{
+  double volume; ///< of all of them, the part of this node
+  double empty;  ///< number of those without particles
+};
+
 /// Distance from the surface over the size of the cells, from the filled fraction of a node; positive in the soil.
 double distance(double fraction)
 {
@@ -17,19 +28,30 @@ double distance(double fraction)
 
 /// Distances at all nodes; those next to zero are zero.
 template <class G, int D = G::dim>
-std::vector<double> distances(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const double> filled)
+std::vector<double> distances(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const double> filled,
+                              const ImplicitStep<G>& step)
 {
-  std::vector<double> whole(filled.size(), 0.0);
+  std::vector<unsigned char> has_soil(static_cast<std::size_t>(mesh.owned_cells), 0);
+  for (Index c : step.cells)
+    has_soil[static_cast<std::size_t>(c)] = 1;
+  std::vector<Around> around(filled.size(), Around{});
   for (Index c = 0; c < mesh.owned_cells; ++c)
     for (Index node : mesh.cells[c])
-      whole[node] += cell_volume<G>(mesh.shapes[c]) / (D + 1);
-  sum_shared(exchange, whole.data(), 1);
+    {
+      around[node].volume += cell_volume<G>(mesh.shapes[c]) / (D + 1);
+      around[node].empty += has_soil[static_cast<std::size_t>(c)] ? 0 : 1;
+    }
+  sum_shared(exchange, around);
   std::vector<double> result(filled.size(), -1.0);
   for (std::size_t i = 0; i < result.size(); ++i)
-    if (whole[i] > 0)
-      result[i] = distance(filled[i] / whole[i]);
-  for (double& d : result)
-    d = std::abs(d) < 1e-3 ? 0 : d;
+  {
+    if (around[i].volume == 0)
+      continue;
+    const double fraction = filled[i] / around[i].volume;
+    result[i] = distance(fraction);
+    if (std::abs(result[i]) < 1e-3 || (result[i] > 0 && around[i].empty > 0 && fraction < most_at_surface))
+      result[i] = 0;
+  }
   return result;
 }
 
@@ -99,7 +121,7 @@ double measure(const Mesh<D>& mesh, Index cell, const Cut<D>& cut)
 template <class G, int D>
 void drain_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const double> filled, ImplicitStep<G>& step)
 {
-  const std::vector<double> d = distances<G>(mesh, exchange, filled);
+  const std::vector<double> d = distances<G>(mesh, exchange, filled, step);
   for (Index c : step.cells)
   {
     std::array<double, D + 1> of_cell;

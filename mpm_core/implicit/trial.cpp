@@ -73,8 +73,9 @@ TrialStrain<D> cell_strain(const Mesh<D>& mesh, const VelocityField<G>& field, c
   for (Vector<D>& row : displacement_gradient)
     for (double& entry : row)
       entry *= step.dt;
+  const double least = step.pore.cells.empty() ? least_growth : std::max(least_growth, step.pore.cells[cell].grains);
   return {displacement_gradient, strain,
-          (1 + hoop) * growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least_growth};
+          (1 + hoop) * growth<D>(gradient, step.dt) > least_growth && 1 + strain.volumetric > least};
 }
 
 /// Copies a batch's stresses and states to the scratch.
