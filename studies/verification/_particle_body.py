@@ -46,10 +46,9 @@ class ParticleBody:
             dt = min(dt * growth, 0.04 * self.period)
 
     def advance(self, dt):
-        """One step of dt [s]."""
-        before = self.model.time
-        list(self.model.implicit(before + dt, dt=dt, quasi_static=True, small_displacements=True))
-        self._moved += (self.model.time - before) * self.model.nodal("velocity")
+        """One step of dt [s], or several shorter ones."""
+        for report in self.model.implicit(self.model.time + dt, dt=dt, quasi_static=True, small_displacements=True):
+            self._moved += report.dt * self.model.nodal("velocity")
 
     def at(self, point):
         """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point; on all ranks."""

@@ -74,6 +74,47 @@ def test_compressible_water_carries_its_part_of_an_undrained_load():
     np.testing.assert_allclose(p.pore_pressure[middle] / column.load, expected, rtol=1e-3)
 
 
+def test_soil_consolidates_under_its_own_weight():
+    """Gibson's linear limit: the excess begins as the buoyant weight above, u = weight H sum 2 sin(m) / m^2 sin(m z / H) ..."""
+    model = on_box((0.2, 1.0), (2, 20), ELASTIC)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-8, modulus=np.inf)
+    model.set_pore_pressure(lambda x: 9810.0 * (1.0 - x[:, 1]))
+    model.hold_pore_pressure(TOP, level=1.0)
+    weight, oedometer = (2000.0 - 1000.0) * 9.81, ELASTIC.p_wave_modulus
+    period, dt, final = 9810.0 / (1e-8 * oedometer), 1e-4, 0.5 * weight / oedometer * 0.2
+    m = np.pi * (np.arange(200) + 0.5)
+    for factor in (0.1, 0.2, 0.5):
+        while model.time < factor * period * (1 - 1e-9):
+            step = min(dt * period, factor * period - model.time)
+            list(model.implicit(model.time + step, dt=step, quasi_static=True, small_displacements=True))
+            dt = min(1.1 * dt, 0.02)
+        expected = 1 - np.sum(4 * np.sin(m) / m**3 * np.exp(-(m**2) * factor))
+        assert -model.water_inflow() / final == pytest.approx(expected, abs=0.008)
+
+
+def undrained_motion(law, cells):
+    """Displacements of the nodes of a body, free at its right side, when its weight comes on at once."""
+    model = on_box((2.0, 1.0), (2 * cells, cells), law)
+    model.release(RIGHT)
+    model.set_gravity((0.0, -9.81))
+    if law is ELASTIC:
+        model.add_water(porosity=0.4, conductivity=1e-14, modulus=4e6)
+    list(model.implicit(1.0, dt=1.0, quasi_static=True, small_displacements=True))
+    return model.nodal("velocity")
+
+
+def test_soil_that_hardly_drains_is_the_undrained_one():
+    """The law of total stress has the water's stiffness in each particle, and u-p pressures at nodes: they converge to each other."""
+    differences = []
+    for cells in (8, 16):
+        one, other = (
+            undrained_motion(law, cells) for law in (ELASTIC, mpm.Undrained(ELASTIC, water_modulus=4e6, porosity=0.4))
+        )
+        differences.append(np.linalg.norm(one - other) / np.linalg.norm(other))
+    assert differences[1] < 0.02 and differences[1] < 0.6 * differences[0]
+
+
 # --- conservation -----------------------------------------------------------------------------------------------------
 
 
