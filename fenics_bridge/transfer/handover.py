@@ -167,9 +167,12 @@ def _require_usable(model, fem, move):
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
-    wet = model._core.water is not None
-    agree(model.comm, None if wet == isinstance(fem, Consolidation) else f"fem: is a {type(fem).__name__}, expected a water.Consolidation "
-          "where particles have pore water (Model.add_water), and another one where they have none")  # fmt: skip
+    fits = (model._core.water is not None) == isinstance(fem, Consolidation)
+    problem = (
+        f"fem: is a {type(fem).__name__}, expected a water.Consolidation where particles have pore water (Model.add_water), "
+        "and another one where they have none"
+    )
+    agree(model.comm, None if fits else problem)
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 

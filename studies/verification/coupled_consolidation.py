@@ -1,4 +1,4 @@
-"""Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by two kinds of elements and by particles.
+"""Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by elements and particles.
 
 Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains at its
 top. Between the rigid plates of Mandel's slab, and inside of Cryer's ball, the pressure first rises above its value at once, as
@@ -7,8 +7,8 @@ plates is prescribed, and the force on them comes out. The ball is axisymmetric.
 so deep and wide that it stands for a half-plane.
 
 Quadratic displacement with linear pressure (Taylor-Hood), linear displacement and pressure with the polynomial pressure
-projection, and implicit particles with the latter's nodes, three per cell, but for the slab, whose plates slide on it as they move;
-backward Euler with steps that grow with the time.
+projection, and implicit particles with the latter's nodes, three per cell, but for the slab, whose plates slide on it as they
+move; backward Euler with steps that grow with the time.
 """
 
 from __future__ import annotations

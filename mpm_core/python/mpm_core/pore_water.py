@@ -121,7 +121,9 @@ class PoreWater(Conditions):
     def hold_pore_pressure(
         self, facet_tag: Tag, pressure: float | None = None, *, level: float | None = None, presses: bool | None = None
     ) -> None:
-        """Prescribe the pore pressure at the nodes on facets with a tag, where water then enters or leaves. A further call changes it.
+        """Prescribe the pore pressure at the nodes on facets with a tag, where water then enters or leaves.
+
+        A further call changes it.
 
         Args:
             facet_tag: by number or name.

@@ -31,7 +31,7 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
 
 def _nothing_acts(model: Model) -> str:
     p = model.particles
-    acts = bool(np.any(model.gravity)) or bool(model._prescribed)
+    acts = bool(np.any(model.gravity)) or bool(model._prescribed) or bool(model._water_conditions)
     acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
     if model.comm.allreduce(int(acts)):
         return ""

@@ -105,7 +105,7 @@ def undrained_motion(law, cells):
 
 
 def test_soil_that_hardly_drains_is_the_undrained_one():
-    """The law of total stress has the water's stiffness in each particle, and u-p pressures at nodes: they converge to each other."""
+    """The law of total stress has the water's stiffness in each particle, and u-p pressures at nodes: they converge."""
     differences = []
     for cells in (8, 16):
         one, other = (
