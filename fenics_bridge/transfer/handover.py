@@ -40,7 +40,7 @@ class Handover:
 
 def initialise(
     model: mpm.Model,
-    fem: QuasiStatic | ElasticSolution,
+    fem: QuasiStatic | ElasticSolution | Consolidation,
     *,
     count_displacement: bool = True,
     move: bool = False,
