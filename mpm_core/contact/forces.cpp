@@ -91,13 +91,12 @@ struct Touch
   Vector<D> normal; ///< out of the body
   Vector<D> arm;    ///< from the body's centre to the nearest point of its surface
   Vector<D> motion; ///< of the particle in the step, relative to that point
-  double overlap;   ///< at the step's start [m]
-  double depth;     ///< at its end [m]
+  double before;    ///< distance from there at the step's start [m]
+  double after;     ///< at its end, along the normal [m]
 };
 
 template <int D>
-Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector<D>& x, const Vector<D>& velocity,
-                  double radius)
+Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector<D>& x, const Vector<D>& velocity)
 {
   const RigidBody<D>& body = contact.body;
   const auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
@@ -108,8 +107,8 @@ Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector
   const Vector<D> turned = rotated<D>(press.turn, touch.arm);
   for (int i = 0; i < D; ++i)
     touch.motion[i] = press.dt * (velocity[i] - body.velocity[i]) - turned[i];
-  touch.overlap = radius - apart;
-  touch.depth = touch.overlap - dot<D>(touch.motion, touch.normal);
+  touch.before = apart;
+  touch.after = apart + dot<D>(touch.motion, touch.normal);
   return touch;
 }
 
@@ -124,43 +123,64 @@ void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
     reaction.moment[i] -= moment[i];
 }
 
+/// Whether a particle touches the surface or is within its own radius of doing so: compared by volumes, since roots
+/// take their time, and most particles of the cells that are looked at are farther away.
+template <class G>
+bool is_near(const Particles<G::dim>& particles, Index p, double distance)
+{
+  const double cube = G::dim == 3 ? distance * distance * distance : distance * distance;
+  return distance <= 0 || cube < particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
+}
+
+/// Lets the slip of a particle go that does not touch the surface.
+template <int D>
+void leave_slip(const Press<D>& press, Index p)
+{
+  for (std::size_t i = 0; press.slips && i < D; ++i)
+    (*press.slips)[i][p] = 0;
+}
+
 /// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
 template <class G, int D = G::dim>
 std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles,
                                         Index p, Contact<D>& contact)
 {
+  const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity);
+  if (!is_near<G>(particles, p, touch.after))
+  {
+    leave_slip<D>(press, p);
+    return std::nullopt;
+  }
   const double radius = particle_radius<G>(particles, p), mass = particles.mass[p];
-  const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity, radius);
+  const double overlap = radius - touch.before, depth = radius - touch.after; // at the step's start and end
   Reaction<D>& reaction = contact.reaction;
-  if (touch.depth > -radius)
-    reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(touch.arm, touch.arm));
+  reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(touch.arm, touch.arm));
   const double stiffness = press.stiffness * mass;
   Vector<D> slip{};
   for (std::size_t i = 0; press.slips && i < D; ++i)
     slip[i] = (*press.slips)[i][p];
-  if (touch.overlap > 0)
-    reaction.energy += 0.5 * stiffness * (touch.overlap * touch.overlap);
+  if (overlap > 0)
+    reaction.energy += 0.5 * stiffness * (overlap * overlap);
   reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
-  if (!(touch.depth > 0))
+  if (!(depth > 0))
   {
-    for (std::size_t i = 0; press.slips && i < D; ++i)
-      (*press.slips)[i][p] = 0;
+    leave_slip<D>(press, p);
     return std::nullopt;
   }
   const double area = particle_area<G>(particles, p, radius);
   reaction.area += area;
   reaction.mass += mass;
-  reaction.normal += stiffness * touch.depth;
+  reaction.normal += stiffness * depth;
   if (press.slips)
   {
-    const double longest = contact.friction * touch.depth + contact.adhesion * area / stiffness;
+    const double longest = contact.friction * depth + contact.adhesion * area / stiffness;
     reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
     for (std::size_t i = 0; i < D; ++i)
       (*press.slips)[i][p] = slip[i];
   }
   Vector<D> force;
   for (int i = 0; i < D; ++i)
-    force[i] = stiffness * (touch.depth * touch.normal[i] - slip[i]);
+    force[i] = stiffness * (depth * touch.normal[i] - slip[i]);
   react<D>(force, touch.arm, reaction);
   return force;
 }
