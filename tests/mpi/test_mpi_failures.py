@@ -1,6 +1,7 @@
 """An error on one rank ends all ranks with its message, in whatever phase of a run; none waits for ever."""
 
 import sys
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -124,3 +125,12 @@ def test_one_rank_fails_and_all_end(comm, shared_path, phase, monkeypatch):
     with pytest.raises((mpm.InputError, mpm.RunError), match=PHASES[phase]) as raised:
         phase(case)
     assert len(set(comm.allgather(str(raised.value)))) == 1
+
+
+def test_frames_of_one_run_have_one_path(comm, shared_path):
+    path = shared_path / ("others" if comm.rank == 1 else "particles")
+    expected = (
+        pytest.raises(mpm.InputError, match="path is not the same on all ranks") if comm.size > 1 else nullcontext()
+    )
+    with expected, ParticleOutput(path, comm):
+        pass

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import RunError
-from .collective import collectively, on_first_rank
+from .collective import check_same_path, collectively, on_first_rank
 from .hdf5 import RowsFile
 
 Arrays = dict[str, NDArray[Any]]
@@ -31,11 +31,13 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
         groups: this rank's rows of arrays, in the groups ``particles``, ``cells`` and ``ranks``; those of ``ranks`` have one.
 
     Raises:
+        InputError: on all ranks: the path is not the same on all of them.
         RunError: on all ranks, with path and reason; nothing is left behind.
 
     Note:
         Collective.
     """
+    check_same_path(comm, path)
     aside = f"{path}.part"
     file = RowsFile(aside, comm, checksums=True)
     file.add_common("format", np.array([FORMAT]))

@@ -50,3 +50,15 @@ def on_first_rank(comm: MPI.Comm, path: str | os.PathLike[str], work: Callable[[
     failure = comm.bcast(failure)
     if failure is not None:
         raise RunError(failure)
+
+
+def check_same_path(comm: MPI.Comm, path: str | os.PathLike[str]) -> None:
+    """Check that all ranks mean the same file: the first rank writes, and would not see another rank's mistake.
+
+    Raises:
+        InputError: on all ranks: the paths differ.
+    """
+    paths = [os.fspath(one) for one in comm.allgather(path)]
+    other = next((rank for rank, one in enumerate(paths) if one != paths[0]), None)
+    if other is not None:
+        raise InputError(f"path is not the same on all ranks: {paths[0]} on rank 0, {paths[other]} on rank {other}")

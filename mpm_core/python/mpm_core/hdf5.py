@@ -70,7 +70,9 @@ class RowsFile:
         # As create_dataset does it, in a fifth of the time, which counts in frames of many small fields.
         all_rows, space = self._h5py.h5s.ALL, self._h5py.h5s.create_simple(whole.shape)
         kind = self._h5py.h5t.py_create(whole.dtype)
-        self._h5py.h5d.create(self._file.id, name.encode(), kind, space).write(all_rows, all_rows, whole)
+        creation = self._h5py.h5p.create(self._h5py.h5p.DATASET_CREATE)
+        creation.set_obj_track_times(False)  # the same frame makes the same file, whenever it is written
+        self._h5py.h5d.create(self._file.id, name.encode(), kind, space, creation).write(all_rows, all_rows, whole)
 
     def close(self, durable: bool = False) -> None:
         """Close the file.

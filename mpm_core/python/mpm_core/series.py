@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import InputError, RunError
-from .collective import on_first_rank
+from .collective import check_same_path, on_first_rank
 from .hdf5 import RowsFile
 
 _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
@@ -37,7 +37,7 @@ class Series:
         compression: level of deflate, 0 to 9.
 
     Raises:
-        InputError: another level of compression.
+        InputError: another level of compression, or a path that is not the same on all ranks.
         RunError: on all ranks, with path and reason.
 
     Note:
@@ -54,6 +54,7 @@ class Series:
         self.n_frames = 0
         self._xdmf, self._grid, self._compression = f"{text}.xdmf", grid, int(compression)
         self._closed, self._frames = False, [""]
+        check_same_path(comm, text)
         on_first_rank(comm, text, self._begin)
 
     def _begin(self) -> None:
