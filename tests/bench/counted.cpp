@@ -7,7 +7,7 @@
 #include "implicit/implicit_step.h"
 #include "particles/seed.h"
 
-using namespace mpm;
+using namespace mpm::implicit;
 
 namespace
 {
@@ -15,7 +15,7 @@ namespace
 template <int D>
 Model<Cartesian<D>> heap(int n, int per_cell)
 {
-  const auto arrays = test::box<D>(n);
+  const auto arrays = mpm::test::box<D>(n);
   std::vector<Index> tags;
   for (std::size_t c = 0; c < arrays.cells.size(); c += D + 1)
   {

@@ -9,7 +9,7 @@
 
 #include <benchmark/benchmark.h>
 
-using namespace mpm;
+using namespace mpm::transfer;
 
 namespace
 {
@@ -61,7 +61,7 @@ struct Filled
   Particles<D> particles;
   std::vector<Run> runs;
 
-  explicit Filled(int n) : mesh(test::box<D>(n).mesh())
+  explicit Filled(int n) : mesh(mpm::test::box<D>(n).mesh())
   {
     particles.state.resize(1);
     seed_cells<Cartesian<D>>(mesh, {}, D == 2 ? 10 : 8, {0, 2000.0}, 0, particles);
