@@ -80,9 +80,10 @@ public:
 
   void add_unprojected(Index row, Index column, const Matrix<D>& block)
   {
+    const GlobalIndex first_row = place(row, 0), first_column = place(column, 0);
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
-        _writer.add(place(row, i), place(column, j), block[i][j]);
+        _writer.add(first_row + i, first_column + j, block[i][j]);
   }
 
   /// Takes memory for more blocks with pressures; must come before they are added.

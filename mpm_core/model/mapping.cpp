@@ -82,7 +82,7 @@ template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
 {
   const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
-  const auto strain_of = [&](Index c)
+  const auto strain_of = [&](Index c, double volume)
   {
     double divergence = 0;
     for (int k = 0; k <= D; ++k)
@@ -92,7 +92,7 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
       if constexpr (G::has_hoop)
         divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
     }
-    return dt * divergence * volume_of(c);
+    return dt * divergence * volume;
   };
   average_over_nodes(mesh, field.part, volume_of, strain_of, exchange, field.volumetric_strain);
 }
@@ -117,11 +117,11 @@ void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, Veloc
 {
   field.mean_stress.resize(mesh.points.size());
   const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
-  const auto integral_of = [&](Index c) { return mean_of<G>(stress_of(c)); };
+  const auto integral_of = [&](Index c, double) { return mean_of<G>(stress_of(c)); };
   average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
   for (Index c : field.part.cells)
     if (const double volume = volume_of(c); volume != 0)
-      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral_of(c));
+      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral_of(c, volume));
 }
 } // namespace
 

@@ -20,7 +20,7 @@ struct VolumeMean
 /// Means over the filled cells around each node of a part of the mesh (method of Detournay & Dzik 2006; with volume
 /// weights this followed by `mean_of_nodes` is its own transpose).
 /// @param volume_of    filled volume of a cell, 0 where it is empty; a callable Index -> double
-/// @param integral_of  what is averaged, integrated over a filled cell; a callable Index -> double
+/// @param integral_of  what is averaged, integrated over a filled cell; a callable (Index, volume) -> double
 /// @note Collective
 template <int D, class VolumeOf, class IntegralOf>
 void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, VolumeOf&& volume_of, IntegralOf&& integral_of,
@@ -33,7 +33,7 @@ void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, VolumeOf&& vo
     const double volume = volume_of(c);
     if (volume == 0)
       continue;
-    const double integral = integral_of(c);
+    const double integral = integral_of(c, volume);
     for (Index node : mesh.cells[c])
     {
       nodes[node].value += integral;

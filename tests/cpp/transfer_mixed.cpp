@@ -27,7 +27,7 @@ std::vector<double> averaged(const Mesh<D>& mesh, const std::vector<double>& vol
   NodeExchange exchange; // one rank: nothing is shared
   std::vector<VolumeMean> nodes(mesh.points.size());
   const auto volume_of = [&](Index c) { return volume[c]; };
-  const auto integral_of = [&](Index c) { return volume[c] * theta[c]; };
+  const auto integral_of = [&](Index c, double filled) { return filled * theta[c]; };
   average_over_nodes(mesh, mpm::test::whole(mesh), volume_of, integral_of, exchange, nodes);
   for (Index c = 0; c < mesh.n_cells(); ++c)
     if (volume[c] > 0)
