@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from fenics_bridge.types import Law
 
@@ -77,6 +78,8 @@ class EquilibriumStep:
         self.reason = ""
         """Why the last correction or move could not be made"""
         self._moved = body.constraints.at(displacement) - body.solution.x.array[self._fixed]
+        self.moves_supports = self._comm.allreduce(bool(np.any(self._moved)), MPI.LOR)
+        """Whether the step prescribes displacements other than zero"""
         self._base = np.zeros_like(body.increment.x.array)
         self._correction = fem.Function(self._space)
 

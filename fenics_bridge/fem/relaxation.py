@@ -124,7 +124,8 @@ def relax(
                 )
                 return result
             continue
-        rate = theta * _record(result, body, step, theta, start)
+        motion = _record(result, body, step, theta, start)
+        rate = None if step.moves_supports else theta * motion  # the next step leaves them where they are
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
             reference += ELASTIC * (1 + theta) * result.growth[0]
         if result.residual[-1] <= tolerance:

@@ -28,6 +28,9 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
     """Write a checkpoint aside, wait until it is on the disk, and rename it; an older file stays until then.
 
     Args:
+        path: of the checkpoint, the same on all ranks.
+        comm: communicator of the model.
+        description: text of the description, the same on all ranks.
         groups: this rank's rows of arrays, in the groups ``particles``, ``cells`` and ``ranks``; those of ``ranks`` have one.
 
     Raises:

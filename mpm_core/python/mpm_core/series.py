@@ -172,7 +172,10 @@ class Frame:
         """Add a field on nodes or cells: a tensor by its components, other real numbers as they are; whole ones as given.
 
         Args:
-            values: (n,) or (n, k).
+            name: of the field.
+            center: "Node" or "Cell".
+            values: this rank's rows, (n,) or (n, k).
+            counts: number of rows of each rank.
             out_of_plane: name of the third of four components.
         """
         width = values.shape[1] if values.ndim == 2 else 1

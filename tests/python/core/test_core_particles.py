@@ -22,6 +22,14 @@ def seeded(dim, rests=False):
     rng = np.random.default_rng(5)
     for name in ("velocity", "stress", "deviatoric_strain", "state", "initial_position"):
         model.particles.set(name, rng.random(getattr(model.particles, name).shape))
+    n = len(model.particles)
+    for name, shape in {
+        "pore_pressure": (n,),
+        "pressure_gradient": (n, dim),
+        "porosity": (n,),
+        "conductivity": (n,),
+    }.items():
+        model.particles.set(name, rng.random(shape))
     return model
 
 
