@@ -116,12 +116,14 @@ void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, Veloc
                          StressOf&& stress_of, Take&& take)
 {
   field.mean_stress.resize(mesh.points.size());
-  const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
-  const auto integral_of = [&](Index c, double) { return mean_of<G>(stress_of(c)); };
+  auto& own = field.integration.mean_stress_of_cell; // kept for the second pass, since moments are far apart in memory
+  own.resize(static_cast<std::size_t>(mesh.owned_cells));
+  const auto volume_of = [&](Index c) { return own[c].volume = integrated_volume(mesh, field, c); };
+  const auto integral_of = [&](Index c, double) { return own[c].value = mean_of<G>(stress_of(c)); };
   average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
   for (Index c : field.part.cells)
-    if (const double volume = volume_of(c); volume != 0)
-      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral_of(c, volume));
+    if (const auto [integral, volume] = own[c]; volume != 0)
+      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral);
 }
 } // namespace
 
