@@ -150,13 +150,7 @@ void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<
   {
     if (!condition.held)
       continue;
-    std::vector<double> on_facet(mesh.points.size(), 0.0);
-    for (Index c = 0; c < mesh.n_cells(); ++c)
-      for (int k = 0; k <= D; ++k)
-        if (mesh.facet_tags[c][k] == condition.facet_tag)
-          for (Index node : facet_nodes<D>(mesh.cells[c], k))
-            on_facet[node] = 1;
-    sum_shared(exchange, on_facet.data(), 1);
+    const std::vector<double> on_facet = nodes_on_facets(mesh, exchange, condition.facet_tag);
     for (std::size_t i = 0; i < on_facet.size(); ++i)
       if (on_facet[i] > 0 && step.active[i])
       {

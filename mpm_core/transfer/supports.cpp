@@ -37,6 +37,19 @@ void add(Support<D>& support, Vector<D> normal, double value, Index facet_tag)
 }
 } // namespace
 
+template <int D>
+std::vector<double> nodes_on_facets(const Mesh<D>& mesh, NodeExchange& exchange, Index facet_tag)
+{
+  std::vector<double> on_facet(mesh.points.size(), 0.0);
+  for (Index c = 0; c < mesh.n_cells(); ++c)
+    for (int k = 0; k <= D; ++k)
+      if (mesh.facet_tags[c][k] == facet_tag)
+        for (Index node : facet_nodes<D>(mesh.cells[c], k))
+          on_facet[static_cast<std::size_t>(node)] = 1;
+  sum_shared(exchange, on_facet.data(), 1);
+  return on_facet;
+}
+
 template <class G>
 std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchange& exchange,
                                            std::span<const SupportRequest<G::dim>> requests)
@@ -48,14 +61,7 @@ std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchang
     if (!request.whole && !(norm<D>(request.vector) > 0))
       throw InputError("normal of the roller on facet tag " + std::to_string(request.facet_tag) +
                        " has no length, expected a direction");
-    // A node may lie on a tagged facet that only another rank has.
-    std::vector<double> on_facet(mesh.points.size(), 0.0);
-    for (Index c = 0; c < mesh.n_cells(); ++c)
-      for (int k = 0; k <= D; ++k)
-        if (mesh.facet_tags[c][k] == request.facet_tag)
-          for (Index node : facet_nodes<D>(mesh.cells[c], k))
-            on_facet[node] = 1;
-    sum_shared(exchange, on_facet.data(), 1);
+    const std::vector<double> on_facet = nodes_on_facets(mesh, exchange, request.facet_tag);
     for (Index node = 0; node < mesh.n_nodes(); ++node)
     {
       if (on_facet[node] == 0)
@@ -88,6 +94,8 @@ std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchang
   return supports;
 }
 
+template std::vector<double> nodes_on_facets(const Mesh<2>&, NodeExchange&, Index);
+template std::vector<double> nodes_on_facets(const Mesh<3>&, NodeExchange&, Index);
 template std::vector<Support<2>> make_supports<PlaneStrain>(const Mesh<2>&, NodeExchange&,
                                                             std::span<const SupportRequest<2>>);
 template std::vector<Support<2>> make_supports<Axisymmetric>(const Mesh<2>&, NodeExchange&,

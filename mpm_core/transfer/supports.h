@@ -27,6 +27,11 @@ struct SupportRequest
   Vector<D> vector;
 };
 
+/// Per node: above zero where it lies on a facet with the tag, which only another rank may have.
+/// @note Collective
+template <int D>
+std::vector<double> nodes_on_facets(const Mesh<D>& mesh, NodeExchange& exchange, Index facet_tag);
+
 /// Merges the boundary conditions into one per node, sorted by node. Directions at a node are made orthonormal; a
 /// condition that follows from the others adds nothing. In axial symmetry the nodes on the axis have no radial
 /// velocity.
