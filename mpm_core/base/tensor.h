@@ -77,6 +77,20 @@ inline Vector<D> product(const Matrix<D>& a, const Vector<D>& b)
 }
 
 template <int D>
+inline Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
+{
+  Vector<D> c;
+  for (int i = 0; i < D; ++i)
+    c[i] = a[i] - b[i];
+  return c;
+}
+
+inline Vector<3> cross(const Vector<3>& a, const Vector<3>& b)
+{
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+template <int D>
 inline double norm(const Vector<D>& a)
 {
   return std::sqrt(dot<D>(a, a));

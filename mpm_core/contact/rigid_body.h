@@ -100,11 +100,6 @@ inline Vector<3> in_space(const Vector<D>& v)
     return v;
 }
 
-inline Vector<3> cross(const Vector<3>& a, const Vector<3>& b)
-{
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 /// A vector in space, rotated as the body is.
 template <int D>
 inline Vector<D> rotated(const Matrix<3>& rotation, const Vector<D>& v)

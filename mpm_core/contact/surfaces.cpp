@@ -13,15 +13,6 @@ namespace
 constexpr double endless = std::numeric_limits<double>::infinity();
 
 template <int D>
-Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
-{
-  Vector<D> c;
-  for (int i = 0; i < D; ++i)
-    c[i] = a[i] - b[i];
-  return c;
-}
-
-template <int D>
 Vector<D> scaled(Vector<D> v, double factor)
 {
   for (double& component : v)

@@ -11,8 +11,6 @@ namespace
 {
 constexpr Index most_in_leaf = 4;
 
-Vector<3> minus(const Vector<3>& a, const Vector<3>& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
 Vector<3> plus(const Vector<3>& a, const Vector<3>& b, double factor)
 {
   return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
@@ -22,9 +20,9 @@ Vector<3> unit_normal(const Triangles& surface, Index t)
 {
   const auto& [a, b, c] = surface.triangles[static_cast<std::size_t>(t)];
   const Vector<3>& origin = surface.vertices[static_cast<std::size_t>(a)];
-  const Vector<3> e = minus(surface.vertices[static_cast<std::size_t>(b)], origin);
-  const Vector<3> f = minus(surface.vertices[static_cast<std::size_t>(c)], origin);
-  const Vector<3> n{e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]};
+  const Vector<3> e = difference<3>(surface.vertices[static_cast<std::size_t>(b)], origin);
+  const Vector<3> f = difference<3>(surface.vertices[static_cast<std::size_t>(c)], origin);
+  const Vector<3> n = cross(e, f);
   const double length = norm<3>(n);
   return {n[0] / length, n[1] / length, n[2] / length};
 }
@@ -38,10 +36,10 @@ void find_vertex_normals(Triangles& surface)
     for (std::size_t k = 0; k < 3; ++k)
     {
       const auto corner = static_cast<std::size_t>(surface.triangles[t][k]);
-      const Vector<3> e = minus(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 1) % 3])],
-                                surface.vertices[corner]);
-      const Vector<3> f = minus(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 2) % 3])],
-                                surface.vertices[corner]);
+      const Vector<3> e = difference<3>(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 1) % 3])],
+                                        surface.vertices[corner]);
+      const Vector<3> f = difference<3>(surface.vertices[static_cast<std::size_t>(surface.triangles[t][(k + 2) % 3])],
+                                        surface.vertices[corner]);
       const double cosine = dot<3>(e, f) / (norm<3>(e) * norm<3>(f));
       surface.vertex_normals[corner] =
           plus(surface.vertex_normals[corner], normal, std::acos(std::clamp(cosine, -1.0, 1.0)));
@@ -109,7 +107,7 @@ void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, In
   boxes.push_back(box);
   if (box.count <= most_in_leaf)
     return;
-  const Vector<3> extent = minus(high, low);
+  const Vector<3> extent = difference<3>(high, low);
   const auto axis = static_cast<std::size_t>(std::ranges::max_element(extent) - extent.begin());
   const Index middle = first + box.count / 2;
   std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last,
@@ -137,9 +135,9 @@ NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vecto
 {
   const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
   const Vector<3>& a = surface.vertices[static_cast<std::size_t>(corners[0])];
-  const Vector<3> ab = minus(surface.vertices[static_cast<std::size_t>(corners[1])], a);
-  const Vector<3> ac = minus(surface.vertices[static_cast<std::size_t>(corners[2])], a);
-  const Vector<3> ap = minus(x, a), bp = minus(ap, ab), cp = minus(ap, ac);
+  const Vector<3> ab = difference<3>(surface.vertices[static_cast<std::size_t>(corners[1])], a);
+  const Vector<3> ac = difference<3>(surface.vertices[static_cast<std::size_t>(corners[2])], a);
+  const Vector<3> ap = difference<3>(x, a), bp = difference<3>(ap, ab), cp = difference<3>(ap, ac);
   const auto at = [&](int feature, double v, double w)
   {
     const Vector<3> offset = plus(plus(ap, ab, -v), ac, -w);
