@@ -71,11 +71,7 @@ template <int D>
 void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain)
 {
   constexpr int S = n_symmetric<D>;
-  std::array<double*, S + 2> columns;
-  for (int k = 0; k < S; ++k)
-    columns[k] = particles.stress[stress_component<D>[k]].data();
-  columns[S] = particles.volume.data();
-  columns[S + 1] = particles.deviatoric_strain.data();
+  const auto columns = strain_columns(particles);
   const double growth = 1 + strain.volumetric, increment = strain.deviatoric;
   const Matrix<D> r = strain.rotation; // a copy that no store can alias
   change_lanes<D == 2>(columns, first, last,

@@ -22,6 +22,18 @@ using SymmetricColumns = std::array<double*, n_symmetric<D>>;
 template <int D>
 void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation);
 
+/// Columns that a strain changes: stresses without zz in plane strain, volume, deviatoric strain.
+template <int D>
+inline std::array<double*, n_symmetric<D> + 2> strain_columns(Particles<D>& particles)
+{
+  std::array<double*, n_symmetric<D> + 2> columns;
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    columns[k] = particles.stress[stress_component<D>[k]].data();
+  columns[n_symmetric<D>] = particles.volume.data();
+  columns[n_symmetric<D> + 1] = particles.deviatoric_strain.data();
+  return columns;
+}
+
 /// Rotates the stresses of the particles [first, last), grows their volumes and accumulates their deviatoric strain.
 template <int D>
 void strain_particles(Particles<D>& particles, Index first, Index last, const CellStrain<D>& strain);

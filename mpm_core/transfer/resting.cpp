@@ -1,6 +1,7 @@
 #include "transfer/resting.h"
 
 #include "particles/seed.h"
+#include "transfer/kinematics.h"
 #include "transfer/lanes.h"
 #include "transfer/turn.h"
 
@@ -141,12 +142,7 @@ template <int D>
 void strain_rows(Particles<D>& particles, Index first, Index last, std::span<const CellStrain<D, Lanes>> strains)
 {
   constexpr int S = n_symmetric<D>;
-  std::array<double*, S + 2> columns;
-  for (int k = 0; k < S; ++k)
-    columns[k] = particles.stress[stress_component<D>[k]].data();
-  columns[S] = particles.volume.data();
-  columns[S + 1] = particles.deviatoric_strain.data();
-  change_rows(columns, first, last,
+  change_rows(strain_columns(particles), first, last,
               [&](Piece<S + 2>& piece, std::size_t group)
               {
                 const CellStrain<D, Lanes>& strain = strains[group / lanes];
