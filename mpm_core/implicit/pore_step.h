@@ -4,6 +4,8 @@
 
 #include "mesh/mesh.h"
 
+#include <numeric>
+
 namespace mpm::implicit
 {
 /// What a cell's particles contribute to the flow of water over a step, by its vertices.
@@ -37,4 +39,18 @@ struct PoreStep
   std::vector<double> prescribed;  ///< that pressure [Pa]
   std::vector<double> content;     ///< water that the soil takes up less what flows to it [m3], over all ranks
 };
+
+/// Volume of the particles of a cell: its vertices' parts together [m3].
+template <int D>
+inline double volume_of(const PoreCell<D>& cell)
+{
+  return std::accumulate(cell.mean.begin(), cell.mean.end(), 0.0);
+}
+
+/// Pressure of a node at the end of the step, under the iterate [Pa].
+template <int D>
+inline double end_pressure(const PoreStep<D>& pore, Index node, double dt)
+{
+  return pore.start[static_cast<std::size_t>(node)] + dt * pore.rate[static_cast<std::size_t>(node)];
+}
 } // namespace mpm::implicit

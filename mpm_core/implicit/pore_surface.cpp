@@ -82,26 +82,9 @@ Cut<D> cut_of(const std::array<double, D + 1>& d)
   return cut;
 }
 
-template <int D>
-Vector<D> place_of(const Mesh<D>& mesh, Index cell, const std::array<double, D + 1>& n)
-{
-  Vector<D> x{};
-  for (int k = 0; k <= D; ++k)
-    for (int a = 0; a < D; ++a)
-      x[a] += n[k] * mesh.points[mesh.cells[cell][k]][a];
-  return x;
-}
-
 double triangle_area(const Vector<3>& a, const Vector<3>& b, const Vector<3>& c)
 {
-  Vector<3> u, v;
-  for (int i = 0; i < 3; ++i)
-  {
-    u[i] = b[i] - a[i];
-    v[i] = c[i] - a[i];
-  }
-  const Vector<3> n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-  return 0.5 * norm<3>(n);
+  return 0.5 * norm<3>(cross(difference<3>(b, a), difference<3>(c, a)));
 }
 
 /// Length or area of the surface in a cell.
@@ -110,7 +93,7 @@ double measure(const Mesh<D>& mesh, Index cell, const Cut<D>& cut)
 {
   std::array<Vector<D>, 4> x;
   for (int i = 0; i < cut.count; ++i)
-    x[i] = place_of(mesh, cell, cut.points[i]);
+    x[i] = point_in_cell<D>(mesh, cell, cut.points[i]);
   if constexpr (D == 2)
     return cut.count < 2 ? 0 : std::hypot(x[1][0] - x[0][0], x[1][1] - x[0][1]);
   else
@@ -131,11 +114,8 @@ void drain_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const 
     if (cut.count == 0)
       continue;
     PoreCell<D>& cell = step.pore.cells[c];
-    double volume = 0;
-    for (double mean : cell.mean)
-      volume += mean;
     const double h = cell_size<D>(mesh.shapes[c].volume);
-    const double per_area = penalty * (cell.flux / h + cell.compliance * h) / volume;
+    const double per_area = penalty * (cell.flux / h + cell.compliance * h) / volume_of(cell);
     const double each = per_area * measure(mesh, c, cut) * thickness<G>(mesh.shapes[c].centre) / cut.count;
     for (int i = 0; i < cut.count; ++i)
       for (int k = 0; k <= D; ++k)

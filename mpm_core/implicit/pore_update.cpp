@@ -56,7 +56,7 @@ CellPressure<D> cell_pressure(const Mesh<D>& mesh, const VelocityField<G>& field
     for (int a = 0; a < D; ++a)
     {
       pressure.of_increment[a] += increment * mesh.shapes[cell].gradient[k][a];
-      at_end[a] += (pore.start[node] + increment) * mesh.shapes[cell].gradient[k][a];
+      at_end[a] += end_pressure(pore, node, step.dt) * mesh.shapes[cell].gradient[k][a];
     }
   }
   pressure.at_end = in_moved_cell(mesh, field, step, cell, at_end);
@@ -124,10 +124,7 @@ void add_inflow(const Mesh<G::dim>& mesh, const ImplicitStep<G>& step, std::span
   for (Index c : step.cells)
     for (const auto& row : pore.cells[c].outflow)
       for (std::size_t l = 0; l < row.size(); ++l)
-      {
-        const Index node = mesh.cells[c][l];
-        water.inflow -= row[l] * (pore.start[node] + step.dt * pore.rate[node]);
-      }
+        water.inflow -= row[l] * end_pressure(pore, mesh.cells[c][l], step.dt);
 }
 
 #define INSTANTIATE(G)                                                                                                 \

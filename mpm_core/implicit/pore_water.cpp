@@ -16,9 +16,7 @@ Vector<D> relative_acceleration(const Mesh<D>& mesh, const VelocityField<G>& fie
     acceleration[a] = -step.pore.gravity[a];
   if (step.options.quasi_static)
     return acceleration;
-  double volume = 0;
-  for (double mean : step.pore.cells[cell].mean)
-    volume += mean;
+  const double volume = volume_of(step.pore.cells[cell]);
   for (int k = 0; k <= D; ++k)
     for (int a = 0; a < D; ++a)
     {
@@ -39,7 +37,7 @@ Vector<D> driving_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, c
   for (int k = 0; k <= D; ++k)
   {
     const Index node = mesh.cells[cell][k];
-    const double pressure = step.pore.start[node] + step.dt * step.pore.rate[node];
+    const double pressure = end_pressure(step.pore, node, step.dt);
     for (int a = 0; a < D; ++a)
       gradient[a] += pressure * mesh.shapes[cell].gradient[k][a];
   }
@@ -107,7 +105,7 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
       content += cell.flux * dot<D>(mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
         content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]] +
-                   cell.outflow[k][l] * (pore.start[nodes[l]] + step.dt * pore.rate[nodes[l]]);
+                   cell.outflow[k][l] * end_pressure(pore, nodes[l], step.dt);
     }
   }
   add_ghost_content(step, pore.content);
@@ -125,9 +123,7 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, i
   const CellShape<D>& shape = mesh.shapes[c];
   const Index row = mesh.cells[c][k], column = mesh.cells[c][l];
   const double unit = pore.unit;
-  double volume = 0;
-  for (double mean : cell.mean)
-    volume += mean;
+  const double volume = volume_of(cell);
   const double inertia = step.options.quasi_static ? 0
                                                    : cell.flux * pore.density * cell.mean[l] /
                                                          (volume * step.stage.weight * step.stage.dt * step.dt);

@@ -109,6 +109,17 @@ inline std::array<double, D + 1> shape_functions(const CellShape<D>& shape, cons
   return n;
 }
 
+/// The point of a cell where the shape functions have given values.
+template <int D>
+inline Vector<D> point_in_cell(const Mesh<D>& mesh, Index cell, const std::array<double, D + 1>& n)
+{
+  Vector<D> x{};
+  for (int k = 0; k <= D; ++k)
+    for (int i = 0; i < D; ++i)
+      x[i] += n[k] * mesh.points[mesh.cells[cell][k]][i];
+  return x;
+}
+
 /// Size h of a simplex [m]: side of the square or cube that D! of its volume fill, (D! V)^(1/D).
 ///
 /// Softening spreads over a band one row of cells wide, and rows of simplices are as wide as the squares or cubes that

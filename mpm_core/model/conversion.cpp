@@ -41,7 +41,7 @@ void divide_row(const Mesh<D>& mesh, std::span<const std::array<double, D + 1>> 
   {
     const Index p = k == 0 ? row : end + k - 1;
     particles.id[p] = id + k;
-    const Vector<D> x = rule_point(mesh, cell, points[static_cast<std::size_t>(k)]);
+    const Vector<D> x = point_in_cell<D>(mesh, cell, points[static_cast<std::size_t>(k)]);
     for (int i = 0; i < D; ++i)
     {
       particles.position[i][p] = x[i];

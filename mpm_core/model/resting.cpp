@@ -52,7 +52,7 @@ void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRo
     if (particles.traction.present && norm<D>(at<D>(particles.traction.columns, p)) > 0)
       refuse(particles, p, "carries a traction");
     Vector<D> off = at<D>(particles.position, p);
-    const Vector<D> point = rule_point(mesh, cell.cell, cell.points[k]);
+    const Vector<D> point = point_in_cell<D>(mesh, cell.cell, cell.points[k]);
     for (int i = 0; i < D; ++i)
       off[i] -= point[i];
     if (norm<D>(off) > 1e-9 * size)

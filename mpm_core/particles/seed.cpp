@@ -154,10 +154,7 @@ Index seed_cells(const Mesh<D>& mesh, std::optional<Index> tag, int per_cell, Se
   for (Index c : cells)
     for (int k = 0; k < per_cell; ++k, ++p)
     {
-      Vector<D> x{};
-      for (int v = 0; v <= D; ++v)
-        for (int i = 0; i < D; ++i)
-          x[i] += points[static_cast<std::size_t>(k)][v] * mesh.points[mesh.cells[c][v]][i];
+      const Vector<D> x = point_in_cell<D>(mesh, c, points[static_cast<std::size_t>(k)]);
       set_particle<D>(particles, p, first_id + mesh.global_cells[c] * per_cell + k, x, c,
                       thickness<G>(x) * mesh.shapes[c].volume / per_cell, soil);
     }

@@ -26,17 +26,6 @@ using Rules = std::map<int, RuleMoments<D>>;
 template <int D>
 const RuleMoments<D>& rule_moments(int points, Rules<D>& rules);
 
-/// A point of a rule in a cell, from its barycentric coordinates.
-template <int D>
-inline Vector<D> rule_point(const Mesh<D>& mesh, Index cell, const std::array<double, D + 1>& coordinates)
-{
-  Vector<D> x{};
-  for (int k = 0; k <= D; ++k)
-    for (int i = 0; i < D; ++i)
-      x[i] += coordinates[k] * mesh.points[mesh.cells[cell][k]][i];
-  return x;
-}
-
 /// sum m_p xi (x) xi of a cell's particles at the points of a rule.
 template <int D>
 std::array<double, n_symmetric<D>> second_moment(const Mesh<D>& mesh, Index cell, double mass,
