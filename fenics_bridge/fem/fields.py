@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.geometry import weighted
+from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.types import MeshTags
 
 N_STRESS = {2: 4, 3: 6}
 """Number of components by dimension."""
@@ -85,9 +87,12 @@ def part_of(function: fem.Function, collapsed: tuple[Any, Any], name: str) -> fe
     return part
 
 
-def force_on(space: Any, forces: NDArray[np.float64], facets: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Sum of nodal forces (local dofs of a displacement space) over the nodes of facets: (D,). Collective."""
+def force_on(
+    space: Any, forces: NDArray[np.float64], facet_tags: MeshTags, facet_tag: int | str
+) -> NDArray[np.float64]:
+    """Sum of nodal forces (local dofs of a displacement space) over the nodes on the facets of a tag: (D,). Collective."""
     dim = space.mesh.geometry.dim
+    facets = tagged_facets(space.mesh.comm, facet_tags, facet_tag, "facet_tag")
     nodes = fem.locate_dofs_topological(space, dim - 1, facets)
     mine = nodes[nodes < space.dofmap.index_map.size_local]
     return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))

@@ -26,7 +26,7 @@ from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
+from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags
 from mpm_core import Geometry
 
@@ -170,9 +170,8 @@ class MixedQuasiStatic:
         """
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        facets = tagged_facets(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
         space, dofs = self._displacements
-        return force_on(space, forces[dofs], facets)
+        return force_on(space, forces[dofs], self._facet_tags, facet_tag)
 
     def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
         """Pressure at points, whichever ranks have the points and their cells; compression positive.

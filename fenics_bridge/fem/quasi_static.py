@@ -28,14 +28,15 @@ from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
+from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
+from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
 from mpm_core import Geometry
 
 
-class QuasiStatic:
+class QuasiStatic(PointFunctions):
     """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
     Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium.
@@ -305,8 +306,7 @@ class QuasiStatic:
             Collective.
         """
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        facets = tagged_facets(self.domain.comm, self.facet_tags, facet_tag, "facet_tag")
-        return force_on(self.displacement.function_space, out_of_balance, facets)
+        return force_on(self.displacement.function_space, out_of_balance, self.facet_tags, facet_tag)
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function.
@@ -324,18 +324,6 @@ class QuasiStatic:
             return self.points.cell_function(self.points.stress, "stress", 1)
         mean = self.points.cell_function(self.points.stress, "stress", 0)
         return nodal_average(mean, self.radius) if smooth else mean
-
-    def state_function(self) -> fem.Function:
-        """State variables of the law as a function that is constant in each cell."""
-        return self.points.cell_function(self.points.state, "state", 0)
-
-    def deviatoric_strain_function(self) -> fem.Function:
-        """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
-        return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
-
-    def material_function(self) -> fem.Function:
-        """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
-        return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
         """Values at points, whichever ranks have the points and their cells.

@@ -22,9 +22,10 @@ from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
+from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
-from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
+from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary
@@ -45,7 +46,7 @@ from fenics_bridge.water.time_steps import run
 from mpm_core import Geometry
 
 
-class Consolidation:
+class Consolidation(PointFunctions):
     """Quasi-static deformation of saturated soil coupled with the flow of its water: displacement u and pore pressure p.
 
     Args:
@@ -298,18 +299,6 @@ class Consolidation:
         mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
         return nodal_average(mean, self.radius) if smooth else mean
 
-    def state_function(self) -> fem.Function:
-        """State variables of the law as a function that is constant in each cell."""
-        return self.points.cell_function(self.points.state, "state", 0)
-
-    def deviatoric_strain_function(self) -> fem.Function:
-        """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
-        return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
-
-    def material_function(self) -> fem.Function:
-        """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
-        return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)
-
     @property
     def laws(self) -> list[Any]:
         """The laws as a list, in the order in which they were given."""
@@ -376,9 +365,8 @@ class Consolidation:
         """
         self._body.increment.x.array[:] = 0.0
         forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
-        facets = tagged_facets(self.domain.comm, self._facet_tags, facet_tag, "facet_tag")
         space, dofs = self._displacements
-        return force_on(space, forces[dofs], facets)
+        return force_on(space, forces[dofs], self._facet_tags, facet_tag)
 
 
 def _parts(space):
