@@ -128,7 +128,7 @@ def cells_near(model: mpm.Model, place: np.ndarray, reach: float) -> np.ndarray:
 
 
 def displacement_of(model: mpm.Model, cells: np.ndarray, per_cell: int) -> float:
-    """Mean displacement [m] of the soil that was in some cells at the start: numbers of particles tell theirs."""
+    """Mean displacement [m] of the soil that was in some cells at the start, known by the numbers of its particles."""
     p = model.particles
     rows = np.isin(p.id // per_cell, cells)
     sums = comm.allreduce(np.append((p.mass[:, None] * p.displacement)[rows].sum(axis=0), p.mass[rows].sum()))

@@ -55,7 +55,7 @@ def test_a_body_that_flows_at_a_steady_rate_takes_one_system_a_step():
 
 
 def test_supports_move_once_in_a_relaxation():
-    """A plastic block under a plate that is pressed down: the plate ends where it was told to, at the force 2 s_u."""
+    """A plastic block under a plate that is pressed down: the plate ends where it is prescribed, at the force 2 s_u."""
     block, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
     clay = mpm.tresca(young=1e6, poisson=0.3, shear_strength=10e3)
     supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1)), bridge.Support(4, (None, -0.05))]

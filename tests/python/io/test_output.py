@@ -255,7 +255,7 @@ def test_the_same_frames_make_the_same_files(tmp_path, some):
         with ParticleOutput(tmp_path / name, COMM) as output:
             for step, fields in enumerate(frames):
                 output.write(float(step), fields)
-        time.sleep(1.1 if name == "a" else 0.0)  # HDF5 keeps times to a second, unless told not to
+        time.sleep(1.1 if name == "a" else 0.0)  # HDF5 keeps times to a second, unless this is switched off
     for step in range(len(frames)):
         one, other = (tmp_path / name / f"{step:06d}.h5" for name in ("a", "b"))
         assert one.read_bytes() == other.read_bytes()
