@@ -55,7 +55,9 @@ def test_a_smooth_wall_feels_rankines_pressure(passive, friction_angle):
 
 def soil_at_rest(filling, dilation_angle, integration):
     """Soil between smooth walls under its weight, far from failure at K0, with averaged strains."""
-    soil = mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=COHESION, friction_angle=30.0, dilation_angle=dilation_angle)
+    soil = mpm.MohrCoulomb(
+        young=1e7, poisson=0.3, cohesion=COHESION, friction_angle=30.0, dilation_angle=dilation_angle
+    )
     height = 1.0 if filling == "even" else 1.4
     model = mpm.Model(box((15, round(10 * height)), (LENGTH, height), diagonals="alternating"), soil)
     if filling == "even":
