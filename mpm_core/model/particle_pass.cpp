@@ -86,11 +86,19 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
   model.energy.ahead += Kind::template half_work_of_batch<G>(particles, batch, scratch);
 }
 
+/// Keeps the sum of stresses of a run, for the work of the batch.
+template <class G>
+void note(const Working<G>& stress, std::size_t run, double (&by_run)[n_stress<G::dim>][batch_size])
+{
+  for (int k = 0; k < G::n_working; ++k)
+    by_run[k][run] = stress[k];
+}
+
 /// What the moments of a cell become when its particles move along with the nodes, whoever they are: only stresses are
 /// summed over particles, run by run, and tractions, which are rare.
 template <class G, int D = G::dim>
 void update_moments(const Particles<D>& particles, const PassOptions& options, const Run& run, std::size_t in_batch,
-                    const BatchScratch<D>& scratch, CellMoments<G>& moments, double& ahead)
+                    BatchScratch<D>& scratch, CellMoments<G>& moments)
 {
   if (run.first_in_cell && options.move)
     move<G>(moments, scratch.motion[in_batch]);
@@ -104,7 +112,7 @@ void update_moments(const Particles<D>& particles, const PassOptions& options, c
     const auto sum = stress_sum<G>(particles, run.first, run.last);
     for (int k = 0; k < G::n_working; ++k)
       moments.stress[k] += sum[k];
-    ahead += half_work<G>(sum, scratch, in_batch);
+    note<G>(sum, in_batch, scratch.stress_after);
   }
 }
 
@@ -174,28 +182,30 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     const CellShape<D>& shape = model.mesh.shapes[run.cell];
     const std::size_t i = r - batch.first_run;
     CellMoments<G>& moments = field.moments[run.cell];
-    if (run.first_in_cell && options.stress)
-      model.energy.stress_work += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
+    note<G>(run.first_in_cell ? moments.stress : Working<G>{}, i, scratch.stress_before);
     if constexpr (Kind::at_rest)
     {
       take_row<G>(model.particles, run.first, moments);
-      if (options.stress)
-        model.energy.ahead += Kind::template half_work_of_run<G>(moments.stress, scratch, i);
+      note<G>(moments.stress, i, scratch.stress_after);
     }
     else if (from_particles)
     {
       if (run.first_in_cell)
         moments = {};
       add_moments<G>(model.particles, run.first, run.last, shape, moments);
-      if (options.stress)
-        model.energy.ahead +=
-            Kind::template half_work_of_run<G>(stress_sum<G>(model.particles, run.first, run.last), scratch, i);
+      note<G>(stress_sum<G>(model.particles, run.first, run.last), i, scratch.stress_after);
     }
     else if constexpr (Kind::moves_moments)
-      update_moments<G>(model.particles, options, run, i, scratch, moments, model.energy.ahead);
+      update_moments<G>(model.particles, options, run, i, scratch, moments);
     add_tractions(model.particles, shape, run.first, run.last, run.cell, field);
     if (run.out_of_order)
       follow_leaving(model, run, field);
+  }
+  if (options.stress)
+  {
+    const std::size_t n = batch.last_run - batch.first_run;
+    model.energy.stress_work += Kind::template half_work_of_runs<G>(scratch.stress_before, scratch, n);
+    model.energy.ahead += Kind::template half_work_of_runs<G>(scratch.stress_after, scratch, n);
   }
 }
 

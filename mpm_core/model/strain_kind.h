@@ -19,15 +19,26 @@ inline double half_work(const Particles<D>& particles, const Batch& batch, const
   return 0.5 * sum;
 }
 
-/// Half of the work of a sum of stresses, V sigma, on the strain of a run of the batch.
+/// Half of the work of the runs' stresses on the strains of their cells, several runs at once.
+/// @param stress  sums V_p sigma_p of the runs, by component
 template <class G, int D = G::dim>
-inline double half_work(const Working<G>& stress, const BatchScratch<D>& scratch, std::size_t run)
+inline double half_work(const double (&stress)[n_stress<D>][batch_size], const BatchScratch<D>& scratch,
+                        std::size_t runs)
 {
-  const auto& increment = scratch.cells[run / lanes].increment;
-  double sum = 0;
-  for (std::size_t k = 0; k < G::n_working; ++k)
-    sum += stress[k] * increment[working_component<G>[k]][run % lanes];
-  return 0.5 * sum;
+  constexpr LaneMask number{0, 1, 2, 3};
+  static_assert(lanes == 4);
+  Lanes sum{};
+  for (std::size_t r = 0; r < runs; r += lanes)
+  {
+    const LaneMask mine = number < static_cast<std::int64_t>(runs - r); // the lanes beyond hold what was there before
+    for (std::size_t k = 0; k < G::n_working; ++k)
+    {
+      Lanes of_runs;
+      std::memcpy(&of_runs, stress[k] + r, sizeof(Lanes));
+      sum += mine ? of_runs * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
+    }
+  }
+  return 0.5 * transfer::sum(sum);
 }
 
 /// Integration over particles, or mixed: volumes and work follow from the moments of a cell and its one strain.
@@ -59,9 +70,10 @@ struct StrainPerCell
   }
 
   template <class G, int D = G::dim>
-  static double half_work_of_run(const Working<G>& stress, const BatchScratch<D>& scratch, std::size_t run)
+  static double half_work_of_runs(const double (&stress)[n_stress<D>][batch_size], const BatchScratch<D>& scratch,
+                                  std::size_t runs)
   {
-    return half_work<G>(stress, scratch, run);
+    return half_work<G>(stress, scratch, runs);
   }
 };
 
@@ -103,7 +115,7 @@ struct StrainPerParticle
   }
 
   template <class G, int D = G::dim>
-  static double half_work_of_run(const Working<G>&, const BatchScratch<D>&, std::size_t)
+  static double half_work_of_runs(const double (&)[n_stress<D>][batch_size], const BatchScratch<D>&, std::size_t)
   {
     return 0;
   }
