@@ -68,15 +68,18 @@ def parts(model: Model) -> NDArray[np.float64]:
 
 def _piece_masses(cells: NDArray, masses: NDArray) -> NDArray[np.float64]:
     """Masses of the sets of cells that nodes connect."""
-    numbers, nodes = np.unique(cells, return_inverse=True)
+    _, nodes = np.unique(cells, return_inverse=True)
     nodes = nodes.reshape(cells.shape)
-    label = np.arange(len(numbers))
+    by_node = np.argsort(nodes, axis=None, kind="stable")
+    cell_at_node = by_node // cells.shape[1]
+    first_at_node = np.flatnonzero(np.diff(nodes.ravel()[by_node], prepend=-1))
+    label = np.arange(len(first_at_node))
     while True:
-        least = label[nodes].min(axis=1)
-        before = label.copy()
-        for k in range(nodes.shape[1]):
-            np.minimum.at(label, nodes[:, k], least)
-        label = label[label]  # a node takes the label of the one it is named after: pieces grow by leaps
+        before = label
+        # A node takes the least label of the cells around it, and then that of the node which bears this number, so
+        # that pieces grow by leaps.
+        label = np.minimum.reduceat(label[nodes].min(axis=1)[cell_at_node], first_at_node)
+        label = label[label]
         if np.array_equal(label, before):
             break
     weights = np.bincount(label[nodes[:, 0]], masses)
