@@ -53,26 +53,6 @@ void map_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particl
   sum_shared(exchange, integration.dual_nodes);
 }
 
-/// Internal forces (14) of what the cells integrate.
-template <class G, int D = G::dim>
-void replace_internal_forces(const Mesh<D>& mesh, VelocityField<G>& field)
-{
-  for (NodeSums<D>& node : field.nodes)
-    node.internal = {};
-  for (Index c = 0; c < mesh.owned_cells; ++c)
-  {
-    if (field.moments[c].mass == 0)
-      continue;
-    const Working<G> stress = integrated_stress(mesh, field, c);
-    for (int k = 0; k <= D; ++k)
-    {
-      const Vector<D> force = internal_force<G>(stress, mesh.shapes[c], k);
-      for (int a = 0; a < D; ++a)
-        field.nodes[mesh.cells[c][k]].internal[a] += force[a];
-    }
-  }
-}
-
 template <class G>
 Working<G> scaled_stress(Working<G> stress, double factor)
 {
@@ -93,33 +73,25 @@ std::array<double, n_symmetric<D>> dual_stress(const Mesh<D>& mesh, const CellIn
 } // namespace
 
 template <class G, int D>
-Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+Working<G> full_cell_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
-  const CellIntegration<D>& integration = field.integration;
-  const Working<G>& sum = field.moments[cell].stress;
-  if (integration.kind == Integration::particles || !integration.whole[cell])
-    return sum;
   const double volume = cell_volume<G>(mesh.shapes[cell]);
   if constexpr (!G::has_hoop)
-    if (integration.kind == Integration::dual_domain)
-      return scaled_stress<G>(dual_stress<D>(mesh, integration, cell), volume);
-  return scaled_stress<G>(sum, volume / field.moments[cell].volume);
+    if (field.integration.kind == Integration::dual_domain)
+      return scaled_stress<G>(dual_stress<D>(mesh, field.integration, cell), volume);
+  return scaled_stress<G>(field.moments[cell].stress, volume / field.moments[cell].volume);
 }
 
 template <class G, int D>
-void integrate_mixed(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
+void begin_integration(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                       const std::vector<Run>& runs, VelocityField<G>& field)
 {
+  if (field.integration.kind == Integration::particles)
+    return;
   find_whole_cells(mesh, exchange, field);
-  replace_internal_forces(mesh, field);
-}
-
-template <class G, int D>
-void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
-                            const std::vector<Run>& runs, VelocityField<G>& field)
-{
-  find_whole_cells(mesh, exchange, field);
-  map_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
-  replace_internal_forces(mesh, field);
+  if constexpr (!G::has_hoop)
+    if (field.integration.kind == Integration::dual_domain)
+      map_dual_domains<G>(mesh, exchange, particles, runs, field.integration);
 }
 
 template <class G, int D>
@@ -170,17 +142,12 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template Working<G> integrated_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                          \
-  template void integrate_mixed(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                                \
+  template Working<G> full_cell_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                           \
+  template void begin_integration(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                        \
+                                  const std::vector<Run>&, VelocityField<G>&);                                         \
   template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \
   template Matrix<G::dim> dual_gradient(const Mesh<G::dim>&, const VelocityField<G>&, const Vector<G::dim>&, Index);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
-INSTANTIATE(Solid)
-#undef INSTANTIATE
-#define INSTANTIATE(G)                                                                                                 \
-  template void integrate_dual_domains(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                   \
-                                       const std::vector<Run>&, VelocityField<G>&);
-INSTANTIATE(PlaneStrain)
 INSTANTIATE(Solid)
 } // namespace mpm::model

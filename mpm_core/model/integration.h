@@ -24,24 +24,28 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
-/// What a cell integrates [N m]: the mean stress over its volume where it is full, the sum over its particles where it
-/// is not, and in all cells when they are left to their particles.
-/// @pre the internal forces of this step have been integrated: the full cells are known
-template <class G, int D = G::dim>
-Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell);
-
-/// Puts the internal force of mixed integration in the place of the particles' sum, on this rank: a full cell
-/// integrates the mean stress of its particles over its volume.
+/// Finds what the cells integrate in this step, where it is not the sum over their particles: a full cell integrates
+/// the mean stress of its particles over its volume (mixed), or the mean stress by the weights of dual domains.
 /// @post field.integration.whole tells which cells are full
-/// @note Collective
+/// @pre no dual domains in axial symmetry
+/// @note Collective where stresses are integrated over whole cells
 template <class G, int D = G::dim>
-void integrate_mixed(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field);
+void begin_integration(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
+                       const std::vector<Run>& runs, VelocityField<G>& field);
 
-/// The same with dual domains: a full cell integrates the mean stress by their weights.
-/// @pre not in axial symmetry
+/// What a full cell integrates [N m]: the mean stress of its particles, or that of dual domains, over its volume.
 template <class G, int D = G::dim>
-void integrate_dual_domains(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
-                            const std::vector<Run>& runs, VelocityField<G>& field);
+Working<G> full_cell_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell);
+
+/// What a cell integrates [N m]: the above where it is full, the sum over its particles where it is not, and in all
+/// cells when they are left to their particles.
+/// @pre begin_integration has been called
+template <class G, int D = G::dim>
+inline Working<G> integrated_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  const bool whole = field.integration.kind != Integration::particles && field.integration.whole[cell];
+  return whole ? full_cell_stress(mesh, field, cell) : field.moments[cell].stress;
+}
 
 /// Means of the velocity gradient over the full cells that share a node, from the nodes' `velocity`.
 /// @note Collective

@@ -27,6 +27,70 @@ void shrink_part(const Mesh<D>& mesh, const NodeExchange& exchange, VelocityFiel
       field.start_velocity[node] = field.acceleration[node] = field.velocity_change[node] = field.velocity[node] = {};
     }
 }
+
+/// Sum of the mean of the normal components of a stress times volume.
+template <class G>
+double mean_of(const Working<G>& stress)
+{
+  double sum = 0;
+  for (int k : normal_component<G>)
+    sum += stress[k];
+  return sum / G::n_normal;
+}
+
+/// Averages over nodes the mean stress times volume of filled cells.
+/// @post integration.mean_stress_of_cell has what was averaged, for `change_by_averaging`
+template <class G, class StressOf>
+void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
+                         StressOf&& stress_of)
+{
+  field.mean_stress.resize(mesh.points.size());
+  auto& own = field.integration.mean_stress_of_cell; // kept for what follows, since moments are far apart in memory
+  own.resize(static_cast<std::size_t>(mesh.owned_cells));
+  const auto volume_of = [&](Index c) { return own[c].volume = integrated_volume(mesh, field, c); };
+  const auto integral_of = [&](Index c, double) { return own[c].value = mean_of<G>(stress_of(c)); };
+  average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
+}
+
+/// By how much averaging changes the mean stress times volume of a filled cell.
+template <class G, int D = G::dim>
+double change_by_averaging(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  const auto [integral, volume] = field.integration.mean_stress_of_cell[cell];
+  return volume * mean_of_nodes<D>(mesh.cells[cell], field.mean_stress) - integral;
+}
+
+/// The fraction of averaging in each cell, the least of its soils; none where all are averaged in full.
+template <class G, int D = G::dim>
+void find_averaged_fractions(const Mesh<D>& mesh, const std::vector<Run>& runs, CellIntegration<D>& integration)
+{
+  const auto& by_law = integration.averaged_by_law;
+  integration.averaged_of_cell.clear();
+  if (std::ranges::all_of(by_law, [](double fraction) { return fraction == 1; }))
+    return;
+  integration.averaged_of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
+  for (const Run& run : runs)
+    integration.averaged_of_cell[run.cell] = std::min(integration.averaged_of_cell[run.cell], by_law[run.material]);
+}
+
+/// Averages the mean stresses of the cells over nodes, in each cell by the fraction that its soils have in
+/// `integration.averaged_by_law`: the transpose of the average that strains are given, so that the forces do the work
+/// of the particles' stresses on averaged strains.
+template <class G, int D = G::dim>
+void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
+                             VelocityField<G>& field)
+{
+  find_averaged_fractions<G>(mesh, runs, field.integration);
+  const auto& fraction = field.integration.averaged_of_cell;
+  const auto stress_of = [&](Index c)
+  {
+    Working<G> stress = integrated_stress(mesh, field, c);
+    for (double& component : stress)
+      component *= fraction.empty() ? 1 : fraction[c];
+    return stress;
+  };
+  average_mean_stress<G>(mesh, exchange, field, stress_of);
+}
 } // namespace
 
 template <class G, int D>
@@ -35,15 +99,23 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
 {
   if (std::exchange(field.part_shrinks, false))
     shrink_part(mesh, exchange, field);
-  scatter<G>(mesh, field.part, field.moments, field.tractions, field.nodes);
-  if (field.integration.kind == Integration::mixed)
-    integrate_mixed(mesh, exchange, field);
-  if constexpr (!G::has_hoop)
-    if (field.integration.kind == Integration::dual_domain)
-      integrate_dual_domains(mesh, exchange, particles, runs, field);
-  field.integration.averaged_of_cell.clear();
+  begin_integration(mesh, exchange, particles, runs, field);
+  const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
   if (!field.integration.averaged_by_law.empty())
-    average_forces(mesh, exchange, runs, field);
+  {
+    average_stress_of_soils(mesh, exchange, runs, field);
+    const auto averaged = [&](Index c)
+    {
+      Working<G> stress = integrated(c);
+      const double change = change_by_averaging(mesh, field, c);
+      for (int k : normal_component<G>)
+        stress[k] += change;
+      return stress;
+    };
+    scatter<G>(mesh, field.part, field.moments, averaged, field.tractions, field.nodes);
+  }
+  else
+    scatter<G>(mesh, field.part, field.moments, integrated, field.tractions, field.nodes);
   add_pore_forces(mesh, particles, runs, field);
 }
 
@@ -81,7 +153,10 @@ void find_velocity_change(VelocityField<G>& field, double pic_fraction, double d
 template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
 {
-  const auto volume_of = [&](Index c) { return integrated_volume(mesh, field, c); };
+  // Averages of stress have found the volumes, and left them side by side.
+  const bool known = !field.integration.averaged_by_law.empty();
+  const auto volume_of = [&](Index c)
+  { return known ? field.integration.mean_stress_of_cell[c].volume : integrated_volume(mesh, field, c); };
   const auto strain_of = [&](Index c, double volume)
   {
     double divergence = 0;
@@ -97,76 +172,19 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
   average_over_nodes(mesh, field.part, volume_of, strain_of, exchange, field.volumetric_strain);
 }
 
-namespace
-{
-/// Sum of the mean of the normal components of a stress times volume.
-template <class G>
-double mean_of(const Working<G>& stress)
-{
-  double sum = 0;
-  for (int k : normal_component<G>)
-    sum += stress[k];
-  return sum / G::n_normal;
-}
-
-/// The change of mean stress times volume of filled cells when it is averaged over nodes, handed to `take` cell by
-/// cell.
-template <class G, class StressOf, class Take>
-void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
-                         StressOf&& stress_of, Take&& take)
-{
-  field.mean_stress.resize(mesh.points.size());
-  auto& own = field.integration.mean_stress_of_cell; // kept for the second pass, since moments are far apart in memory
-  own.resize(static_cast<std::size_t>(mesh.owned_cells));
-  const auto volume_of = [&](Index c) { return own[c].volume = integrated_volume(mesh, field, c); };
-  const auto integral_of = [&](Index c, double) { return own[c].value = mean_of<G>(stress_of(c)); };
-  average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
-  for (Index c : field.part.cells)
-    if (const auto [integral, volume] = own[c]; volume != 0)
-      take(c, volume * mean_of_nodes<G::dim>(mesh.cells[c], field.mean_stress) - integral);
-}
-} // namespace
-
 template <class G, int D>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress)
 {
-  const auto stress_of = [&](Index c) -> const Working<G>& { return stress[c]; };
-  average_mean_stress<G>(mesh, exchange, field, stress_of,
-                         [&](Index c, double change)
-                         {
-                           for (int k : normal_component<G>)
-                             stress[c][k] += change;
-                         });
-}
-
-template <class G, int D>
-void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field)
-{
-  const auto& by_law = field.integration.averaged_by_law;
-  auto& averaged = field.integration.averaged_of_cell;
-  averaged.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
-  for (const Run& run : runs)
-    averaged[run.cell] = std::min(averaged[run.cell], by_law[run.material]);
-  const auto stress_of = [&](Index c)
+  average_mean_stress<G>(mesh, exchange, field, [&](Index c) -> const Working<G>& { return stress[c]; });
+  for (Index c : field.part.cells)
   {
-    Working<G> stress = integrated_stress(mesh, field, c);
-    for (double& component : stress)
-      component *= averaged[c];
-    return stress;
-  };
-  average_mean_stress<G>(mesh, exchange, field, stress_of,
-                         [&](Index c, double change)
-                         {
-                           for (int k = 0; k <= D; ++k)
-                           {
-                             Vector<D>& force = field.nodes[mesh.cells[c][k]].internal;
-                             for (int a = 0; a < D; ++a)
-                               force[a] += change * mesh.shapes[c].gradient[k][a];
-                             if constexpr (G::has_hoop)
-                               force[0] += change * hoop_gradient<G>(mesh.shapes[c]);
-                           }
-                         });
+    if (field.integration.mean_stress_of_cell[c].volume == 0)
+      continue;
+    const double change = change_by_averaging(mesh, field, c);
+    for (int k : normal_component<G>)
+      stress[c][k] += change;
+  }
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -176,8 +194,7 @@ void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vect
   template void find_start_velocity(VelocityField<G>&);                                                                \
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
   template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \
-  template void average_stresses(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, std::span<Working<G>>);        \
-  template void average_forces(const Mesh<G::dim>&, NodeExchange&, const std::vector<Run>&, VelocityField<G>&);
+  template void average_stresses(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, std::span<Working<G>>);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -11,8 +11,12 @@ namespace mpm::model
 {
 /// Sums of mass (11), momentum, internal force (14) and traction (15) at the nodes of a field, of this rank's
 /// particles.
+///
+/// With nodal mixed discretisation the stresses are averaged as the strains will be, in each cell by the least fraction
+/// that its soils have in `integration.averaged_by_law`: with volume weights the average is its own transpose, so that
+/// the forces do the work of the particles' stresses on averaged strains.
 /// @post cells that have become empty are left out of the field's part of the mesh, where it is to shrink
-/// @note Collective where stresses are integrated over whole cells
+/// @note Collective where stresses are integrated over whole cells, or averaged
 template <class G, int D = G::dim>
 void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
                         const std::vector<Run>& runs, VelocityField<G>& field);
@@ -48,13 +52,6 @@ template <class G, int D = G::dim>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
 
-/// The same for the internal forces of a field on this rank, in each cell by the fraction that its soils have in
-/// `integration.averaged_by_law`.
-/// @post integration.averaged_of_cell has the fractions, by which the strains are to be averaged, too
-/// @note Collective
-template <class G, int D = G::dim>
-void average_forces(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs, VelocityField<G>& field);
-
 /// Volumetric strain of a cell after nodal mixed discretisation.
 /// @param own  of the cell before
 /// @pre average_strains has been called for the field
@@ -78,6 +75,8 @@ double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index
 /// @param dt        [s]
 inline double local_damping(double alpha, double residual, double momentum, double dt)
 {
+  if (alpha == 0)
+    return 0;
   const double impulse = (1 + alpha) * residual * dt;
   const double slowed = impulse == 0 ? 0 : std::clamp(-momentum / impulse, 0.0, 1.0); // part of the step until the stop
   return alpha * residual * (1 - 2 * slowed);

@@ -3,7 +3,7 @@
 /// From cell moments to nodal sums. Conservative: the sum over nodes equals the sum over particles.
 
 #include "mesh/part.h"
-#include "transfer/moments.h"
+#include "transfer/by_vertex.h"
 
 #include <span>
 
@@ -37,11 +37,56 @@ inline Vector<D> internal_force(const Working<G>& stress, const CellShape<D>& sh
   return force;
 }
 
+/// Adds the tractions in a cell to its nodes.
+template <int D>
+inline void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMoments<D>& moments,
+                              std::span<NodeSums<D>> nodes)
+{
+  for (int k = 0; k <= D; ++k)
+    for (int a = 0; a < D; ++a)
+      nodes[mesh.cells[cell][k]].traction[a] +=
+          at_vertex<D>(moments.force[a], moments.force_xi[a], mesh.shapes[cell].gradient[k]);
+}
+
 /// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
+/// @param stress_of  what a cell integrates [N m], sum V_p sigma_p or what takes its place; a callable Index -> Working
 /// @param tractions  one per cell, or empty
-template <class G>
+template <class G, class StressOf>
 void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
-             std::span<const TractionMoments<G::dim>> tractions, std::span<NodeSums<G::dim>> nodes);
+             StressOf&& stress_of, std::span<const TractionMoments<G::dim>> tractions,
+             std::span<NodeSums<G::dim>> nodes)
+{
+  constexpr int D = G::dim;
+  for (Index node : part.nodes)
+    nodes[node] = {};
+  for (Index c : part.cells)
+  {
+    const CellMoments<G>& moments = cells[c];
+    if (moments.mass == 0)
+      continue;
+    const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
+    const ByVertex<D> mass = at_vertices<D>(moments.mass, moments.mass_xi, gradients);
+    const Working<G> stress = stress_of(c);
+    std::array<ByVertex<D>, D> momentum, internal;
+    for (int a = 0; a < D; ++a)
+    {
+      momentum[a] = at_vertices<D>(moments.momentum[a], moments.momentum_xi[a], gradients);
+      internal[a] = internal_forces<G>(stress, a, gradients, mesh.shapes[c]);
+    }
+    for (int k = 0; k <= D; ++k)
+    {
+      NodeSums<D>& node = nodes[mesh.cells[c][k]];
+      node.mass += mass[k];
+      for (int a = 0; a < D; ++a)
+      {
+        node.momentum[a] += momentum[a][k];
+        node.internal[a] += internal[a][k];
+      }
+    }
+    if (!tractions.empty())
+      scatter_tractions<D>(mesh, c, tractions[c], nodes);
+  }
+}
 
 /// The momentum `sum m_p N_i sum_j N_j change_j` of particles that all had the velocity of the nodal field `change` at
 /// their place: the consistent mass matrix times `change`. The particles are not visited.

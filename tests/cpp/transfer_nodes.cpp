@@ -63,7 +63,8 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
     add_moments<D>(particles, run.first, run.last, mesh.shapes[run.cell], tractions[run.cell]);
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
-  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, tractions, nodes);
+  const auto stress_of = [&](Index c) { return moments[c].stress; };
+  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, stress_of, tractions, nodes);
   return nodes;
 }
 
