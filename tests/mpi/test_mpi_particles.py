@@ -182,3 +182,14 @@ def test_an_added_field_follows_its_particles_to_other_ranks(comm):
     np.testing.assert_array_equal(particles.origin, particles.initial_position)
     assert len(particles) == 0 or particles.displacement[:, 0].min() > 3.0  # across all ranks
     assert report.particles == comm.allreduce(len(particles)) > 0
+
+
+def test_all_ranks_find_the_same_critical_cell():
+    comm = MPI.COMM_WORLD
+    model = block(comm, (0.0, 0.0))
+    found = mpm.critical_cell(model)
+    assert len(set(comm.allgather(found))) == 1
+    np.testing.assert_allclose(found.time_step, model.critical_time_step(), rtol=1e-12)
+    alone = block(MPI.COMM_SELF, (0.0, 0.0))
+    assert found.number in alone.particles.cell
+    np.testing.assert_allclose(alone.mesh.points[alone.mesh.cells[found.number]].mean(axis=0), found.centre)

@@ -31,6 +31,7 @@ from ._core import compiler as compiler
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
 from .contact import RigidContact
+from .critical_cell import CriticalCell, critical_cell
 from .element import ElementTest
 from .energy import EnergyWarning
 from .ghost import GhostPenalty
@@ -58,6 +59,7 @@ __all__ = [
     "CamClay",
     "ConeMatch",
     "Conversion",
+    "CriticalCell",
     "Disc",
     "DruckerPrager",
     "ElementTest",
@@ -99,6 +101,7 @@ __all__ = [
     "ViscoplasticMohrCoulomb",
     "__version__",
     "checkpoint_description",
+    "critical_cell",
     "distances",
     "log_preconsolidation",
     "matched_drucker_prager",

@@ -139,10 +139,11 @@ class Mesh:
         self.cell_numbers: int = 1 + comm.allreduce(int(self.global_cells.max(initial=-1)), MPI.MAX)
         """Highest number of a cell over all ranks, plus one."""
         self._places: WeakKeyDictionary[Mesh, tuple[NDArray[np.int64], NDArray[np.int64]]] = WeakKeyDictionary()
-        self._tags = {
+        self.tags: dict[str, set[int]] = {
             "cell": set().union(*comm.allgather(set(map(int, np.unique(self.cell_tags))))),
             "facet": set().union(*comm.allgather({int(t) for t in np.asarray(facet_tags).ravel()})),
         }
+        """Tags that the mesh has on any rank, of cells ("cell") and of facets ("facet")."""
         given = {"cell": cell_names or {}, "facet": facet_names or {}}
         self.names: dict[str, dict[str, tuple[int, ...]]] = {
             kind: {name: tuple(int(t) for t in np.atleast_1d(tags)) for name, tags in names.items()}
@@ -209,7 +210,7 @@ class Mesh:
         Raises:
             InputError: no cell or facet has one of them; the message lists the known names and tags.
         """
-        names, known, tags = self.names[kind], self._tags[kind], []
+        names, known, tags = self.names[kind], self.tags[kind], []
         for one in [given] if isinstance(given, (str, int, np.integer)) else given:
             present = [tag for tag in (names.get(one, ()) if isinstance(one, str) else (int(one),)) if tag in known]
             if not present:

@@ -175,7 +175,7 @@ class Model(Body):
         return self._core.steps
 
     def critical_time_step(self) -> float:
-        """Critical time step (16): smallest h_min / c_d over the particles [s]."""
+        """Critical time step (16): smallest h_min / c_d over the particles [s]; `critical_cell` finds the cell that sets it."""
         return self._core.critical_time_step()
 
     def out_of_balance(self, gravity: ArrayLike | None = None) -> float:

@@ -25,7 +25,7 @@ def mesh_text(mesh: Mesh) -> str:
     tags = "; ".join(
         f"{kind} tags "
         + (", ".join(f"{tag} ({names[kind][tag]})" if tag in names[kind] else str(tag) for tag in sorted(known)))
-        for kind, known in mesh._tags.items()
+        for kind, known in mesh.tags.items()
         if known
     )
     where = f" on rank {mesh.comm.rank} of {mesh.comm.size}" if mesh.comm.size > 1 else ""

@@ -54,6 +54,29 @@ def test_only_filled_cells_and_their_own_law_and_density_count(dim):
 
 
 @pytest.mark.parametrize("dim", DIMS)
+def test_the_cell_that_sets_the_step_is_found(dim):
+    # One stiff cell somewhere: whichever it is, its h / c is far below that of the others
+    stiff_soil = mpm.MohrCoulomb(young=100 * YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0)
+    model = soil_block(dim, [ELASTIC, stiff_soil])
+    soft = mpm.critical_cell(model)
+    assert altitudes(model.mesh)[soft.number] == pytest.approx(altitudes(model.mesh).min(), rel=1e-12)
+    number = len(model.mesh.cells) // 3
+    place = model.mesh.points[model.mesh.cells[number]].mean(axis=0)
+    model.seed_points(place[None] + 1e-6, [1e-3], density=DENSITY, material=1)
+    found = mpm.critical_cell(model)
+    assert (found.number, found.material) == (number, 1) and found.centre == pytest.approx(tuple(place))
+    assert found.wave_speed == pytest.approx(10 * SPEED, rel=1e-12)
+    assert found.altitude == pytest.approx(altitudes(model.mesh)[number], rel=1e-12)
+    assert found.time_step == pytest.approx(found.altitude / found.wave_speed, rel=1e-12)
+    assert found.time_step == pytest.approx(model.critical_time_step(), rel=1e-12)
+
+
+def test_no_cell_sets_the_step_of_nothing():
+    with pytest.raises(mpm.InputError, match="no particles"):
+        mpm.critical_cell(mpm.Model(box([1, 1]), ELASTIC))
+
+
+@pytest.mark.parametrize("dim", DIMS)
 def test_default_step_is_half_the_critical_one_and_meets_the_end(dim):
     model = soil_block(dim)
     critical = model.critical_time_step()
