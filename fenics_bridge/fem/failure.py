@@ -86,6 +86,7 @@ def _in_words(fem, load):
     weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
     parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
     parts += [f"pressure {p:.5g} Pa{_of(fem.facet_tags, tag)}" for tag, p in load.pressure.items() if p]
+    parts += [f"traction {tuple(map(float, t))} Pa{_of(fem.facet_tags, tag)}" for tag, t in load.traction.items()]
     parts += [f"{load.displacement:.3g} of the prescribed displacements"] if load.displacement else []
     parts += [f"{load.held:.3g} of the forces still held"] if load.held else []
     return ", ".join(parts) or "no load"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -33,6 +33,8 @@ class Load:
     """Fraction of the displacements that the supports prescribe [-], for `prescribed` supports"""
     held: float = 0.0
     """Fraction of the forces that were out of balance when the present stage began and are still held [-], see `Stage`"""
+    traction: dict[int | str, Sequence[float]] = field(default_factory=dict)
+    """Force per area [Pa], shape (D,), by facet tag or name, on the undeformed outer boundary, for instance shear"""
 
     def towards(self, other: Load, fraction: float) -> Load:
         """The load at a fraction of the way from this one to another.
@@ -55,18 +57,26 @@ class Load:
             between_tags(self.pressure, other.pressure),
             between(self.displacement, other.displacement),
             between(self.held, other.held),
+            {
+                tag: tuple(vector)
+                for tag, vector in between_tags(*map(_arrays, (self.traction, other.traction))).items()
+            },
         )
 
 
 def require_finite(comm: MPI.Comm, load: Load) -> None:
     """Raise InputError on all ranks if a load has a value that is not finite on any. Collective."""
     problem = None
-    for name in ("unit_weight", "pressure", "displacement", "held"):
+    for name in ("unit_weight", "pressure", "traction", "displacement", "held"):
         value = getattr(load, name)
-        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v)]
+        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v).all()]
         if wrong:
             problem = f"{name} is {wrong[0]}, expected finite numbers"
     agree(comm, problem)
+
+
+def _arrays(tractions):
+    return {tag: np.asarray(vector, dtype=float) for tag, vector in tractions.items()}
 
 
 def _weight_by_tag(unit_weight):
@@ -105,6 +115,7 @@ class LoadVectors:
         self._test = ufl.TestFunction(space) if test is None else test
         self._weight = {None: self._unit_weight(ufl.dx)}
         self._pressure: dict[int, NDArray[np.float64]] = {}
+        self._traction: dict[int, list[NDArray[np.float64]]] = {}
 
     def forces(self, load: Load) -> NDArray[np.float64]:
         """External forces of a load, ghosts up to date.
@@ -116,7 +127,8 @@ class LoadVectors:
             Array over local unrolled dofs [N] ([N/m] in plane strain, [N] per radian).
 
         Raises:
-            InputError: a tag does not exist, or a value is not finite. Raised on all ranks alike.
+            InputError: a tag does not exist, a value is not finite, or a traction has not D components. Raised on all ranks
+                alike.
 
         Note:
             Collective.
@@ -130,6 +142,9 @@ class LoadVectors:
             forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
+        for tag, traction in load.traction.items():
+            for component, unit in zip(self._vector(traction), self._unit_tractions(tag)):
+                forces = forces + component * unit
         return forces + self.constant + load.held * self.held
 
     def resolved(self, load: Load) -> Load:
@@ -147,7 +162,15 @@ class LoadVectors:
         comm, weight = self._space.mesh.comm, load.unit_weight
         if isinstance(weight, dict):
             weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
-        return replace(load, unit_weight=weight, pressure=by_number(comm, self._facet_tags, load.pressure, "pressure"))
+        pressure = by_number(comm, self._facet_tags, load.pressure, "pressure")
+        traction = by_number(comm, self._facet_tags, load.traction, "traction")
+        return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
+
+    def _vector(self, traction):
+        vector, domain = np.asarray(traction, dtype=float), self._space.mesh
+        dim = domain.geometry.dim
+        agree(domain.comm, None if vector.shape == (dim,) else f"traction has shape {vector.shape}, expected ({dim},)")
+        return vector
 
     def _unit_weight(self, dx):
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
@@ -177,6 +200,23 @@ class LoadVectors:
                 form -= weighted(inside, self._radius) * dS(tag)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
+
+    def _unit_tractions(self, tag):
+        """Nodal forces of 1 Pa along each axis."""
+        if tag not in self._traction:
+            domain = self._space.mesh
+            ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
+            there = 1.0 if self._active is None else self._active
+            self._traction[tag] = [
+                assembled(
+                    fem.form(
+                        weighted(there * ufl.inner(fem.Constant(domain, axis), self._test), self._radius) * ds(tag)
+                    ),
+                    self._space,
+                ).array.copy()
+                for axis in np.eye(domain.geometry.dim)
+            ]
+        return self._traction[tag]
 
 
 def elastic_load(
