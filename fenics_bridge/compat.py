@@ -158,15 +158,15 @@ def quadrature_space(domain: mesh.Mesh, degree: int, size: int) -> Any:
     return fem.FunctionSpace(domain, element)
 
 
-def quadrature_points(domain: mesh.Mesh, degree: int) -> NDArray[np.float64]:
-    """Points of the quadrature rule of the given degree in the reference cell: (q, D)."""
+def quadrature_rule(domain: mesh.Mesh, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (q, D) and weights (q,) of the quadrature rule of the given degree in the reference cell."""
     if basix_ufl is not None:
         import basix
 
-        return basix.make_quadrature(domain.basix_cell(), degree)[0]
+        return basix.make_quadrature(domain.basix_cell(), degree)
     from ffcx.element_interface import create_quadrature
 
-    return create_quadrature(domain.topology.cell_name(), degree, "default")[0]
+    return create_quadrature(domain.topology.cell_name(), degree, "default")
 
 
 def interpolation_points(space: Any) -> NDArray[np.float64]:

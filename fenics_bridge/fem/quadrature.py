@@ -34,7 +34,8 @@ class QuadraturePoints:
     ) -> None:
         self.size = N_STRESS[domain.geometry.dim]
         self._domain = domain
-        self.degree, self.reference = degree, compat.quadrature_points(domain, degree)
+        self.degree = degree
+        self.reference, self._weights = compat.quadrature_rule(domain, degree)
         self.per_cell = len(self.reference)
         """Number of points in a cell"""
         # With the points of a law in one piece it works on them in place.
@@ -185,19 +186,23 @@ class QuadraturePoints:
     def cell_function(self, values: NDArray, name: str, degree: int) -> fem.Function:
         """Function in the cells that follows from values at the points.
 
-        The mean of admissible stresses is admissible; the linear function is exact at the points.
+        The mean of admissible stresses is admissible; the linear function is exact at as many points as the cell has corners.
 
         Args:
             values: values at the points, shape (n,) or (n, k).
             name: name of the function.
-            degree: 0 for the mean by volume, constant in each cell; 1 for the function through the points, linear in each cell.
+            degree: 0 for the mean by volume, constant in each cell; 1 for the linear function in each cell that is nearest to the
+                values at its points (least squares, by the weights of the points).
         """
         values = values.reshape(len(self.cells), self.per_cell, -1)
         if degree == 0:
-            weights = None if self._radii is None else np.broadcast_to(self._radii[:, :, None], values.shape)
-            at_nodes = np.average(values, axis=1, weights=weights)[:, None]
+            weights = (
+                np.broadcast_to(self._weights, values.shape[:2]) if self._radii is None else self._weights * self._radii
+            )
+            at_nodes = np.einsum("cq,cqs->cs", weights / weights.sum(axis=1, keepdims=True), values)[:, None]
         else:
-            at_nodes = np.einsum("kq,cqs->cks", np.linalg.inv(self._linear_shapes()), values)
+            root = np.sqrt(self._weights)
+            at_nodes = np.einsum("kq,cqs->cks", np.linalg.pinv(root[:, None] * self._linear_shapes()) * root, values)
         space = compat.function_space(self._domain, "DG", degree, values.shape[2])
         function = fem.Function(space, name=name)
         function.x.array.reshape(-1, values.shape[2])[compat.cell_dofs(space)[self.cells]] = at_nodes

@@ -112,7 +112,9 @@ def test_errors_reach_every_rank():
         bridge.solve_elastic(domain, facet_tags, [bridge.fixed(99)], YOUNG, POISSON, UNIT_WEIGHT)
 
 
-@pytest.mark.parametrize(("dilation_angle", "options"), [(25.0, {}), (0.0, {}), (25.0, {"degree": 1, "nmd": True})])
+@pytest.mark.parametrize(
+    ("dilation_angle", "options"), [(25.0, {}), (0.0, {}), (25.0, {"degree": 1, "nmd": True}), (0.0, {"degree": 4})]
+)
 def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle, options):
     points = np.array([[1.1, 1.0], [0.53, 0.45], [1.62, 0.31]])
     results = []
@@ -222,7 +224,7 @@ def in_order(model, *names):
     return [getattr(model.particles, name)[order] for name in names]
 
 
-@pytest.mark.parametrize("options", [{"degree": 1, "nmd": True}, {"degree": 2}])
+@pytest.mark.parametrize("options", [{"degree": 1, "nmd": True}, {"degree": 2}, {"degree": 4}])
 def test_axisymmetric_elements_are_the_same_on_any_number_of_ranks(options):
     """A cylinder of clay under a rigid plate that yields in part, and an elastic ring around it."""
     found = []

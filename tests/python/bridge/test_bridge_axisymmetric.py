@@ -11,7 +11,12 @@ import mpm_core as mpm
 
 MESHES = Path(__file__).resolve().parents[3] / "meshes"
 AXISYMMETRIC = bridge.Geometry.AXISYMMETRIC
-KINDS = {"linear": {"degree": 1}, "averaged": {"degree": 1, "nmd": True}, "quadratic": {"degree": 2}}
+KINDS = {
+    "linear": {"degree": 1},
+    "averaged": {"degree": 1, "nmd": True},
+    "quadratic": {"degree": 2},
+    "quartic": {"degree": 4},
+}
 
 
 def ring(inner, outer, cells, height=0.25, rows=2, grading=1.0):
@@ -25,7 +30,7 @@ def ring(inner, outer, cells, height=0.25, rows=2, grading=1.0):
 ENDS = [bridge.roller(3, (0, 1)), bridge.roller(4, (0, 1))]
 
 
-@pytest.mark.parametrize(("kind", "order"), [("linear", 2), ("averaged", 2), ("quadratic", 3)])
+@pytest.mark.parametrize(("kind", "order"), [("linear", 2), ("averaged", 2), ("quadratic", 3), ("quartic", 5)])
 def test_thick_cylinder_of_lame(kind, order):
     # sigma_r = A - B / r^2, sigma_theta = A + B / r^2 with A = p a^2 / (b^2 - a^2), B = A b^2, and in plane strain
     # u = (1 + nu) / E ((1 - 2 nu) A r + B / r): 1.906667e-3 m inside, 1.213333e-3 m outside
@@ -63,7 +68,7 @@ def test_uniform_strain_is_exact(kind):
     assert fem.reaction(4)[1] == pytest.approx(-expected[1] * 0.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["averaged", "quadratic"])
+@pytest.mark.parametrize("kind", ["averaged", "quadratic", "quartic"])
 def test_plastic_thick_cylinder(kind):
     # Hill (1950), chapter V.2, Tresca: with the plastic radius c, p = s_u (1 - c^2 / b^2 + 2 ln(c / a)); in the plastic zone
     # sigma_r = -p + 2 s_u ln(r / a), outside of it sigma_r = -s_u (c^2 / r^2 - c^2 / b^2)
@@ -115,17 +120,17 @@ def footing(kind, rough):
 
 
 @pytest.mark.parametrize(("rough", "factor"), [(False, 5.69), (True, 6.05)])
-@pytest.mark.parametrize("kind", ["averaged", "quadratic"])
+@pytest.mark.parametrize("kind", ["averaged", "quadratic", "quartic"])
 def test_circular_footing_on_clay(kind, rough, factor):
     # Bearing capacity factors of Cox, Eason, Hopkins (1961) and Eason, Shield (1960). The elements' own is above: they are too
     # stiff, the less so the finer they are
-    assert factor < footing(kind, rough) < factor * {"averaged": 1.08, "quadratic": 1.05}[kind]
+    assert factor < footing(kind, rough) < factor * {"averaged": 1.08, "quadratic": 1.05, "quartic": 1.02}[kind]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_ground_at_rest_stays_at_rest(kind):
     # Stresses are linear, and times the radius quadratic, which the points integrate to second order: so the ground is out of
-    # balance by that, and moves by that much
+    # balance by that, and moves by that much; those of quartic elements integrate it exactly
     law = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0)
     supports = [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)]
     load, moved = bridge.Load(unit_weight=20e3), []
@@ -138,7 +143,7 @@ def test_ground_at_rest_stays_at_rest(kind):
         assert fem.equilibrate(load).converged
         moved.append(np.sqrt(np.mean(fem.displacement.x.array**2)))
         assert fem.reaction(3)[1] == pytest.approx(-20e3 * 1.0 * 2.0**2 / 2, rel=1e-9)  # the weight of one radian
-    assert moved[-1] < 2e-3 * settlement and moved[1] / moved[2] > 3
+    assert moved[-1] < 2e-3 * settlement and (moved[1] / moved[2] > 3 or moved[-1] < 1e-12 * settlement)
     assert not fem.points.state.any()
 
 

@@ -34,9 +34,9 @@ def top_of_column(model):
     return model.evaluate_at(top)["displacement"][0, -1]
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_elastic_column_is_exact_at_the_quadrature_points(dim):
-    model = elastic_column(dim)
+@pytest.mark.parametrize(("dim", "degree"), [(2, 2), (3, 2), (2, 4)])
+def test_elastic_column_is_exact_at_the_quadrature_points(dim, degree):
+    model = elastic_column(dim, degree)
     model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
     exact = column_stress(model.points.coordinates()[:, -1], dim)
     assert model.converged
@@ -45,6 +45,14 @@ def test_elastic_column_is_exact_at_the_quadrature_points(dim):
     points = interior_points(50, dim)
     values = model.evaluate_at(points, smooth=True)
     assert np.allclose(values["stress"], column_stress(points[:, -1], dim), atol=1e-8 * UNIT_WEIGHT)
+
+
+def test_the_mean_of_a_cell_is_that_by_its_area():
+    # The mean of x^2 over a triangle with its corners at x_k is (sum of x_k^2 + sum of x_k x_l, k < l) / 6
+    model = elastic_column(2, 4)
+    squares = model.points.cell_function(model.points.coordinates()[:, 1] ** 2, "square", 0)
+    y = model.domain.geometry.x[bridge.compat.cell_nodes(model.domain)][:, :, 1]
+    assert np.allclose(squares.x.array, (y.sum(axis=1) ** 2 + (y**2).sum(axis=1)) / 12, rtol=1e-12)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -272,7 +280,8 @@ def test_progress_names_every_step(capsys):
     [
         (lambda m: m.set_initial_stress(np.zeros((3, 4)), bridge.Load()), r"stress.*\(3, 4\)"),
         (lambda m: m.solve(bridge.Load(pressure={77: 1.0})), "pressure.*tag 77"),
-        (lambda m: slope_model(degree=3), "degree.*3"),
+        (lambda m: slope_model(degree=3), r"degree: got 3, expected one of \(1, 2, 4\)"),
+        (lambda m: elastic_column(3, 4), r"degree: got 4, expected one of \(1, 2\)"),
         (lambda m: m.evaluate_at(np.array([[5.0, 5.0]])), r"\(5, 5\)"),
     ],
 )
