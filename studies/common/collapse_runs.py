@@ -11,7 +11,7 @@ import numpy as np
 
 import fenics_bridge as bridge
 
-from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
 from .options import add_switch
 
@@ -159,7 +159,7 @@ class CollapseRuns:
         """
         pictures = {}
         for number, (angle, runs) in enumerate(self.runs.items()):
-            field = gathered(runs[-1].mechanism)
+            field = mechanism_field(runs[-1].mechanism)
             if field is not None:
                 name = "mechanism" if number == 0 else "mechanism_without_dilation"
                 bound = "" if runs[-1].failed else "Lower bound: "

@@ -69,21 +69,42 @@ class Field:
         return values[order][np.searchsorted(np.cumsum(area[order]), (1 - fraction) * area.sum())]
 
 
-def gathered(function: object, half_section: bool = False) -> Field | None:
-    """A continuous function of DOLFINx at the corners of all cells; None but on the first rank. Collective.
+def gathered(function: object, half_section: bool = False, parts: int = 1) -> Field | None:
+    """A continuous function of DOLFINx at the corners of triangles; None but on the first rank. Collective.
 
-    half_section: of an axisymmetric body, which the axes of pictures then say
+    half_section: of an axisymmetric body, which the axes of pictures then say; parts: into which each side of a cell is divided
     """
     comm = function.function_space.mesh.comm
     mesh = bridge.background_arrays(function.function_space.mesh)
-    values = bridge.evaluate_at(mesh["points"], value=function)["value"]
     own = mesh["cells"][mesh["cell_owners"] == comm.rank]
-    parts = comm.gather((mesh["points"][own].reshape(-1, 2), values[own].reshape(3 * len(own), -1)))
-    if parts is None:
+    shapes, triangles = _divided(parts)
+    nodes = np.einsum("qk,ckd->cqd", shapes, mesh["points"][own])
+    values = bridge.evaluate_at(nodes.reshape(-1, 2), value=function)["value"].reshape(*nodes.shape[:2], -1)
+    found = comm.gather((nodes[:, triangles].reshape(-1, 2), values[:, triangles].reshape(-1, values.shape[2])))
+    if found is None:
         return None
-    corners, at_corners = (np.concatenate(arrays) for arrays in zip(*parts))
-    points, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    return Field(points, number.reshape(-1, 3), at_corners[first], half_section)
+    corners, at_corners = (np.concatenate(arrays) for arrays in zip(*found))
+    alike = np.round(
+        corners / np.ptp(corners, axis=0).max(), 9
+    )  # both cells at a side have its points, but for rounding
+    _, first, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+    return Field(corners[first], number.reshape(-1, 3), at_corners[first], half_section)
+
+
+def mechanism_field(mechanism: object, half_section: bool = False) -> Field | None:
+    """A mechanism at all nodes of its elements, so that elements of higher degree show what moves within them. Collective."""
+    nodes = mechanism.function_space.dofmap.dof_layout.num_dofs
+    return gathered(mechanism, half_section, parts=round((np.sqrt(8 * nodes + 1) - 3) / 2))
+
+
+def _divided(parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """A triangle whose sides are divided: barycentric coordinates of the points (q, 3), and triangles of these (parts^2, 3)."""
+    places = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
+    number = {place: k for k, place in enumerate(places)}
+    upright = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in places if i + j < parts]
+    inverted = [[(i + 1, j + 1), (i, j + 1), (i + 1, j)] for i, j in places if i + j < parts - 1]
+    shapes = np.array([(parts - i - j, i, j) for i, j in places]) / parts
+    return shapes, np.array([[number[place] for place in triangle] for triangle in upright + inverted])
 
 
 # --- curves ----------------------------------------------------------------------------------------------------------

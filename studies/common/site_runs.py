@@ -14,7 +14,7 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 
 from .collapse_runs import UNDECIDED
-from .field_plots import bend, gathered, save_convergence, save_curves, save_mechanism
+from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
 from .results import open_results
 from .site_file import Site, cell_size_of, read_site
@@ -69,7 +69,7 @@ def site_study(
 
 def _drawn(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool) -> Pictures:
     """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
-    field = gathered(runs[-1].mechanism, half_section)
+    field = mechanism_field(runs[-1].mechanism, half_section)
     if field is None:
         return {}
     names = ["site" if size is None else f"{size:g} m" for size in sizes]

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .field_plots import Field, gathered, save_mechanism
+from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, save_figure
 from .plots import CURVES, paper_style
 from .seepage_plots import PRESSURE, save_flow
@@ -26,7 +26,7 @@ MOST_PANELS = 4
 def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[str, float]) -> Pictures:
     """All pictures of a slope in time; limits: factors of safety by name, drawn as lines. Collective."""
     worst = lowest(list(instants))
-    field: Field | None = gathered(worst.safety.mechanism)
+    field: Field | None = mechanism_field(worst.safety.mechanism)
     if field is None:
         return {}
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]

@@ -1,0 +1,39 @@
+"""Fields of finite elements on the triangles of pictures."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+from studies.common.field_plots import gathered, mechanism_field
+
+
+def of_degree(degree):
+    """A displacement (y^2, x y) on four by two cells of a unit square, in a space of a degree."""
+    domain, _, _ = bridge.box_mesh(MPI.COMM_SELF, [1.0, 1.0], [4, 2])
+    space = bridge.compat.function_space(domain, "Lagrange", degree, 2)
+    function = bridge.compat.fem.Function(space)
+    function.interpolate(lambda x: np.array([x[1] ** 2, x[0] * x[1]]))
+    return function
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_a_mechanism_is_shown_at_all_nodes_of_its_elements(degree):
+    field = mechanism_field(of_degree(degree))
+    assert field.points.shape == ((4 * degree + 1) * (2 * degree + 1), 2)
+    assert field.cells.shape == (16 * degree**2, 3)
+    x, y = field.points.T
+    assert np.allclose(field.values, np.column_stack([y**2, x * y]), atol=1e-12)
+    corners = field.points[field.cells]
+    areas = 0.5 * np.linalg.det(corners[:, 1:] - corners[:, :1])
+    assert np.allclose(np.abs(areas), 1 / (16 * degree**2))
+    assert len(field.outline) == 2 * (4 + 2) * degree  # sides within are shared, those of the square are not
+    # The shear of a triangle is that of its corners, so (eyy - exx)^2 + gxy^2 = x^2 + 9 y^2 at some point within it
+    error = np.abs(field.shear() - np.hypot(*(corners.mean(axis=1) * [1, 3]).T)).max()
+    assert error < 1.0 / degree
+
+
+def test_a_field_keeps_the_cells_of_the_mesh():
+    function = of_degree(2)
+    field = gathered(function)
+    assert len(field.cells) == function.function_space.mesh.topology.index_map(2).size_local
