@@ -7,9 +7,11 @@ of volume, so that velocities jump along their lines only.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import minimize
 
 Strength = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """c_u [Pa] at abscissas and heights [m]"""
@@ -76,6 +78,37 @@ def slip_circle(
     angles = np.linspace(*np.arcsin((np.array([first, last]) - centre[0]) / radius), SAMPLES)
     c = strength(centre[0] + radius * np.sin(angles), centre[1] - radius * np.cos(angles))
     return float(np.mean(c) * (angles[-1] - angles[0]) * radius**2 / moment) if moment > 0 else np.inf
+
+
+def best_circle(surface: np.ndarray, strength: Strength, unit_weight: float, deepest: float) -> float:
+    """Least factor of safety of slip circles, over their centre and their depth below the toe.
+
+    Args:
+        surface: (4, 2) [m], level ground, crest, toe and level ground from left to right.
+        strength: c_u [Pa]; unit_weight: [N/m3].
+        deepest: depth below the toe that no circle exceeds [m].
+    """
+    (crest, top), (toe, bottom) = surface[1:3]
+    height = top - bottom
+
+    def factor(values):
+        x, above, depth = values
+        if not 0 <= depth <= deepest:
+            return 1e3
+        centre = np.array([x, bottom + above])
+        return min(slip_circle(centre, above + depth, surface, strength, unit_weight), 1e3)
+
+    spans = (crest, toe + 0.5 * height, 11), (height, 5 * height, 9), (0.0, deepest, 6)
+    trials = itertools.product(*(np.linspace(*span) for span in spans))
+    first = np.array(min(trials, key=factor))
+    inwards = 1.0 if first[2] < 0.5 * deepest else -1.0
+    return least(factor, first, 0.1 * height * np.array([1.0, 1.0, inwards]))
+
+
+def least(factor: Callable[[np.ndarray], float], first: np.ndarray, sides: np.ndarray) -> float:
+    """Least value by Nelder and Mead's simplex, which begins with the given sides."""
+    corners = np.vstack([first, first + np.diag(sides)])
+    return minimize(factor, first, method="Nelder-Mead", options={"initial_simplex": corners, "fatol": 1e-5}).fun
 
 
 def _resistance(start: np.ndarray, end: np.ndarray, strength: Strength) -> float:

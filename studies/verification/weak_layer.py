@@ -13,18 +13,16 @@ Cells are of 2 m, and of 1 m in the layer, as in the paper; halved, they give 1.
 0.513 at the ratios 1, 0.8, 0.6, 0.5, 0.4 and 0.2.
 """
 
-import itertools
 from functools import partial
 
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
-from _slip_surfaces import sliding_blocks, slip_circle
-from common.field_plots import gathered, save_mechanism
+from _slip_surfaces import best_circle, least, sliding_blocks
+from common.field_plots import mechanism_field, save_mechanism
 from common.results import ROOT
 from matplotlib.path import Path as Outline
 from mpi4py import MPI
-from scipy.optimize import minimize
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -75,37 +73,19 @@ def blocks_bound(ratio):
     return least(factor, first, np.array([0.3, 0.3, 0.3, 0.3, 0.6 * HEIGHT, -0.4 * HEIGHT]))
 
 
-def circle_bound(ratio):
-    """Least factor of slip circles above the base, over centre and depth below the toe."""
-
-    def factor(values):
-        x, y, depth = values
-        if not 0 <= depth <= HEIGHT:
-            return 1e3
-        return min(slip_circle(np.array([x, y]), y + depth, SURFACE, partial(strength_at, ratio), UNIT_WEIGHT), 1e3)
-
-    trials = itertools.product(*(HEIGHT * np.linspace(*span) for span in ((2, 4.5, 11), (1, 5, 9), (0, 1, 6))))
-    return least(factor, np.array(min(trials, key=factor)), 0.1 * HEIGHT * np.array([1.0, 1.0, -1.0]))
-
-
-def least(factor, first, sides):
-    """Least value by Nelder and Mead's simplex, which begins with the given sides."""
-    corners = np.vstack([first, first + np.diag(sides)])
-    return minimize(factor, first, method="Nelder-Mead", options={"initial_simplex": corners, "fatol": 1e-5}).fun
-
-
 # --- 3. All together -------------------------------------------------------------------------------------------------
 
 
 def run(quick: bool, folder) -> Result:
     ratios = (1.0, 0.2) if quick else tuple(PUBLISHED)
-    bounds = {ratio: (blocks_bound(ratio), circle_bound(ratio)) for ratio in ratios}
+    circles = {ratio: best_circle(SURFACE, partial(strength_at, ratio), UNIT_WEIGHT, HEIGHT) for ratio in ratios}
+    bounds = {ratio: (blocks_bound(ratio), circles[ratio]) for ratio in ratios}
     checks = [Check("best circle, one soil", 1.47, "Taylor's chart", bounds[1.0][1], 5e-3)]
     found = {}
     for ratio in ratios:
         found[ratio] = safety(2.0, ratio)
         checks += compared(ratio, found[ratio], min(bounds[ratio]))
-    field = gathered(found[0.2].mechanism)
+    field = mechanism_field(found[0.2].mechanism)
     if field is not None:
         draw(folder, found, bounds)
         save_mechanism(
