@@ -1,8 +1,10 @@
 """Contact with rigid surfaces on several ranks: the motion and the reactions of one."""
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from mpm_core.body_output import BodyOutput
 from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, spread_box
 
 import mpm_core as mpm
@@ -72,6 +74,23 @@ def test_bodies_move_alike_on_any_partition(comm, owners_of, shared_path):
             value = getattr(reference, name)
             for found in (getattr(one, name), getattr(again, name)):
                 assert found == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max()), name
+
+
+def test_files_of_bodies_are_those_of_one_rank(comm, shared_path):
+    (model, *_), (alone, *_) = sliding_block(comm), sliding_block(MPI.COMM_SELF)
+    for each, path in ((model, shared_path / "many"), (alone, shared_path / f"one-{comm.rank}")):
+        with BodyOutput(each, path, float32=False) as output:
+            list(each.explicit(0.2, dt=1e-3))
+            output.write()
+    comm.Barrier()
+    with (
+        h5py.File(shared_path / "many" / "000000.h5") as many,
+        h5py.File(shared_path / f"one-{comm.rank}" / "000000.h5") as one,
+    ):
+        assert sorted(many) == sorted(one)
+        for name in many:
+            np.testing.assert_allclose(many[name][()], one[name][()], rtol=1e-8, atol=1e-10)
+    assert np.array_equal(model.contacts[0].outline()[0], alone.contacts[0].outline()[0])
 
 
 def test_an_overlap_on_one_rank_is_refused_on_all(comm):

@@ -14,6 +14,7 @@ from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
 from .mesh import floats
+from .outlines import Outline, outline
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
 from .surfaces import KINDS, Surface
 from .triangles import Triangles
@@ -31,6 +32,7 @@ class RigidContact:
     def __init__(self, model: Model, number: int) -> None:
         self.model = model
         self._number = number
+        self._outline: Outline | None = None  # at the start
 
     def _state(self) -> dict[str, Any]:
         return _core.contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
@@ -105,6 +107,46 @@ class RigidContact:
         """Matrix that rotates directions in the surface at its start to where they are now, shape (D, D)."""
         dim = self.model.mesh.dim
         return self._vector("rotation")[:dim, :dim]
+
+    def outline(self) -> Outline:
+        """The boundary of the surface where it is now: segments in two dimensions, triangles in three.
+
+        Planes and open polylines are shown as far as the mesh went where the surface was at its start.
+
+        Returns:
+            Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D).
+        """
+        if self._outline is None:
+            mesh, entry = self.model.mesh, self.model._contacts[self._number]
+            corners = np.array([mesh.points.min(axis=0, initial=np.inf), -mesh.points.max(axis=0, initial=-np.inf)])
+            self.model.comm.Allreduce(MPI.IN_PLACE, corners, MPI.MIN)
+            self._outline = outline(_surface_of(self.model, entry["surface"]), corners[0], -corners[1])
+        points, cells = self._outline
+        return self._centre + (points - self._start) @ self.rotation.T, cells
+
+    @property
+    def _start(self) -> NDArray[np.float64]:
+        """The centre at the start [m]."""
+        return np.array(self.model._contacts[self._number]["body"]["centre"])
+
+    @property
+    def _centre(self) -> NDArray[np.float64]:
+        """The centre now [m]."""
+        return self._start + self.displacement
+
+    def velocity_at(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Velocity of points of the body in the last step [m/s], shape (n, D).
+
+        Args:
+            points: where they are now [m], shape (n, D).
+
+        Raises:
+            InputError: points of another shape.
+        """
+        dim = self.model.mesh.dim
+        arms = np.zeros((len(np.atleast_1d(np.asarray(points))), 3))
+        arms[:, :dim] = floats("points", points, (None, dim)) - self._centre
+        return self.velocity + np.cross(self._vector("spin"), arms)[:, :dim]
 
     @property
     def kinetic_energy(self) -> float:

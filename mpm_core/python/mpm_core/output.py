@@ -14,19 +14,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ._core import Geometry, InputError, RunError
+from .body_output import BodyOutput
 from .collective import collectively
 from .model import Model
 from .output_checks import agreed, checked_mesh, narrowest, particle_fields, real_fields
-from .series import Series, padded
-
-T = TypeVar("T", bound="_Output")
+from .series import Output, Series, padded
 
 PARTICLE_FIELDS = (
     "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
@@ -37,26 +35,7 @@ NODAL_FIELDS = ("mass", "velocity", "internal_force")
 """Fields that are written of its nodes."""
 
 
-class _Output:
-    """What outputs of one series have in common: a context manager that closes it."""
-
-    def __init__(self, series: Series) -> None:
-        self._series = series
-
-    def close(self) -> None:
-        """Nothing can be written after that."""
-        self._series.close()
-
-    def __enter__(self: T) -> T:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-class ParticleOutput(_Output):
+class ParticleOutput(Output):
     """Frames of particles; a context manager.
 
     Example:
@@ -117,7 +96,7 @@ class ParticleOutput(_Output):
         self._vertices = (n, vertices)
 
 
-class MeshOutput(_Output):
+class MeshOutput(Output):
     """The background mesh, written once, and frames of fields on its nodes and cells; a context manager.
 
     Args:
@@ -209,6 +188,8 @@ class ModelOutput:
         particles: path of the files of particles, as for `ParticleOutput`; None if none are to be written.
         mesh: path of the files of the mesh, as for `MeshOutput`, with the tags of cells as the field ``tag``; None if none are
             to be written.
+        bodies: path of the files of the rigid surfaces that the particles touch, as for `BodyOutput`; None if none are to be
+            written.
         particle_fields: attributes of ``model.particles``, such as ``velocity``, and ``displacement``, ``plastic_strain``; the
             position is always written.
         nodal_fields: as ``Model.nodal`` gives them.
@@ -232,15 +213,16 @@ class ModelOutput:
         nodal_fields: Sequence[str] = NODAL_FIELDS,
         float32: bool = True,
         compression: int = 0,
+        bodies: str | os.PathLike[str] | None = None,
     ) -> None:
-        if particles is None and mesh is None:
-            raise InputError("particles and mesh are None, expected a path for one of them at least")
+        if particles is None and mesh is None and bodies is None:
+            raise InputError("particles, mesh and bodies are None, expected a path for one of them at least")
         self._model, self._start = model, model.mesh
         self._fields, self._nodal = list(particle_fields), list(nodal_fields)
         self._float32 = float32
         start = model.mesh
         agreed(start.comm, self._checked_names)
-        self._outputs: list[ParticleOutput | MeshOutput] = []
+        self._outputs: list[ParticleOutput | MeshOutput | BodyOutput] = []
         if particles is not None:
             particle_output = ParticleOutput(particles, start.comm, float32, compression)
             if model.geometry == Geometry.AXISYMMETRIC:
@@ -252,6 +234,8 @@ class ModelOutput:
             self._outputs.append(
                 MeshOutput(mesh, start.comm, start.points, start.cells[own], float32, compression, tags)
             )
+        if bodies is not None:
+            self._outputs.append(BodyOutput(model, bodies, float32, compression))
 
     def _checked_names(self) -> dict[str, np.ndarray]:
         """The names of all fields, if these exist."""
@@ -275,6 +259,8 @@ class ModelOutput:
                 if isinstance(output, ParticleOutput):
                     fields = self._model._core.copied_fields(self._fields, self._float32)
                     output.write(self._model.time, {**fields, **(more or {})})
+                elif isinstance(output, BodyOutput):
+                    output.write()
                 else:
                     output.write(self._model.time, self._nodal_fields())
             except RunError as failure:  # the other one may still be written

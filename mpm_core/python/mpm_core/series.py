@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -133,6 +134,28 @@ class Series:
     def close(self) -> None:
         """Nothing can be written after that."""
         self._closed = True
+
+
+T = TypeVar("T", bound="Output")
+
+
+class Output:
+    """What outputs of one series have in common: a context manager that closes it."""
+
+    def __init__(self, series: Series) -> None:
+        self._series = series
+
+    def close(self) -> None:
+        """Nothing can be written after that."""
+        self._series.close()
+
+    def __enter__(self: T) -> T:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class Frame:
