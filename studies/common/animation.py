@@ -8,7 +8,7 @@ import itertools
 import shutil
 import subprocess
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -21,7 +21,17 @@ from matplotlib.colors import Colormap, Normalize
 from PIL import Image
 
 from .files import expendable
-from .plots import Quantity, Scene, colour_limits, disc_diameter, draw_bar, draw_scene, figure_with_bar, paper_style
+from .plots import (
+    Quantity,
+    Scene,
+    bodies_drawn,
+    colour_limits,
+    disc_diameter,
+    draw_bar,
+    draw_scene,
+    figure_with_bar,
+    paper_style,
+)
 from .progress import counted
 
 
@@ -34,12 +44,14 @@ class Frame:
         position: (n, 2), m.
         volume: (n,), m^3 per metre of thickness.
         values: (n,) of the quantity shown, SI units.
+        bodies: segments of rigid surfaces (k, 2, 2), m.
     """
 
     time: float
     position: np.ndarray
     volume: np.ndarray
     values: np.ndarray
+    bodies: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
 
     def __post_init__(self) -> None:
         self.position = np.array(self.position, np.float32)
@@ -49,7 +61,10 @@ class Frame:
 
 def film_frames(frames: Sequence[Mapping[str, np.ndarray]]) -> list[Frame]:
     """Stored frames of particles as those of a film that shows the accumulated shear strain."""
-    return [Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"]) for f in frames]
+    return [
+        Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"], f.get("bodies", np.empty((0, 2, 2))))
+        for f in frames
+    ]
 
 
 FASTEST, SHORTEST = 25, 4.0
@@ -84,19 +99,22 @@ def save_animation(
     has_ffmpeg = shutil.which("ffmpeg") is not None
     path = path.with_suffix(".mp4" if has_ffmpeg else ".gif")
     with expendable(path) as aside:
-        pictures = _pictures(
-            scene, counted("film, frames", shown), quantity, limits, [frame.position for frame in frames]
-        )
+        corners = scene.limits([frame.position for frame in frames], [frame.bodies for frame in frames])
+        pictures = _pictures(scene, counted("film, frames", shown), quantity, limits, corners)
         (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures, rate)
     return path
 
 
 def _pictures(
-    scene: Scene, frames: Iterable[Frame], quantity: Quantity, limits: tuple[float, float], positions: list[np.ndarray]
+    scene: Scene,
+    frames: Iterable[Frame],
+    quantity: Quantity,
+    limits: tuple[float, float],
+    corners: tuple[np.ndarray, np.ndarray],
 ) -> Iterator[np.ndarray]:
     """Frames as pixels (height, width, 4), even numbers of them as films need. What does not move is drawn once."""
     with paper_style():
-        figure, axes, bar_axes = figure_with_bar(*scene.limits(positions), scene.half_section)
+        figure, axes, bar_axes = figure_with_bar(*corners, scene.half_section)
         figure.set_dpi(150)
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
         canvas = FigureCanvasAgg(figure)
@@ -107,12 +125,14 @@ def _pictures(
         draw_scene(axes, scene)
         lines = sorted((c for c in axes.collections if c not in still), key=lambda c: c.get_zorder())
         above = _Overlay.of(canvas, axes, lines)
-        title = axes.set_title("", loc="left", pad=4)
+        title, bodies = axes.set_title("", loc="left", pad=4), bodies_drawn(axes, np.empty((0, 2, 2)))
         for frame in frames:
             pixels[:] = background
             _draw_discs(pixels, axes, frame, colormaps[quantity.colours], Normalize(*limits), quantity.scale)
             above.draw(pixels)
             title.set_text(f"$t$ = {frame.time:.2f} s")
+            bodies.set_segments(frame.bodies)
+            axes.draw_artist(bodies)
             axes.draw_artist(title)
             yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
         plt.close(figure)

@@ -29,6 +29,8 @@ QUANTITIES = {
 }  # fmt: skip
 PORE = "excess_pore_pressure"
 """The state variable; frames of models that have it have it too"""
+ALIKE = ("time", "bodies")
+"""Entries of a frame that all ranks have alike"""
 LEVELS = 65534
 ABSENT = 65535
 MOST_BYTES = 60e6
@@ -46,7 +48,8 @@ class Movie:
         scene: mesh behind the particles.
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
             (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,)
-            when rows change their order or number from frame to frame. On ranks other than the first each is None.
+            when rows change their order or number from frame to frame; ``bodies`` (k, 2, 2) are segments of rigid surfaces [m],
+            as many in each frame. On ranks other than the first each is None.
         quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
     """
 
@@ -64,7 +67,7 @@ class Movie:
 
 
 def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
-    """The particles of a plane model on this rank as they are."""
+    """The particles of a plane model on this rank as they are, and all rigid surfaces. Collective where there are such."""
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
     pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
@@ -74,8 +77,14 @@ def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
     return {
         "time": np.float64(time), "position": p["position"], "volume": area, "id": p["id"],
         "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
-        "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore,
+        "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore, **_bodies(model),
     }  # fmt: skip
+
+
+def _bodies(model: mpm.Model) -> dict[str, np.ndarray]:
+    """The rigid surfaces that the particles touch, as segments, where there are any. Collective."""
+    outlines = [contact.outline() for contact in model.contacts]
+    return {"bodies": np.concatenate([points[cells] for points, cells in outlines])} if outlines else {}
 
 
 def particle_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray] | None:
@@ -123,7 +132,7 @@ def gathered(comm: MPI.Comm, frame: dict[str, np.ndarray]) -> dict[str, np.ndarr
     parts = comm.gather(frame)
     if parts is None:
         return None
-    return {name: frame[name] if name == "time" else np.concatenate([part[name] for part in parts]) for name in frame}
+    return {name: frame[name] if name in ALIKE else np.concatenate([part[name] for part in parts]) for name in frame}
 
 
 # --- packing ---------------------------------------------------------------------------------------------------------
@@ -159,6 +168,7 @@ def packed(movie: Movie) -> dict:
         "count": len(ids),
         "ids": ids.tolist() if (ids != np.arange(len(ids))).any() else None,
         "fields": fields,
+        "bodies": [np.round(frame["bodies"].reshape(-1), 5).tolist() if "bodies" in frame else [] for frame in frames],
         "scene": _scene(movie.scene),
         "axes": [label.replace("$", "") for label in axis_labels(movie.scene.half_section)],
     }

@@ -28,6 +28,8 @@ from .figures import save_figure
 
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
+BODY = "#1d3a5f"
+"""Of rigid surfaces"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 ROUND_TICKS = MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
 WIDTH = 6.9  # in; a page's text width
@@ -114,9 +116,19 @@ class Scene:
         self.boundary = self.points[boundary_edges(self.cells)]
         self.initial_outline = self.points[boundary_edges(soil)]
 
-    def limits(self, positions: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner of the soil at the start and the given positions, with a margin."""
-        corners = [self.initial_outline.reshape(-1, 2), *positions]
+    def limits(
+        self, positions: Iterable[np.ndarray], bodies: Iterable[np.ndarray] = ()
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the soil at the start and the given positions, with a margin.
+
+        Args:
+            positions: (n, 2), m.
+            bodies: segments of rigid surfaces (k, 2, 2), m; what lies beyond the mesh does not count.
+        """
+        ends = [segments.reshape(-1, 2) for segments in bodies]
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        inside = [points[((points >= low) & (points <= high)).all(axis=1)] for points in ends]
+        corners = [self.initial_outline.reshape(-1, 2), *positions, *inside]
         corners = [corner for corner in corners if len(corner)]
         lower = np.min([corner.min(axis=0) for corner in corners], axis=0)
         upper = np.max([corner.max(axis=0) for corner in corners], axis=0)
@@ -177,6 +189,13 @@ def draw_scene(axes: Axes, scene: Scene) -> None:
     axes.add_collection(LineCollection(scene.initial_outline, colors=GREY, linewidths=0.6, zorder=2))
 
 
+def bodies_drawn(axes: Axes, segments: np.ndarray) -> LineCollection:
+    """Draw rigid surfaces, as segments (k, 2, 2) [m]."""
+    lines = LineCollection(segments, colors=BODY, linewidths=1.6, capstyle="round", zorder=4)
+    axes.add_collection(lines)
+    return lines
+
+
 def disc_diameter(volume: np.ndarray) -> np.ndarray:
     """Diameter of discs that cover the plane without gaps where each stands for its volume, m.
 
@@ -216,6 +235,7 @@ def save_particles(
     *,
     limits: tuple[float, float] | None = None,
     title: str = "",
+    bodies: np.ndarray | None = None,
 ) -> None:
     """Draw particles coloured by a quantity.
 
@@ -226,11 +246,14 @@ def save_particles(
         values: (n,), SI units.
         limits: of the colour scale, from `colour_limits`; those of ``values`` if not given.
         title: stands above, for instance the time.
+        bodies: segments of rigid surfaces (k, 2, 2), m.
     """
     limits = limits or colour_limits(quantity, [values])
     with paper_style():
-        figure, axes, bar_axes = figure_with_bar(*scene.limits([position]), scene.half_section)
+        segments = np.empty((0, 2, 2)) if bodies is None else bodies
+        figure, axes, bar_axes = figure_with_bar(*scene.limits([position], [segments]), scene.half_section)
         draw_scene(axes, scene)
+        bodies_drawn(axes, segments)
         collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
         collection.set_array(quantity.scale * values)
         axes.set_title(title, loc="left", pad=4)

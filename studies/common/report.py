@@ -132,7 +132,11 @@ def _data(report: Report) -> dict:
     movies = report.movies
     quantities = {key: quantity for movie in movies for key, quantity in movie.quantities.items()}
     limits = {key: colour_limits(q, _values(movies, key)) for key, q in quantities.items()}
-    corners = [movie.scene.limits([frame["position"] for frame in movie.frames]) for movie in movies]
+    bodies = [[frame["bodies"] for frame in movie.frames if "bodies" in frame] for movie in movies]
+    corners = [
+        movie.scene.limits([frame["position"] for frame in movie.frames], segments)
+        for movie, segments in zip(movies, bodies, strict=True)
+    ]
     return {
         "movies": [packed(movie) for movie in movies],
         "slider": report.slider,

@@ -33,7 +33,7 @@ GROUPS = {
         "lube_columns",
         "quarter_model",
     ),
-    "Limit analysis": ("limit_slopes", "limit_footing", "published_slopes", "weak_layer"),
+    "Limit analysis": ("limit_slopes", "limit_footing", "published_slopes", "pushed_footing", "weak_layer"),
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),

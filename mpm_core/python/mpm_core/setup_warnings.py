@@ -33,11 +33,13 @@ def _nothing_acts(model: Model) -> str:
     p = model.particles
     acts = bool(np.any(model.gravity)) or bool(model._prescribed) or bool(model._water_conditions)
     acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
+    bodies = [entry["body"] for entry in model._contacts]
+    acts = acts or any(np.any(body[name][1]) for body in bodies for name in ("velocity", "spin", "force"))
     if model.comm.allreduce(int(acts)):
         return ""
     return (
-        "nothing acts on the particles: gravity is zero, and so are tractions, prescribed velocities, and the particles' own "
-        "velocities and stresses; gravity is given by model.set_gravity"
+        "nothing acts on the particles: gravity is zero, and so are tractions, velocities of supports and of rigid surfaces, and the "
+        "particles' own velocities and stresses; gravity is given by model.set_gravity"
     )
 
 

@@ -112,10 +112,17 @@ class View {
     if (showMesh && scene.mesh) this.segments(c, scene.mesh, "rgba(60,70,80,.45)", 0.6);
     this.segments(c, scene.outline, "#8c8c8c", 1);
     this.segments(c, scene.boundary, "#111", 1.4);
+    this.segments(c, this.bodies(), "#1d3a5f", 2.2);
     if (pinned >= 0) this.path(c, pinned);
     for (const i of [marked, pinned]) if (i >= 0) this.ring(c, i);
     c.restore();
     this.axes(c);
+  }
+
+  // Rigid surfaces at the time that is shown.
+  bodies() {
+    const { k, fraction } = this.now, all = this.movie.bodies;
+    return fraction > 0 ? all[k].map((a, i) => a + fraction * (all[k + 1][i] - a)) : all[k];
   }
 
   segments(c, xy, colour, width) {

@@ -31,6 +31,13 @@ def test_a_sound_model_says_nothing():
     assert said(model_of()) == []
 
 
+def test_a_surface_that_moves_acts_on_the_particles():
+    for velocity in ((0.0, 0.0), (0.0, -0.1)):
+        model = model_of(gravity=0.0)
+        model.add_contact(mpm.Plane((0, 1 + 1e-3 - model.gap(mpm.Plane((0, 1), (0, -1)))), (0, -1)), velocity=velocity)
+        assert any("nothing acts" in text for text in said(model)) == (velocity == (0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     "options, text",
     [

@@ -257,7 +257,7 @@ def test_a_picture_that_fails_costs_only_itself(tmp_path, capsys):
 def test_discs_of_a_film_have_their_place_size_and_colour():
     position, volume = np.array([[0.5, 0.25], [0.1, 0.75]]), np.full(2, 0.02)
     frame = animation.Frame(1.0, position, volume, np.array([0.0, 1.0]))
-    (pixels,) = animation._pictures(scene(), [frame], plots.SHEAR_STRAIN, (0.0, 1.0), [position])
+    (pixels,) = animation._pictures(scene(), [frame], plots.SHEAR_STRAIN, (0.0, 1.0), scene().limits([position]))
     colours = colormaps[plots.SHEAR_STRAIN.colours]([0.0, 1.0], bytes=True)[:, :3]
     height, width = pixels.shape[:2]
     with plots.paper_style():

@@ -29,6 +29,7 @@ SMALL = {
     "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",
     "excavation": "--cell-size 3 --elements P1",
     "footing": "--cell-size 0.25 --meshes 1 --elements P1",
+    "footing_push": "--cell-size 0.1 --particles-per-cell 1 --penetration 0.01 --speed 5e-3 --frames 2",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
     "rain": "--cell-size 3 --elements P1 --days 3 --factor-times 1",
@@ -43,7 +44,16 @@ SMALL = {
 }
 """Each study at a size that takes a second or less; a new study needs its line here."""
 ON_TWO_RANKS = ("balance",)
-WITH_PARTICLES = ("balance", "compare_fem", "embankment", "handover", "retrogression", "slope", "slope_schemes")
+WITH_PARTICLES = (
+    "balance",
+    "compare_fem",
+    "embankment",
+    "footing_push",
+    "handover",
+    "retrogression",
+    "slope",
+    "slope_schemes",
+)
 NAMES = sorted(
     [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
 )

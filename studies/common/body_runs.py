@@ -1,0 +1,141 @@
+"""Runs in which a rigid body moves against soil: history, files for ParaView, frames of pictures, checkpoints, restart."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.output import PARTICLE_FIELDS, ModelOutput
+from mpm_core.probes import ProbeFile
+
+import mpm_core as mpm
+
+from .checkpoint import Checkpoints, add_checkpoint_options, numbered
+from .history import History
+from .interrupt import Interrupt
+from .movie import gathered, own_frame
+from .notes import notes_of
+from .options import Options, add_count, add_number, add_switch
+from .output_options import add_output_options, add_picture_options, check_frames
+from .progress import Progress
+from .schemes import add_pic
+
+MAY_CHANGE = {
+    "damping", "pic", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film", "rebalance"
+}  # fmt: skip
+"""Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
+
+
+def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
+    """Options of the explicit run, of its files and of its checkpoints."""
+    add_number(p, "--damping", damping, "-", "local damping", at_least=0, below=1)
+    add_pic(p, pic)
+    add_switch(p, "--nmd", nmd, "average volumetric strains over nodes, against locking")
+    add_count(p, "--frames", frames, "times at which particles are stored and drawn")
+    add_output_options(p, PARTICLE_FIELDS)
+    add_picture_options(p)
+    add_number(p, "--rebalance", 1.2, "-", "repartition the mesh above this load imbalance: maximum over mean particles per rank",
+               above=1)  # fmt: skip
+    add_checkpoint_options(p)
+
+
+@dataclass
+class BodyRun:
+    """What came of a run; all of it on all ranks but the frames, which the first rank has."""
+
+    history: History
+    frames: list[dict] = field(default_factory=list)
+    stopped: str | None = None
+    exit_code: int = 0
+
+
+def follow(
+    a: Options,
+    model: mpm.Model,
+    until: float,
+    columns: Sequence[str],
+    row: Callable[[History, mpm.Report], Mapping[str, float]],
+    folder: Path,
+    *,
+    shown: str,
+) -> BodyRun:
+    """Follow particles and bodies by the explicit scheme until a time [s]. Collective.
+
+    The files of a body are ``body_0.csv`` and so on, in the order of ``Model.contacts``.
+
+    Args:
+        a: options, of `add_body_run_options` among them.
+        columns: of ``history.csv``; the first is ``time_s``.
+        row: the values of a row, from the rows before it and the report; all ranks call it.
+        shown: the column that the line of progress shows.
+    """
+    check_frames(model, a, folder)
+    again, comm = a.restart is not None, model.comm
+    particles, mesh, bodies = (comm.bcast(numbered(folder, name, again)) for name in ("particles", "mesh", "bodies"))
+    probes = [ProbeFile(folder / f"body_{k}.csv", contact, keep=again) for k, contact in enumerate(model.contacts)]
+    kept: list[dict[str, np.ndarray]] = []
+    with (
+        Interrupt(comm) as interrupt,
+        History(folder / "history.csv", columns, comm, keep_before=model.time if again else None) as history,
+        ModelOutput(model, particles, mesh, a.fields.split(","), float32=not a.float64, compression=a.compression,
+                    bodies=bodies) as files,
+        Progress(a.study, until, comm) as progress,
+    ):  # fmt: skip
+        result = BodyRun(history)
+        checkpoints = Checkpoints(
+            model, folder / "checkpoint.h5", a.checkpoint_every, notes_of(a.study, a.parameters(), a.restarts, {})
+        )
+
+        def look(report: mpm.Report) -> None:
+            history.add(**row(history, report))
+            files.write()
+            for probe in probes:
+                probe.record()
+            kept.append(own_frame(model, report.time))
+            progress.show(report.time, report.steps, **{shown: f"{history[shown][-1]:.4g}"})
+
+        def between_steps() -> bool:
+            checkpoints.save_when_due()
+            return interrupt.requested()
+
+        try:
+            look(model.report())
+            run = model.explicit(
+                until, every=until / a.frames, since=0.0, watch=between_steps, rebalance=a.rebalance, **scheme(a)
+            )
+            for report in run:
+                look(report)
+                if interrupt.requested():
+                    checkpoints.save()
+                    result.stopped = (
+                        f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
+                    )
+                    break
+        except mpm.RunError as error:
+            result.stopped = str(error)
+        for probe in probes:
+            probe.close()
+        frames = [gathered(comm, frame) for frame in kept]
+        result.frames = [frame for frame in frames if frame is not None]
+        result.exit_code = interrupt.exit_code or (1 if result.stopped else 0)
+    return result
+
+
+def scheme(a: Namespace) -> dict[str, Any]:
+    """How the explicit scheme steps, from the options; arguments of ``Model.explicit``."""
+    return {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": mpm.Integration.MIXED}
+
+
+def mean_force(history: History, body: mpm.RigidContact, time: float, axis: int) -> float:
+    """Mean force along an axis since the row before [N]; the force itself in the first one.
+
+    The history has the columns ``time_s`` and ``impulse_Ns``. Single steps would show the noise of cell crossings.
+    """
+    if len(history) == 0 or time <= history["time_s"][-1]:
+        return float(body.force[axis])
+    return float((body.impulse[axis] - history["impulse_Ns"][-1]) / (time - history["time_s"][-1]))

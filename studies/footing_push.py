@@ -1,0 +1,247 @@
+"""A rigid footing is pushed into clay: load over settlement, from the first yield to large penetration.
+
+A strip or circular footing, smooth or rough, is a rigid body that touches the particles; it does not depend on the mesh, and
+goes on when the soil beside it has risen above its base. The clay does not drain and has no weight (Tresca), so that the load
+over area and shear strength just after the soil has yielded is the bearing capacity factor N_c: 5.14 for a strip, 5.69 for a
+smooth and 6.05 for a rough circle. It comes from above: cells at the edge make the footing wider by half of their size. With
+the penetration the load goes on rising, as that of a footing that is embedded.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common.animation import film_frames, save_animation
+from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, follow, mean_force
+from common.checkpoint import check_restart
+from common.figures import Pictures, save_figure
+from common.files import OutputError
+from common.history import History
+from common.movie import Movie
+from common.options import add_choice, add_count, add_number, check, study_parser
+from common.page import Page
+from common.plots import CURVES, DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, paper_style, save_particles
+from common.ranks import run_study
+from common.results import ROOT, open_results
+from common.scenes import scene_of
+from common.summary import write_summary
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+COLUMNS = ["time_s", "settlement_m", "load_factor", "impulse_Ns", "contact_area_m2", "sticking_fraction",
+           "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
+EXACT = {
+    ("strip", "smooth"): 2 + np.pi,
+    ("strip", "rough"): 2 + np.pi,
+    ("circular", "smooth"): 5.69,
+    ("circular", "rough"): 6.05,
+}
+"""Bearing capacity factors: Prandtl 1920; Cox, Eason and Hopkins 1961; Eason and Shield 1960"""
+COLLAPSE = (12.0, 24.0)
+"""Settlements between which the factor is taken, over the width times the strength over Young's modulus: the soil has just
+yielded, and the footing is hardly embedded"""
+CAPTIONS = {
+    "load": "Load over area and shear strength, over the settlement", "strain": "Accumulated plastic shear strain in the end",
+    "displacement": "Displacement in the end", "film": "Accumulated plastic shear strain",
+}  # fmt: skip
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_choice(
+        p, "--shape", "strip", ("strip", "circular"), "half of a strip, or the half section of a circular footing"
+    )
+    add_choice(
+        p, "--base", "rough", ("smooth", "rough"), "no shear stress on the footing, or up to the strength of the clay"
+    )
+    add_number(p, "--half-width", 0.5, "m", "half of the footing's width, or its radius", above=0)
+    add_number(p, "--penetration", 0.3, "m", "settlement in the end", above=0)
+    add_number(p, "--strength", 20e3, "Pa", "undrained shear strength of the clay", above=0)
+    add_number(p, "--rigidity", 200.0, "-", "Young's modulus over the shear strength", above=0)
+    add_number(p, "--poisson", 0.45, "-", "Poisson's ratio", above=-1, below=0.5)
+    add_number(p, "--density", 1800.0, "kg/m3", "density of the clay", above=0)
+    add_number(p, "--speed", 1e-3, "-", "speed of the footing over that of elastic waves", above=0, at_most=0.1)
+    add_number(p, "--cell-size", 0.02, "m", "cells along the way of the footing's edge", above=0)
+    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that; those far away have four times as much",
+               at_least=1)  # fmt: skip
+    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    check(p, a.penetration <= 4 * a.half_width, lambda: f"--penetration is {a.penetration:g} m, expected up to twice the width, "
+          f"{4 * a.half_width:g} m")  # fmt: skip
+    check(p, 2 * a.cell_size <= a.half_width, lambda: f"--cell-size is {a.cell_size:g} m, expected half of --half-width, "
+          f"{a.half_width:g} m, at most")  # fmt: skip
+    check_restart(p, a, MAY_CHANGE)
+    return a
+
+
+# --- 2. Ground and footing -------------------------------------------------------------------------------------------
+
+
+def clay(a: Namespace) -> mpm.MohrCoulomb:
+    return mpm.tresca(young=a.rigidity * a.strength, poisson=a.poisson, shear_strength=a.strength)
+
+
+def speed_of(a: Namespace) -> float:
+    """Of the footing [m/s]."""
+    return float(a.speed * np.sqrt(clay(a).p_wave_modulus / a.density))
+
+
+def duration(a: Namespace) -> float:
+    """The footing gains its speed over a hundredth of the way [s]."""
+    return 1.01 * a.penetration / speed_of(a)
+
+
+def footing(a: Namespace, base: float) -> mpm.Box:
+    """The footing with its base at a height [m]."""
+    return mpm.Box((-a.half_width, base), (a.half_width, base + a.half_width + a.penetration))
+
+
+def build(a: Namespace) -> mpm.Model:
+    """Clay on a fixed base under the footing. Collective."""
+    near = a.coarsening * a.cell_size
+    lengths = {
+        "half_width": a.half_width, "width": 5 * a.half_width + a.penetration, "depth": 3 * a.half_width + a.penetration,
+        "headroom": 0.25 * a.half_width + 0.5 * a.penetration, "penetration": a.penetration, "edge_size": a.cell_size,
+        "near_size": near, "far_size": 4 * near,
+    }  # fmt: skip
+    mesh = bridge.read_mesh(ROOT / "meshes" / "footing_push.geo", comm, parameters=lengths)
+    geometry = mpm.Geometry.AXISYMMETRIC if a.shape == "circular" else mpm.Geometry.PLANE_STRAIN
+    model = mpm.Model(bridge.background_mesh(*mesh), clay(a), geometry=geometry)
+    if a.restart is not None:
+        model.restore(a.restart)
+        return model
+    model.seed(density=a.density, per_cell=a.particles_per_cell, cell_tag="soil")
+    for side in ("axis", "far"):
+        model.roller(side, normal=(1, 0))
+    model.fix("base")
+    base = 1e-9 * a.half_width - model.gap(footing(a, 0.0))  # particles are larger than their distance from the surface
+    speed = speed_of(a)
+    rising = ([0.0, 0.02 * a.penetration / speed], [(0.0, 0.0), (0.0, -speed)])
+    model.add_contact(footing(a, base), adhesion=a.strength if a.base == "rough" else 0.0, velocity=rising)
+    model.rebalance()
+    return model
+
+
+def full_load(a: Namespace) -> float:
+    """Shear strength times the part of the footing that the half section has: that of half a strip, of one radian [N]."""
+    return a.strength * (0.5 * a.half_width**2 if a.shape == "circular" else a.half_width)
+
+
+def row(a: Namespace, body: mpm.RigidContact, history: History, report: mpm.Report) -> dict[str, float]:
+    """A row of the history; Collective."""
+    return {
+        "time_s": report.time, "settlement_m": -body.displacement[1],
+        "load_factor": mean_force(history, body, report.time, 1) / full_load(a), "impulse_Ns": body.impulse[1],
+        "contact_area_m2": body.area, "sticking_fraction": body.sticking_fraction,
+        "unexplained_fraction_of_energy": report.unexplained_fraction, "dt_s": report.dt,
+    }  # fmt: skip
+
+
+def collapse_factor(a: Namespace, history: History) -> float | None:
+    """Mean load factor just after the soil has yielded; None where the footing did not get there."""
+    settled = history["settlement_m"] * a.rigidity / (2 * a.half_width)
+    chosen = (settled >= COLLAPSE[0]) & (settled <= COLLAPSE[1])
+    return float(history["load_factor"][chosen].mean()) if chosen.any() else None
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw_load(path: Path, a: Namespace, history: History) -> None:
+    """The load factor over the settlement, with the exact one."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.6, 3.2), layout="constrained")
+        settled = history["settlement_m"] / (2 * a.half_width)
+        axes.plot(settled, history["load_factor"], color=CURVES[0], label=f"{a.base} {a.shape} footing")
+        axes.axhline(
+            EXACT[a.shape, a.base], color="black", linewidth=0.9, linestyle="--", label="exact, at the surface"
+        )
+        width = "width" if a.shape == "strip" else "diameter"
+        axes.set(
+            xlabel=f"Settlement over the {width} [-]",
+            ylabel="Load over area and $s_u$ [-]",
+            xlim=(0, None),
+            ylim=(0, None),
+        )
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(loc="lower right")
+        save_figure(figure, path, dpi=200)
+
+
+def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
+    """The load, the soil and the footing in the end, and a film."""
+    if scene is None or not a.pictures:
+        return {}
+    last = result.frames[-1]
+    title = f"settlement {result.history['settlement_m'][-1]:.3g} m"
+
+    def particles(name: str, key: str, quantity: Quantity) -> None:
+        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity, title=title,
+                       bodies=last["bodies"])  # fmt: skip
+
+    pictures = {
+        "load": lambda: draw_load(folder / "load.png", a, result.history),
+        "strain": partial(particles, "strain", "shear_strain", SHEAR_STRAIN),
+        "displacement": partial(particles, "displacement", "displacement", DISPLACEMENT),
+    }
+    if a.film:
+        pictures["film"] = partial(save_animation, folder / "film", scene, film_frames(result.frames), SHEAR_STRAIN)
+    return pictures
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    begin = perf_counter()
+    folder = open_results(a, comm)
+    model = build(a)
+    (body,) = model.contacts
+    steps = model.report().particle_steps
+    start = perf_counter()
+    result = follow(a, model, duration(a), COLUMNS, partial(row, a, body), folder, shown="load_factor")
+    seconds, report, scene = perf_counter() - start, model.report(), scene_of(model, [1])
+    factor, history = collapse_factor(a, result.history), result.history
+    summary = {
+        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
+        "bearing_capacity_factor": factor, "exact_factor": EXACT[a.shape, a.base],
+        "largest_load_factor": float(history["load_factor"].max()), "settlement_m": history["settlement_m"][-1],
+        "load_factor_in_the_end": history["load_factor"][-1], "time_s": report.time, "steps": report.steps,
+        "unexplained_fraction_of_energy": report.unexplained_fraction,
+        "particle_steps_per_second": (report.particle_steps - steps) / seconds, "wall_seconds": perf_counter() - begin,
+    }  # fmt: skip
+    name = f"{a.base} {a.shape} footing"
+    movies = [Movie(name, scene, result.frames)] if scene is not None else []
+    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS), drawn(a, scene, result, folder))
+    if comm.rank == 0:
+        if result.stopped:
+            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
+        shown = "not reached" if factor is None else f"{factor:.2f}"
+        print(f"{name}: N_c {shown}, exact {EXACT[a.shape, a.base]:.2f}; load factor {history['load_factor'][-1]:.2f} at a settlement "
+              f"of {history['settlement_m'][-1]:.3g} m\nresults in {folder}")  # fmt: skip
+    return result.exit_code
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

@@ -1,0 +1,70 @@
+"""Rigid footings pushed into clay as bodies that touch particles: the bearing capacity factor N_c, smooth and rough.
+
+The study footing_push with stiff clay, so that the soil has yielded all around before the footing is embedded: load
+over area and shear strength at settlements of 0.6 to 1.2 % of the width, for a strip and for a circular footing. Cells
+at the edge make the footing wider by about half of their size, 1.25 % of its half width (2.5 % of the area of a circle),
+and what is left comes from the cells below it and from the settlement: a strip gains about 1 % when it is embedded by
+1 % of its width. So the factors come from above.
+"""
+
+import numpy as np
+from _case import Check, Kind, Result, run_alone
+from _plots import save_comparison
+from common.body_runs import scheme
+from mpi4py import MPI
+
+import footing_push
+
+RIGIDITY, WIDTH = 2000.0, 1.0
+SOURCES = {"strip": "Prandtl 1920", "circular": "slip lines, tests/python/studies/test_circular_footing.py"}
+TOLERANCES = {"strip": 0.03, "circular": 0.06}
+
+
+def pushed(shape, base, quick):
+    """N_c, and the curve of settlement over width and load factor, (k, 2)."""
+    cells = ["--cell-size", "0.05", "--coarsening", "2"] if quick else ["--cell-size", "0.0125", "--coarsening", "4"]
+    most = footing_push.COLLAPSE[1] * WIDTH / RIGIDITY
+    a = footing_push.parse(["--shape", shape, "--base", base, *cells, "--rigidity", str(RIGIDITY), "--speed", "5e-4",
+                            "--penetration", str(most)])  # fmt: skip
+    model = footing_push.build(a)
+    (body,), rows = model.contacts, []
+
+    def look(report):
+        rows.append((report.time, -body.displacement[1], body.impulse[1]))
+
+    look(model.report())
+    until = footing_push.duration(a)
+    for report in model.explicit(until, every=until / 24, **scheme(a)):
+        look(report)
+    time, settled, impulse = np.array(rows).T
+    factor = np.diff(impulse) / np.diff(time) / footing_push.full_load(a)
+    chosen = settled[1:] >= footing_push.COLLAPSE[0] * WIDTH / RIGIDITY * (1 + 1e-6)
+    return factor[chosen].mean(), np.column_stack([settled[1:] / WIDTH, factor])
+
+
+def run(quick: bool, folder) -> Result:
+    # --- 1. All footings ---------------------------------------------------------------------------------------------
+    kinds = [("strip", "smooth")] if quick else list(footing_push.EXACT)
+    checks, curves = [], {}
+    for shape, base in kinds:
+        exact, source = footing_push.EXACT[shape, base], SOURCES[shape]
+        found, curves[f"{base} {shape}"] = pushed(shape, base, quick)
+        tolerance = 0.15 if quick else TOLERANCES[shape]
+        checks.append(Check(f"N_c, {base} {shape} footing", exact, source, found, tolerance))
+        checks.append(
+            Check(f"N_c, {base} {shape} footing: it comes from above", exact, source, found, 0.0, kind=Kind.AT_LEAST)
+        )
+
+    # --- 2. Picture --------------------------------------------------------------------------------------------------
+    if MPI.COMM_WORLD.rank == 0:
+        ends = np.array([0.0, footing_push.COLLAPSE[1] / RIGIDITY])
+        values = {f"{footing_push.EXACT[kind]:.2f}": np.full(2, footing_push.EXACT[kind]) for kind in kinds}
+        save_comparison(folder / "load.png", {name: tuple(curve.T) for name, curve in curves.items()},
+                        {f"exact, {name}": (ends, line) for name, line in values.items()},
+                        ("Settlement over the width [-]", "Load over area and $s_u$ [-]"), joined=True,
+                        limits=((0.0, None), (0.0, None)))  # fmt: skip
+    return Result(checks, {"load.png": "Load over the settlement of footings that are pushed into clay"})
+
+
+if __name__ == "__main__":
+    run_alone(run)

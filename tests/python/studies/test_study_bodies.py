@@ -1,0 +1,77 @@
+"""Studies in which a rigid body moves against soil: a restart, two ranks, the body in pictures, page and files."""
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+# Python's own copy, without what MPI adds to it in this process.
+ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+SMALL = {
+    "footing_push": "--cell-size 0.1 --particles-per-cell 3 --penetration 0.02 --speed 5e-3 --frames 4 --no-film",
+}
+
+
+def run(study, folder, *options, ranks=1):
+    command = [sys.executable, str(STUDIES / f"{study}.py"), "--output", str(folder), *SMALL[study].split(), *options]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", *command]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=ENVIRONMENT)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def last_row(folder, name="history.csv"):
+    with open(folder / name, newline="") as file:
+        return {key: float(value) for key, value in list(csv.DictReader(file))[-1].items()}
+
+
+@pytest.fixture(scope="module", params=sorted(SMALL))
+def study(request, tmp_path_factory):
+    """Its name, and the folder of a small run."""
+    return request.param, run(request.param, tmp_path_factory.mktemp(request.param), "--checkpoint-every", "40")
+
+
+def test_a_restart_ends_as_the_run_that_never_stopped(study, tmp_path):
+    name, whole = study
+    again = run(name, tmp_path, "--restart", str(whole / "checkpoint.h5"))
+    for file in ("history.csv", "body_0.csv"):
+        one, other = last_row(whole, file), last_row(again, file)
+        # A mean force over the last frame begins at another row before.
+        assert {k: v for k, v in one.items() if "load" not in k} == {k: v for k, v in other.items() if "load" not in k}
+
+
+def test_two_ranks_give_the_same(study, tmp_path):
+    name, alone = study
+    two = run(name, tmp_path, "--no-pictures", ranks=2)
+    one, other = last_row(alone, "body_0.csv"), last_row(two, "body_0.csv")
+    largest = {
+        unit: max(abs(v) for k, v in one.items() if k.endswith(unit)) for unit in {k.split("_")[-1] for k in one}
+    }
+    for key, value in one.items():
+        assert other[key] == pytest.approx(value, rel=1e-6, abs=1e-6 * largest[key.split("_")[-1]]), key
+
+
+def test_the_body_moves_in_files_and_on_the_page(study):
+    _, folder = study
+    frames = sorted((folder / "bodies").iterdir())
+    with h5py.File(frames[0]) as first, h5py.File(frames[-1]) as last:
+        moved = last["points"][()] - first["points"][()]
+    row = last_row(folder, "body_0.csv")
+    assert moved[:, :2] == pytest.approx(
+        np.tile([row["displacement_x_m"], row["displacement_y_m"]], (len(moved), 1)), abs=1e-6
+    )
+    data = json.loads(re.search(r'id="data">(.*?)</script>', (folder / "report.html").read_text(), re.DOTALL).group(1))
+    (movie,) = data["movies"]
+    shown = np.array(movie["bodies"])
+    assert len(shown) == len(movie["times"]) == len(frames)
+    ends = shown.reshape(len(shown), -1, 2)[[0, -1]]
+    assert ends[1] - ends[0] == pytest.approx(np.broadcast_to(moved[0, :2], ends[0].shape), abs=2e-5)
