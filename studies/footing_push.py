@@ -17,8 +17,7 @@ from time import perf_counter
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.animation import film_frames, save_animation
-from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, follow, mean_force
+from common.body_runs import CAPTIONS, MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force
 from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
 from common.files import OutputError
@@ -26,7 +25,7 @@ from common.history import History
 from common.movie import Movie
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.page import Page
-from common.plots import CURVES, DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, paper_style, save_particles
+from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
@@ -49,10 +48,6 @@ EXACT = {
 COLLAPSE = (12.0, 24.0)
 """Settlements between which the factor is taken, over the width times the strength over Young's modulus: the soil has just
 yielded, and the footing is hardly embedded"""
-CAPTIONS = {
-    "load": "Load over area and shear strength, over the settlement", "strain": "Accumulated plastic shear strain in the end",
-    "displacement": "Displacement in the end", "film": "Accumulated plastic shear strain",
-}  # fmt: skip
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -190,23 +185,8 @@ def draw_load(path: Path, a: Namespace, history: History) -> None:
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The load, the soil and the footing in the end, and a film."""
-    if scene is None or not a.pictures:
-        return {}
-    last = result.frames[-1]
-    title = f"settlement {result.history['settlement_m'][-1]:.3g} m"
-
-    def particles(name: str, key: str, quantity: Quantity) -> None:
-        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity, title=title,
-                       bodies=last["bodies"])  # fmt: skip
-
-    pictures = {
-        "load": lambda: draw_load(folder / "load.png", a, result.history),
-        "strain": partial(particles, "strain", "shear_strain", SHEAR_STRAIN),
-        "displacement": partial(particles, "displacement", "displacement", DISPLACEMENT),
-    }
-    if a.film:
-        pictures["film"] = partial(save_animation, folder / "film", scene, film_frames(result.frames), SHEAR_STRAIN)
-    return pictures
+    pictures = body_pictures(a, scene, result, folder, f"settlement {result.history['settlement_m'][-1]:.3g} m")
+    return {"load": lambda: draw_load(folder / "load.png", a, result.history), **pictures} if pictures else {}
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -233,7 +213,14 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     name = f"{a.base} {a.shape} footing"
     movies = [Movie(name, scene, result.frames)] if scene is not None else []
-    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS), drawn(a, scene, result, folder))
+    write_summary(
+        folder,
+        a,
+        summary,
+        comm,
+        Page(movies=movies, captions={"load": "Load over area and shear strength, over the settlement", **CAPTIONS}),
+        drawn(a, scene, result, folder),
+    )
     if comm.rank == 0:
         if result.stopped:
             print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,16 @@ from mpm_core.probes import ProbeFile
 
 import mpm_core as mpm
 
+from .animation import film_frames, save_animation
 from .checkpoint import Checkpoints, add_checkpoint_options, numbered
+from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .movie import gathered, own_frame
 from .notes import notes_of
 from .options import Options, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
+from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from .progress import Progress
 from .schemes import add_pic
 
@@ -29,6 +33,8 @@ MAY_CHANGE = {
     "damping", "pic", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film", "rebalance"
 }  # fmt: skip
 """Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
+CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displacement": "Displacement in the end"}
+"""Of `body_pictures`"""
 
 
 def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
@@ -63,6 +69,7 @@ def follow(
     folder: Path,
     *,
     shown: str,
+    since: float = 0.0,
 ) -> BodyRun:
     """Follow particles and bodies by the explicit scheme until a time [s]. Collective.
 
@@ -73,6 +80,7 @@ def follow(
         columns: of ``history.csv``; the first is ``time_s``.
         row: the values of a row, from the rows before it and the report; all ranks call it.
         shown: the column that the line of progress shows.
+        since: when the run began [s]; a restart needs it.
     """
     check_frames(model, a, folder)
     again, comm = a.restart is not None, model.comm
@@ -106,7 +114,12 @@ def follow(
         try:
             look(model.report())
             run = model.explicit(
-                until, every=until / a.frames, since=0.0, watch=between_steps, rebalance=a.rebalance, **scheme(a)
+                until,
+                every=(until - since) / a.frames,
+                since=since,
+                watch=between_steps,
+                rebalance=a.rebalance,
+                **scheme(a),
             )
             for report in run:
                 look(report)
@@ -124,6 +137,27 @@ def follow(
         result.frames = [frame for frame in frames if frame is not None]
         result.exit_code = interrupt.exit_code or (1 if result.stopped else 0)
     return result
+
+
+def body_pictures(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path, title: str) -> Pictures:
+    """Strain and displacement in the end, and a film of the strain, with the bodies; nothing where there is no scene.
+
+    Args:
+        a: options with pictures and film.
+        title: stands above the first two.
+    """
+    if scene is None or not a.pictures:
+        return {}
+    last = result.frames[-1]
+    kinds = {"strain": ("shear_strain", SHEAR_STRAIN), "displacement": ("displacement", DISPLACEMENT)}
+    pictures: dict[str, Callable[[], object]] = {
+        name: partial(save_particles, folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+                      title=title, bodies=last["bodies"])
+        for name, (key, quantity) in kinds.items()
+    }  # fmt: skip
+    if a.film:
+        pictures["film"] = partial(save_animation, folder / "film", scene, film_frames(result.frames), SHEAR_STRAIN)
+    return pictures
 
 
 def scheme(a: Namespace) -> dict[str, Any]:
