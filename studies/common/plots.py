@@ -167,7 +167,7 @@ def colour_limits(quantity: Quantity, values: Iterable[np.ndarray]) -> tuple[flo
 
 def figure_with_bar(lower: np.ndarray, upper: np.ndarray, half_section: bool = False) -> tuple[Figure, Axes, Axes]:
     """A figure for a picture in equal axes that shows [lower, upper], with space for a horizontal colour bar below."""
-    left, right, bottom, top, bar = 0.52, 0.18, 0.98, 0.34, 0.11  # in
+    left, right, bottom, top, bar = 0.64, 0.18, 0.98, 0.34, 0.11  # in
     width = WIDTH - left - right
     height = np.clip(width * (upper[1] - lower[1]) / (upper[0] - lower[0]), 1.2, 6.5)
     total = bottom + height + top
