@@ -178,9 +178,7 @@ def run(
     ):
         history.add(**look(model, ground, start, model.report()))
         try:
-            for report in model.explicit(
-                a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3, energy_limit=np.inf
-            ):
+            for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3):
                 maps.record()
                 history.add(**look(model, ground, start, report))
                 output.write()
