@@ -264,7 +264,7 @@ class Model(Body):
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
-        return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit")
+        return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit", self, until)
 
     def implicit(
         self,
@@ -354,7 +354,7 @@ class Model(Body):
             self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
             energy_limit=limit, accuracy=wanted,
         )  # fmt: skip
-        return Reports(reports, "implicit")
+        return Reports(reports, "implicit", self, until)
 
     def equilibrate(
         self,

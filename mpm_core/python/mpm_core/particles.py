@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .mesh import floats
-from .views import particle_mesh, particle_table, particles_text
+from .views import particle_mesh, particle_table, particles_text, plot_particles
 
 SHOWN = ("position", "displacement", "velocity", "stress", "plastic_strain")
 """Fields of tables and point meshes where nothing else is asked for."""
@@ -143,6 +143,25 @@ class Particles:
             ImportError: meshio is not installed.
         """
         return particle_mesh(self, names or SHOWN)
+
+    def plot(self, name: str = "displacement", axes: Any = None) -> Any:
+        """Draw the particles of this rank, coloured by a field.
+
+        Args:
+            name: a field, whose size is shown if it is a vector, or a component such as ``stress_yy`` or ``velocity_x``.
+            axes: matplotlib axes to draw into, three-dimensional ones in 3D; new ones by default.
+
+        Returns:
+            The axes. In two dimensions each particle is a circle as wide as the square of its volume.
+
+        Raises:
+            InputError: no such field or component; the message lists them.
+            ImportError: matplotlib is not installed.
+
+        Example:
+            >>> model.particles.plot("stress_yy").set_title("after a second")
+        """
+        return plot_particles(self, name, axes)
 
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.

@@ -1,12 +1,17 @@
-"""Iteration over the reports of a run."""
+"""Iteration over the reports of a run, with a progress bar where one is wanted."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-R = TypeVar("R")
+from .report import Report
+
+if TYPE_CHECKING:
+    from .model import Model
+
+R = TypeVar("R", bound=Report)
 
 
 class Reports(Generic[R]):
@@ -16,12 +21,15 @@ class Reports(Generic[R]):
         >>> for report in model.explicit(until=2.0, every=0.5):
         ...     print(report.time)
         >>> report = model.explicit(until=4.0).last()
+        >>> for report in model.explicit(until=6.0, every=0.1).with_progress():
+        ...     pass
 
     A run whose reports are not requested makes no step; a RuntimeWarning says so.
     """
 
-    def __init__(self, steps: Iterator[R], scheme: str) -> None:
+    def __init__(self, steps: Iterator[R], scheme: str, model: Model, until: float) -> None:
         self._steps, self._scheme, self._begun = steps, scheme, False
+        self._model, self._until = model, until
 
     def __iter__(self) -> Reports[R]:
         return self
@@ -36,6 +44,23 @@ class Reports(Generic[R]):
         for each in self:
             report = each
         return report
+
+    def with_progress(self) -> Iterator[R]:
+        """The same reports, with a bar of simulated time on the first rank: in a notebook its own, elsewhere on the terminal.
+
+        Raises:
+            ImportError: tqdm is not installed.
+        """
+        from tqdm.auto import tqdm
+
+        form = "{desc}: {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} s [{elapsed} < {remaining}]"
+        shown = self._model.comm.rank == 0
+        with tqdm(
+            total=self._until, initial=self._model.time, desc=self._scheme, bar_format=form, disable=not shown
+        ) as bar:
+            for report in self:
+                bar.update(report.time - bar.n)
+                yield report
 
     def __del__(self) -> None:
         if not getattr(self, "_begun", True):

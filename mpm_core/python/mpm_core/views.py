@@ -1,4 +1,4 @@
-"""Meshes, models, particles and reports as a notebook shows them, and particles as pandas and meshio take them."""
+"""Meshes, models, particles and reports as a notebook shows them; particles for pandas, meshio and matplotlib."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from ._core import InputError
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -67,14 +69,17 @@ def _columns(name: str, values: np.ndarray, dim: int) -> dict[str, np.ndarray]:
     return {f"{name}_{end}": values[:, k] for k, end in enumerate(ends)}
 
 
+def _units(particles: Particles) -> dict[str, str]:
+    """Units of the fields, including those that follow from others."""
+    derived = {"displacement": "m", "plastic_strain": "-"}
+    return {field["name"]: field["unit"] for field in particles.schedule()} | derived
+
+
 def particle_table(particles: Particles, names: Sequence[str]) -> Any:
     """See `Particles.to_dataframe`."""
     import pandas
 
-    units = {field["name"]: field["unit"] for field in particles.schedule()} | {
-        "displacement": "m",
-        "plastic_strain": "-",
-    }
+    units = _units(particles)
     dim, columns, unit_of = particles.position.shape[1], {}, {}
     for name in names:
         for column, values in _columns(name, getattr(particles, name), dim).items():
@@ -93,3 +98,45 @@ def particle_mesh(particles: Particles, names: Sequence[str]) -> Any:
     points[:, : position.shape[1]] = position
     cells = [("vertex", np.arange(len(points))[:, None])]
     return meshio.Mesh(points, cells, point_data={name: np.array(getattr(particles, name)) for name in names})
+
+
+def _plotted(particles: Particles, name: str) -> tuple[np.ndarray, str]:
+    """One number per particle, and its label: a field or a component of it, or the size of a vector."""
+    units = _units(particles)
+    dim = particles.position.shape[1]
+    for field in sorted(units, key=len, reverse=True):
+        if name != field and not name.startswith(f"{field}_"):
+            continue
+        values = np.asarray(getattr(particles, field))
+        columns = _columns(field, values, dim)
+        if name not in columns and name == field and values.ndim == 2 and values.shape[1] == dim:
+            columns = {name: np.linalg.norm(values, axis=1)}
+        if name not in columns:
+            raise InputError(f"name is {name!r}, expected one of {', '.join(columns)}")
+        return columns[name], f"{name.replace('_', ' ')} [{units[field]}]"
+    raise InputError(f"name is {name!r}, expected a field or a component of it: {', '.join(sorted(units))}")
+
+
+def plot_particles(particles: Particles, name: str, axes: Any) -> Any:
+    """See `Particles.plot`."""
+    import matplotlib.pyplot as plt
+    from matplotlib.collections import EllipseCollection
+
+    values, label = _plotted(particles, name)
+    position = particles.position
+    dim = position.shape[1]
+    if axes is None:
+        axes = plt.figure(layout="compressed").add_subplot(projection="3d" if dim == 3 else None)
+    if dim == 3:
+        drawn = axes.scatter(*position.T, c=values, s=2)
+        axes.set_zlabel("z [m]")
+    else:
+        size = np.sqrt(particles.volume)
+        drawn = EllipseCollection(
+            size, size, np.zeros(len(size)), units="xy", offsets=position, offset_transform=axes.transData, array=values
+        )
+        axes.add_collection(drawn)
+        axes.autoscale_view()
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.figure.colorbar(drawn, ax=axes, label=label)
+    return axes

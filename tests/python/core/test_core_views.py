@@ -1,11 +1,14 @@
-"""How a notebook shows meshes, models and reports, and particles as pandas and meshio take them."""
+"""How a notebook shows meshes, models and reports; particles for pandas, meshio and matplotlib."""
 
+import matplotlib
 import meshio
 import numpy as np
 import pytest
 from core_cases import box
 
 import mpm_core as mpm
+
+matplotlib.use("Agg")
 
 
 @pytest.fixture
@@ -51,3 +54,34 @@ def test_meshio_has_particles_as_points_with_fields(model, tmp_path):
     np.testing.assert_array_equal(read.points[:, :2], p.position)
     np.testing.assert_array_equal(read.point_data["volume"], p.volume)
     assert len(read.cells_dict["vertex"]) == len(p)
+
+
+def test_a_picture_has_a_circle_as_large_as_each_particle_coloured_by_the_field(model):
+    p = model.particles
+    axes = p.plot("displacement")
+    (circles,) = axes.collections
+    np.testing.assert_allclose(circles.get_array(), np.linalg.norm(p.displacement, axis=1))
+    np.testing.assert_allclose(circles.get_offsets(), p.position)
+    np.testing.assert_allclose((2 * circles._widths) ** 2, p.volume)  # matplotlib keeps half of a width
+    assert axes.figure.axes[1].get_ylabel() == "displacement [m]" and axes.get_aspect() == 1
+    again = p.plot("stress_yy", axes)
+    np.testing.assert_array_equal(again.collections[1].get_array(), p.stress[:, 1])
+    with pytest.raises(mpm.InputError, match="'stress', expected one of stress_xx, stress_yy"):
+        p.plot("stress")
+    with pytest.raises(mpm.InputError, match="'weight', expected a field or a component of it: .*velocity"):
+        p.plot("weight")
+
+
+def test_a_picture_of_a_solid_is_three_dimensional():
+    model = mpm.Model(box((2, 2, 2)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=1)
+    axes = model.particles.plot("position_z")
+    np.testing.assert_allclose(np.asarray(axes.collections[0]._offsets3d[2]), model.particles.position[:, 2])
+    assert axes.get_zlabel() == "z [m]"
+
+
+def test_a_bar_shows_the_simulated_time(model, capsys):
+    reports = list(model.explicit(0.03, every=0.01).with_progress())
+    assert [round(report.time, 9) for report in reports] == [0.02, 0.03]
+    shown = capsys.readouterr().err
+    assert "explicit:  33%" in shown and "100%" in shown and "0.03/0.03 s" in shown
