@@ -165,11 +165,15 @@ def scheme(a: Namespace) -> dict[str, Any]:
     return {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": mpm.Integration.MIXED}
 
 
-def mean_force(history: History, body: mpm.RigidContact, time: float, axis: int) -> float:
+def mean_force(history: History, body: mpm.RigidContact, time: float, axis: int, column: str = "impulse_Ns") -> float:
     """Mean force along an axis since the row before [N]; the force itself in the first one.
 
-    The history has the columns ``time_s`` and ``impulse_Ns``. Single steps would show the noise of cell crossings.
+    Single steps would show the noise of cell crossings.
+
+    Args:
+        history: with the column ``time_s``.
+        column: of the impulse along the axis.
     """
     if len(history) == 0 or time <= history["time_s"][-1]:
         return float(body.force[axis])
-    return float((body.impulse[axis] - history["impulse_Ns"][-1]) / (time - history["time_s"][-1]))
+    return float((body.impulse[axis] - history[column][-1]) / (time - history["time_s"][-1]))

@@ -40,6 +40,7 @@ SMALL = {
     "seepage": "--cell-size 2 --days 20 --frames 2",
     "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "slope_schemes": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 " "--longer-steps 1",
+    "wall": "--cell-size 0.25 --particles-per-cell 1 --speed 0.05 --frames 2",
     "verification": "--quick --cases column",
 }
 """Each study at a size that takes a second or less; a new study needs its line here."""
@@ -53,6 +54,7 @@ WITH_PARTICLES = (
     "retrogression",
     "slope",
     "slope_schemes",
+    "wall",
 )
 NAMES = sorted(
     [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]

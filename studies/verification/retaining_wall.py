@@ -1,0 +1,92 @@
+"""Rigid walls that move away from sand and into it: active and passive pressure, smooth and rough.
+
+The study wall: sand with a friction angle of 30 degrees on rock, and walls that are contact bodies. Behind smooth walls
+Rankine's coefficients are exact. Behind rough ones they lie between a field of stresses and a mechanism: 2 % apart for the
+active pressure, while the passive pressure of the plane wedge is far too high. Sand that does not dilate rises less than
+the wall needs to make use of all its friction, so the passive pressure is compared with the field of stresses for the
+friction that acts.
+"""
+
+import numpy as np
+from _case import Check, Kind, Result, run_alone
+from _plots import save_comparison
+from common.body_runs import scheme
+from common.earth_pressure import stress_field
+from mpi4py import MPI
+
+import wall
+
+ROUGH = 20.0  # degrees
+RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "field of stresses, Lancellotta 2002", "plane wedge, Coulomb 1776"
+
+
+class Rows:
+    """The columns of a history, without a file."""
+
+    def __init__(self):
+        self.rows = []
+
+    def __len__(self):
+        return len(self.rows)
+
+    def __getitem__(self, column):
+        return np.array([row[column] for row in self.rows])
+
+
+def moved(motion, friction_angle, quick):
+    """The options, and the rows of the study's history."""
+    size = ["--cell-size", "0.1", "--speed", "0.02"] if quick else []
+    a = wall.parse(["--motion", motion, "--wall-friction-angle", str(friction_angle), *size])
+    model, rows = wall.build(a), Rows()
+    body = model.contacts[0]
+    rows.rows.append(wall.row(a, body, rows, model.report()))
+    until = wall.end(a)
+    for report in model.explicit(until, every=(until - wall.at_rest(a)) / 20, **scheme(a)):
+        rows.rows.append(wall.row(a, body, rows, report))
+    return a, rows
+
+
+def run(quick: bool, folder) -> Result:
+    # --- 1. Walls ----------------------------------------------------------------------------------------------------
+    tolerance = 0.12 if quick else 0.05
+    runs, checks = {}, []
+    for motion in ("active", "passive"):
+        for friction in (0.0,) if quick else (0.0, ROUGH):
+            a, rows = runs[f"{motion}, {'rough' if friction else 'smooth'}"] = moved(motion, friction, quick)
+            name = f"coefficient of {motion} pressure, {'rough' if friction else 'smooth'} wall"
+            found, (field, wedge) = wall.in_the_end(a, rows, "coefficient"), wall.bounds(a)
+            if friction == 0:
+                checks.append(Check(name, field, RANKINE, found, tolerance))
+            elif motion == "active":
+                checks.append(Check(f"{name}: at most", field, LANCELLOTTA, found, tolerance, kind=Kind.AT_MOST))
+                checks.append(Check(f"{name}: at least", wedge, COULOMB, found, tolerance, kind=Kind.AT_LEAST))
+            else:
+                delta = np.arctan(wall.in_the_end(a, rows, "wall_friction"))
+                acting = stress_field(np.radians(a.friction_angle), delta, passive=True)
+                source = f"{LANCELLOTTA}, for the {np.degrees(delta):.1f} degrees that act"
+                checks.append(Check(name, acting, source, found, tolerance))
+                checks.append(Check(f"{name}: at most", wedge, COULOMB, found, 0.0, kind=Kind.AT_MOST))
+
+    # --- 2. Pictures -------------------------------------------------------------------------------------------------
+    if MPI.COMM_WORLD.rank == 0:
+        for motion in ("active", "passive"):
+            chosen = {name: pair for name, pair in runs.items() if name.startswith(motion)}
+            curves = {
+                name: (np.abs(rows["wall_displacement_m"]) / a.height, rows["coefficient"])
+                for name, (a, rows) in chosen.items()
+            }
+            ends = np.array([0.0, max(x.max() for x, _ in curves.values())])
+            lines = {
+                f"{name}, field of stresses": (ends, np.full(2, wall.bounds(a)[0])) for name, (a, _) in chosen.items()
+            }
+            save_comparison(folder / f"{motion}.png", curves, lines,
+                            ("Displacement of the wall over its height [-]", "Coefficient of earth pressure [-]"),
+                            joined=True, limits=((0.0, None), (0.0, None)))  # fmt: skip
+    return Result(checks, {
+        "active.png": "Coefficient of the pressure on walls that move away from sand",
+        "passive.png": "Coefficient of the pressure on walls that move into sand",
+    })  # fmt: skip
+
+
+if __name__ == "__main__":
+    run_alone(run)

@@ -1,0 +1,281 @@
+"""Earth pressure on a rigid wall that moves away from sand, into it, or gives way.
+
+A wall retains sand on rock with the friction angle of the sand. It moves away from the sand (active pressure) or into it
+(passive pressure), or it is free, held by a force that falls to a part of the active one. Smooth, the coefficients are
+Rankine's; rough, they lie between those of a field of stresses (Lancellotta 2002), which is on the safe side, and of a
+plane wedge (Coulomb 1776), which is not. Sand that does not dilate may not make use of all of the wall's friction.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common import body_runs
+from common.body_runs import BodyRun, follow, mean_force
+from common.checkpoint import check_restart
+from common.earth_pressure import coulomb, stress_field, wall_acceleration
+from common.figures import Pictures, save_figure
+from common.files import OutputError
+from common.history import History
+from common.movie import Movie
+from common.options import add_choice, add_count, add_number, check, study_parser
+from common.page import Page
+from common.plots import CURVES, GREY, Scene, paper_style
+from common.ranks import run_study
+from common.results import open_results
+from common.scenes import scene_of
+from common.summary import write_summary
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+GRAVITY = 9.81
+COLUMNS = ["time_s", "wall_displacement_m", "coefficient", "impulse_Ns", "vertical_impulse_Ns", "wall_friction",
+           "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
+RELEASED = 1.3
+"""When a free wall has its last support, over the time at which the sand is at rest"""
+LAST = 1 / 3
+"""Part of the way of the wall over which the coefficient is taken, at its end"""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_choice(p, "--motion", "active", ("active", "passive", "free"), "of the wall: from the sand, into it, or free")
+    add_number(p, "--height", 1.0, "m", "height of the wall", above=0)
+    add_number(p, "--friction-angle", 30.0, "degrees", "friction angle of the sand", above=0, below=50)
+    add_number(p, "--dilation-angle", 0.0, "degrees", "dilation angle, at most the friction angle", at_least=0)
+    add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction between sand and wall", at_least=0)
+    add_number(p, "--cohesion", 50.0, "Pa", "cohesion of the sand", at_least=0)
+    add_number(p, "--young", 1e7, "Pa", "Young's modulus", above=0)
+    add_number(p, "--density", 1800.0, "kg/m3", "density of the sand", above=0)
+    add_number(p, "--movement", None, "-", "displacement of the wall over its height (default: 0.008 active, 0.03 passive)",
+               above=0)  # fmt: skip
+    add_number(p, "--speed", 0.01, "1/s", "speed of the wall over its height", above=0)
+    add_number(p, "--support", 0.5, "-", "force on a free wall in the end, over the active force", at_least=0)
+    add_number(p, "--wall-mass", 0.2, "-", "mass of a free wall, over that of a square of sand as high", above=0)
+    add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height", above=0, at_most=0.25)
+    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=40)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    for name in ("dilation_angle", "wall_friction_angle"):
+        value = getattr(a, name)
+        check(p, value <= a.friction_angle, lambda name=name, value=value: f"--{name.replace('_', '-')} is {value:g}, expected at "
+              f"most --friction-angle, {a.friction_angle:g} degrees")  # fmt: skip
+    if a.movement is None:
+        a.movement = 0.03 if a.motion == "passive" else 0.008
+    check_restart(p, a, body_runs.MAY_CHANGE)
+    return a
+
+
+# --- 2. Sand and wall ------------------------------------------------------------------------------------------------
+
+
+def is_passive(a: Namespace) -> bool:
+    return bool(a.motion == "passive")
+
+
+def unit_force(a: Namespace) -> float:
+    """gamma H^2 / 2 [N/m]."""
+    return 0.5 * a.density * GRAVITY * a.height**2
+
+
+def at_rest(a: Namespace) -> float:
+    """When the sand is at rest under its weight [s]; gravity rises over the first third."""
+    return 50 * a.height / float(np.sqrt(a.young / a.density))
+
+
+def end(a: Namespace) -> float:
+    """When the wall has done its way [s]; a free wall has the time to fall by its height."""
+    if a.motion == "free":
+        return at_rest(a) + 1.5 * float(np.sqrt(2 * a.height / GRAVITY))
+    return at_rest(a) + 1.1 * a.movement / a.speed
+
+
+def bounds(a: Namespace) -> tuple[float, float]:
+    """Coefficients of the horizontal pressure by a field of stresses and by a plane wedge; the same on a smooth wall [-]."""
+    angles = np.radians(a.friction_angle), np.radians(a.wall_friction_angle)
+    return stress_field(*angles, passive=is_passive(a)), coulomb(*angles, passive=is_passive(a))
+
+
+def wall_mass(a: Namespace) -> float:
+    """Of a free wall, kg per metre."""
+    return float(a.wall_mass * a.density * a.height**2)
+
+
+def support(a: Namespace) -> float:
+    """Force that holds a free wall in the end [N/m]."""
+    return a.support * unit_force(a) * bounds(a)[0]
+
+
+def expected_acceleration(a: Namespace) -> float:
+    """At which a free wall gives way, with a plane wedge behind it [m/s2]."""
+    return wall_acceleration(*np.radians([a.friction_angle, a.wall_friction_angle]), weight=a.density * GRAVITY,
+                             cohesion=a.cohesion, height=a.height, mass=wall_mass(a), support=support(a))  # fmt: skip
+
+
+def acceleration(a: Namespace, history: History) -> float:
+    """Of a free wall, from its release until it has gone by a tenth of its height [m/s2]: twice that of a parabola."""
+    time, moved = history["time_s"], -history["wall_displacement_m"]
+    chosen = (time >= RELEASED * at_rest(a)) & (moved <= 0.1 * a.height)
+    return float(2 * np.polyfit(time[chosen], moved[chosen], 2)[0]) if chosen.sum() > 3 else float("nan")
+
+
+def wall_motion(a: Namespace) -> dict[str, object]:
+    """How the wall moves; arguments of ``Model.add_contact``."""
+    start = at_rest(a)
+    if a.motion != "free":
+        speed = a.speed * a.height * (1 if is_passive(a) else -1)
+        return {"velocity": ([start, start + 0.2 * a.movement / a.speed], [(0.0, 0.0), (speed, 0.0)])}
+    rest = unit_force(a) * 0.45  # between the active and the passive one, so that it stands
+    force = ([0.0, start / 3, start, RELEASED * start], [(0.0, 0.0), (rest, 0.0), (rest, 0.0), (support(a), 0.0)])
+    return {"body": mpm.FreeBody(mass=wall_mass(a), axes=(True, False), rotates=False, force=force)}
+
+
+def build(a: Namespace) -> mpm.Model:
+    """Sand at rest behind the wall. Collective."""
+    h, cell = a.height, a.cell_size * a.height
+    before, behind, above = 1.5 if a.motion == "free" else 0.5, 5.0 if is_passive(a) else 2.0, 0.4
+    counts = [round((before + behind) * h / cell), round((1 + above) * h / cell) + 1]
+    left = cell * round(before * h / cell)
+    body = ((left, cell), (left + 2 * behind * h, cell + h))  # over a row of empty cells
+    mesh = bridge.box_mesh(comm, np.array(counts) * cell, counts, body=body)
+    sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
+                           dilation_angle=a.dilation_angle)  # fmt: skip
+    model = mpm.Model(bridge.background_mesh(*mesh), sand)
+    if a.restart is not None:
+        model.restore(a.restart)
+        return model
+    model.seed(density=a.density, per_cell=a.particles_per_cell, cell_tag=bridge.BODY)
+    for tag in (1, 2):
+        model.roller(tag, normal=(1, 0))
+    model.set_gravity((0.0, -GRAVITY), ramp=at_rest(a) / 3)
+    # Particles are larger than their distance from the sides of cells.
+    face, foot = (
+        at + model.gap(mpm.Plane((left, cell), normal)) - 1e-9 * h for at, normal in ((left, (1, 0)), (cell, (0, 1)))
+    )
+    wall = mpm.Box((face - 0.3 * h, foot - h), (face, foot + 1.35 * h))
+    inner, rough = np.tan(np.radians([a.friction_angle, a.wall_friction_angle]))
+    model.add_contact(wall, friction=rough, adhesion=a.cohesion * rough / inner, **wall_motion(a))
+    model.add_contact(mpm.Plane((0.0, foot), (0.0, 1.0)), friction=inner, adhesion=a.cohesion)
+    model.rebalance()
+    model.explicit(at_rest(a), **(body_runs.scheme(a) | {"damping": 0.7})).last()
+    return model
+
+
+def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Report) -> dict[str, float]:
+    """A row of the history. Collective."""
+    # Cohesion acts as a surcharge c cot(phi) that the wall feels too (corresponding states, Caquot 1934).
+    surcharge = a.cohesion / np.tan(np.radians(a.friction_angle)) * a.height / unit_force(a)
+    push = -mean_force(history, wall, report.time, 0)
+    drag = mean_force(history, wall, report.time, 1, "vertical_impulse_Ns")
+    return {
+        "time_s": report.time, "wall_displacement_m": wall.displacement[0],
+        "coefficient": (push / unit_force(a) + surcharge) / (1 + surcharge), "impulse_Ns": wall.impulse[0],
+        "vertical_impulse_Ns": wall.impulse[1], "wall_friction": abs(drag) / push if push > 0 else 0.0,
+        "unexplained_fraction_of_energy": report.unexplained_fraction, "dt_s": report.dt,
+    }  # fmt: skip
+
+
+def accelerations(a: Namespace, history: History) -> dict[str, float]:
+    """Computed and expected, of a wall that is free."""
+    if a.motion != "free":
+        return {}
+    return {
+        "acceleration_m_per_s2": acceleration(a, history),
+        "acceleration_by_plane_wedge_m_per_s2": expected_acceleration(a),
+    }
+
+
+def in_the_end(a: Namespace, history: History, column: str) -> float:
+    """Mean of a column over the last third of the way."""
+    moved = np.abs(history["wall_displacement_m"])
+    return float(history[column][moved >= (1 - LAST) * moved[-1]].mean())
+
+
+# --- 3. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw_pressure(path: Path, a: Namespace, history: History) -> None:
+    """The coefficient over the displacement of the wall, or over time where it is free, with the bounds."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.6, 3.2), layout="constrained")
+        free = a.motion == "free"
+        along = history["time_s"] - at_rest(a) if free else np.abs(history["wall_displacement_m"]) / a.height
+        axes.plot(along, history["coefficient"], color=CURVES[0], label="computed")
+        for value, name, style in zip(bounds(a), ("stress field", "plane wedge"), ("--", ":"), strict=True):
+            name = name if a.wall_friction_angle > 0 else "Rankine"
+            axes.axhline(value, color="black", linewidth=0.9, linestyle=style, label=f"{name}, {value:.3f}")
+            if a.wall_friction_angle == 0:
+                break
+        if free:
+            axes.axhline(
+                a.support * bounds(a)[0], color=GREY, linewidth=0.9, label="force that holds the wall in the end"
+            )
+        xlabel = "Time since the sand was at rest [s]" if free else "Displacement of the wall over its height [-]"
+        axes.set(xlabel=xlabel, ylabel="Coefficient of earth pressure [-]", xlim=(0, None), ylim=(0, None))
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend()
+        save_figure(figure, path, dpi=200)
+
+
+def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
+    """The coefficient, sand and wall in the end, and a film."""
+    pictures = body_runs.body_pictures(
+        a, scene, result, folder, f"wall moved by {abs(result.history['wall_displacement_m'][-1]):.3g} m"
+    )
+    return (
+        {"pressure": lambda: draw_pressure(folder / "pressure.png", a, result.history), **pictures} if pictures else {}
+    )
+
+
+# --- 4. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    begin = perf_counter()
+    folder = open_results(a, comm)
+    model = build(a)
+    wall = model.contacts[0]
+    result = follow(a, model, end(a), COLUMNS, partial(row, a, wall), folder, shown="coefficient", since=at_rest(a))
+    history, report, scene = result.history, model.report(), scene_of(model, [bridge.BODY])
+    coefficient, friction = (in_the_end(a, history, name) for name in ("coefficient", "wall_friction"))
+    field, wedge = bounds(a)
+    summary = {
+        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
+        "coefficient_in_the_end": coefficient, "coefficient_by_stress_field": field, "coefficient_by_plane_wedge": wedge,
+        "coefficient_at_rest": history["coefficient"][0], "wall_displacement_m": history["wall_displacement_m"][-1],
+        "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), "time_s": report.time, "steps": report.steps,
+        **accelerations(a, history), "unexplained_fraction_of_energy": report.unexplained_fraction, "wall_seconds": perf_counter() - begin,
+    }  # fmt: skip
+    movies = [Movie(f"{a.motion} wall", scene, result.frames)] if scene is not None else []
+    captions = {"pressure": "Coefficient of the horizontal earth pressure on the wall", **body_runs.CAPTIONS}
+    write_summary(folder, a, summary, comm, Page(movies=movies, captions=captions), drawn(a, scene, result, folder))
+    if comm.rank == 0:
+        if result.stopped:
+            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
+        print(f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane wedge {wedge:.3f}; "
+              f"the wall moved by {abs(history['wall_displacement_m'][-1]):.3g} m\nresults in {folder}")  # fmt: skip
+    return result.exit_code
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

@@ -1,0 +1,70 @@
+"""Earth pressure: closed forms against statics of their own, and a wall that stands or gives way as they say."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
+
+from common.earth_pressure import coulomb, stress_field, wall_acceleration  # noqa: E402
+
+ANGLES = [np.radians(angles) for angles in ((25.0, 0.0), (30.0, 20.0), (35.0, 10.0))]
+
+
+def thrust(phi, delta, sign, theta):
+    """Horizontal force over gamma H^2 / 2 of a wedge at the angle theta that slides, by the equilibrium of two forces."""
+    lean = theta - sign * phi  # of the force on the plane against the vertical
+    rows = np.array([[1.0, -np.sin(lean)], [sign * np.tan(delta), np.cos(lean)]])  # wall, horizontal; plane
+    return np.linalg.solve(rows, [0.0, 1 / np.tan(theta)])[0]
+
+
+@pytest.mark.parametrize("phi, delta", ANGLES)
+def test_coulombs_wedge_is_the_worst_of_all(phi, delta):
+    theta = np.radians(np.arange(5.0, 85.0, 0.02))
+    active = max(thrust(phi, delta, 1, t) for t in theta if t > phi)
+    passive = min(force for t in theta if t + phi < np.pi / 2 and (force := thrust(phi, delta, -1, t)) > 0)
+    assert coulomb(phi, delta, passive=False) == pytest.approx(active, rel=1e-5)
+    assert coulomb(phi, delta, passive=True) == pytest.approx(passive, rel=1e-5)
+
+
+@pytest.mark.parametrize("phi, delta", ANGLES)
+@pytest.mark.parametrize("passive", [False, True])
+def test_stresses_and_wedge_bound_the_pressure(phi, delta, passive):
+    field, wedge = stress_field(phi, delta, passive=passive), coulomb(phi, delta, passive=passive)
+    rankine = np.tan(np.pi / 4 + (0.5 if passive else -0.5) * phi) ** 2
+    if delta == 0:
+        assert (field, wedge) == pytest.approx((rankine, rankine), rel=1e-12)
+    else:
+        assert field < wedge if passive else wedge < field < rankine
+
+
+@pytest.mark.parametrize("phi, delta", ANGLES)
+def test_a_wall_stands_on_coulombs_force(phi, delta):
+    given = {"weight": 18e3, "cohesion": 0.0, "height": 2.0, "mass": 500.0}
+    force = 0.5 * 18e3 * 4 * coulomb(phi, delta, passive=False)
+    assert wall_acceleration(phi, delta, **given, support=1.0001 * force) == 0
+    assert wall_acceleration(phi, delta, **given, support=0.999 * force) > 0
+    # A wall without mass or support before soil: the wedge slides down its plane by itself.
+    light = wall_acceleration(phi, 0.0, **{**given, "mass": 0.0}, support=0.0)
+    theta = np.linspace(phi, np.pi / 2, 20001)[1:-1]
+    along = 9.81 * (np.sin(theta) - np.cos(theta) * np.tan(phi)) * np.cos(theta)
+    assert light == pytest.approx(along.max(), rel=1e-5)
+
+
+@pytest.mark.parametrize("support", [0.5, 1.3])
+def test_a_free_wall_stands_or_gives_way(support, tmp_path):
+    wall = importlib.import_module("wall")
+    size = "--cell-size 0.1 --particles-per-cell 3 --frames 20 --no-pictures --motion free"
+    assert wall.main([*size.split(), "--support", str(support), "--output", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "summary.json").read_text())
+    expected = found["acceleration_by_plane_wedge_m_per_s2"]
+    if support > 1:
+        assert expected == 0 and abs(found["wall_displacement_m"]) < 2e-4
+    else:
+        # A wedge as a whole goes somewhat faster than one that deforms.
+        assert found["acceleration_m_per_s2"] == pytest.approx(expected, rel=0.15)
