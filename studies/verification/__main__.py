@@ -44,6 +44,7 @@ GROUPS = {
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),
+    "Slides": ("slide_convergence", "extruded_slope"),
     "The paper": ("paper_slope",),
 }
 CASES = tuple(name for names in GROUPS.values() for name in names)
