@@ -18,6 +18,7 @@ sys.path.insert(0, str(STUDIES))
 
 SMALL = {
     "balance": "--cell-size 0.5 --mesh fitted --particles-per-cell 1 --time 0.02 --frames 2",
+    "barrier": "--cell-size 0.5 --particles-per-cell 1 --length 5 --duration 1 --frames 2",
     "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
     "collapse_schemes": "--cell-size 0.5 --meshes 1 --elements P1",
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
@@ -47,6 +48,7 @@ SMALL = {
 ON_TWO_RANKS = ("balance",)
 WITH_PARTICLES = (
     "balance",
+    "barrier",
     "compare_fem",
     "embankment",
     "footing_push",

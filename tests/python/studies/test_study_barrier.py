@@ -1,0 +1,47 @@
+"""The force of a flow on a wall: the closed form, and what the particles of the study do."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
+
+from common.flow_impact import bore  # noqa: E402
+
+
+@pytest.mark.parametrize("froude", [1.0, 2.0, 6.0])
+@pytest.mark.parametrize("after, before", [(1.0, 1.0), (3.0, 0.5)])
+def test_a_bore_keeps_mass_and_momentum(froude, after, before):
+    # In units of h and sqrt(g h): the force is what the flow brings and what it pushes with.
+    depth, force = bore(froude, after, before)
+    speed = froude / (depth - 1)  # of the bore, by mass: u + s = H s
+    assert depth > 1
+    assert force == pytest.approx(froude * (froude + speed) + 0.5 * before, rel=1e-10)
+    assert force == pytest.approx(0.5 * after * depth**2, rel=1e-10)
+
+
+def test_sand_at_a_wall_pushes_between_two_bores(tmp_path):
+    barrier = importlib.import_module("barrier")
+    size = "--cell-size 0.25 --particles-per-cell 6 --length 12 --frames 16 --no-pictures"
+    assert barrier.main([*size.split(), "--output", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "summary.json").read_text())
+    fluid, passive = found["force_of_bore_in_fluid_N_per_m"], found["force_of_bore_in_sand_N_per_m"]
+    assert fluid < found["force_N_per_m"] < passive
+
+
+def test_forces_of_wall_and_plane_stop_the_flow(tmp_path):
+    barrier = importlib.import_module("barrier")
+    size = "--cell-size 0.25 --particles-per-cell 3 --length 5 --slope 15"
+    a = barrier.parse(size.split())
+    model = barrier.build(a)
+    first = np.array(model.report().momentum)
+    report = model.explicit(2 * barrier.passage(a), integration=barrier.mpm.Integration.MIXED).last()
+    given = report.mass * np.array(barrier.gravity_of(a)) * (1, -1) * report.time
+    taken = sum(contact.impulse for contact in model.contacts)
+    assert np.array(report.momentum) - first == pytest.approx(given - taken, abs=1e-9 * np.abs(first).max())
+    assert model.contacts[0].impulse[0] > 0.5 * first[0]
