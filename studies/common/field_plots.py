@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -41,12 +41,14 @@ class Field:
     """A nodal quantity on triangles, on the first rank.
 
     points: (n, 2) [m]; cells: (m, 3) rows of points; values: (n, k); half_section: of an axisymmetric body
+    borders: segments (k, 2, 2) [m] around soils
     """
 
     points: np.ndarray
     cells: np.ndarray
     values: np.ndarray
     half_section: bool = False
+    borders: np.ndarray | None = None
 
     @property
     def outline(self) -> np.ndarray:
@@ -91,10 +93,29 @@ def gathered(function: object, half_section: bool = False, parts: int = 1) -> Fi
     return Field(corners[first], number.reshape(-1, 3), at_corners[first], half_section)
 
 
-def mechanism_field(mechanism: object, half_section: bool = False) -> Field | None:
-    """A mechanism at all nodes of its elements, so that elements of higher degree show what moves within them. Collective."""
+def mechanism_field(mechanism: object, half_section: bool = False, soils: object = None) -> Field | None:
+    """A mechanism at all nodes of its elements, so that elements of higher degree show what moves within them. Collective.
+
+    soils: tags of the cells, by name, whose borders are shown
+    """
     nodes = mechanism.function_space.dofmap.dof_layout.num_dofs
-    return gathered(mechanism, half_section, parts=round((np.sqrt(8 * nodes + 1) - 3) / 2))
+    field = gathered(mechanism, half_section, parts=round((np.sqrt(8 * nodes + 1) - 3) / 2))
+    borders = None if soils is None else soil_borders(mechanism.function_space.mesh, soils)
+    return None if field is None else replace(field, borders=borders)
+
+
+def soil_borders(domain: object, cell_tags: object) -> np.ndarray | None:
+    """Sides of cells around each soil with a name: segments (k, 2, 2) [m]; None but on the first rank. Collective."""
+    mesh = bridge.background_arrays(domain, cell_tags)
+    own = mesh["cell_owners"] == domain.comm.rank
+    parts = domain.comm.gather((mesh["points"][mesh["cells"][own]], mesh["cell_tags"][own]))
+    if parts is None:
+        return None
+    corners, tags = (np.concatenate(arrays) for arrays in zip(*parts))
+    points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    cells = cells.reshape(-1, 3)
+    of_soils = [boundary_edges(cells[np.isin(tags, of_soil)]) for of_soil in bridge.names_of(cell_tags).values()]
+    return points[np.concatenate([np.empty((0, 2), int), *of_soils])]
 
 
 def _divided(parts: int) -> tuple[np.ndarray, np.ndarray]:
@@ -241,6 +262,8 @@ def save_mechanism(
             values = () if is_shear else (lengths / top,)
             axes.tripcolor(*field.points.T, field.cells, *values, cmap=quantity.colours, vmin=0, vmax=1, rasterized=True,
                            **shown)  # fmt: skip
+            if field.borders is not None:
+                axes.add_collection(LineCollection(field.borders, colors="#a0a0a0", linewidths=0.6, zorder=2))
             if line is not None:
                 axes.plot(*line.T, "--", color=LINE, linewidth=1.4, label=line_name)
             _bar(figure, bar, quantity, (0.0, 1.0), "max" if is_shear else "neither")

@@ -51,14 +51,17 @@ def site_study(
     for size in sizes:
         site = read_site(a.site, comm, size)
         progress = step_line("site" if size is None else f"cells of {size:g} m")
-        runs.append(find(site, site.finite_elements(**finite_elements(a)), progress))
+        model = site.finite_elements(**finite_elements(a))
+        runs.append(find(site, model, progress))
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
              "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    write_summary(folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label, site.axisymmetric))
+    write_summary(
+        folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label, site.axisymmetric, model.cell_tags)
+    )
     if comm.rank == 0:
         for row in rows:
             sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
@@ -67,9 +70,11 @@ def site_study(
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
-def _drawn(folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool) -> Pictures:
+def _drawn(
+    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool, soils: object
+) -> Pictures:
     """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
-    field = mechanism_field(runs[-1].mechanism, half_section)
+    field = mechanism_field(runs[-1].mechanism, half_section, soils)
     if field is None:
         return {}
     names = ["site" if size is None else f"{size:g} m" for size in sizes]

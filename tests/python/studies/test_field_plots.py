@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-from studies.common.field_plots import gathered, mechanism_field
+from studies.common.field_plots import gathered, mechanism_field, soil_borders
 
 
 def of_degree(degree):
@@ -37,3 +38,15 @@ def test_a_field_keeps_the_cells_of_the_mesh():
     function = of_degree(2)
     field = gathered(function)
     assert len(field.cells) == function.function_space.mesh.topology.index_map(2).size_local
+
+
+def test_borders_of_soils_are_the_sides_around_them(tmp_path):
+    domain, _, _ = bridge.box_mesh(MPI.COMM_SELF, [1.0, 1.0], [4, 4])
+    middle = bridge.background_arrays(domain)
+    middle = middle["points"][middle["cells"]].mean(axis=1)
+    tags = np.where(middle[:, 1] > 0.5, np.where(middle[:, 0] > 0.5, 3, 2), 1).astype(np.int32)
+    soils = meshtags(domain, 2, np.arange(len(tags), dtype=np.int32), tags)
+    bridge.name_tags(soils, {"clay": 1, "sand": (2, 3)})
+    edges = np.diff(soil_borders(domain, soils), axis=1)[:, 0]
+    # Each soil is 1 m by 0.5 m, and the border between the classes of sand is none
+    assert np.linalg.norm(edges, axis=1).sum() == pytest.approx(6.0)
