@@ -25,8 +25,8 @@ def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
 def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Options ``--elements`` and ``--equilibrium``."""
     add_choice(parser, "--elements", "P2", ("P1", "P1-averaged", "P2", "P4"),
-               "linear triangles, the same with averaged volumetric strains, quadratic ones, or those of degree 4, which are "
-               "the most accurate for their number of nodes")  # fmt: skip
+               "linear triangles, the same with averaged volumetric strains (not for soil with little cohesion and no dilation), "
+               "quadratic ones, or those of degree 4, which are the most accurate for their number of nodes")  # fmt: skip
     add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
                "out-of-balance force that is accepted, over the forces at work: 1e-8 by Newton's method and 1e-5 by "
                "relaxation, or 1e-2 as in practice")  # fmt: skip

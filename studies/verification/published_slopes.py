@@ -79,7 +79,7 @@ def circle_bound(strength):
 def safety(model):
     """The factor of safety under the weight, as a Collapse."""
     return bridge.factor_of_safety(
-        model, bridge.Load(unit_weight=UNIT_WEIGHT), start=0.4, first_step=0.2, tolerance=3e-3
+        model, bridge.Load(unit_weight=UNIT_WEIGHT), start=0.4, first_step=0.2, tolerance=1e-3
     )
 
 
