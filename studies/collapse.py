@@ -20,6 +20,7 @@ from common.results import open_results
 from common.site_runs import add_site_option, site_study
 from common.slope_fem import (
     add_fem_slope_options,
+    add_ground_option,
     check_fem_slope_options,
     mesh_sizes,
     slope_fem,
@@ -42,6 +43,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
+    add_ground_option(p)
     add_flow_options(p)
     add_site_option(p)
     return p
@@ -70,7 +72,7 @@ def target(spiral: bridge.LogSpiral) -> Target:
 
 def collapse(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
     """Raise the unit weight to the last equilibrium on one mesh; the first step does not depend on the result."""
-    model = slope_fem(a, comm, cell_size, dilation_angle)
+    model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
     first_step = a.cohesion / a.height
     title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"
     return bridge.collapse_load(model, weight, first_step=first_step, progress=step_line(title))

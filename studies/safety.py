@@ -15,7 +15,7 @@ import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.files import OutputError
-from common.options import add_flag, add_number, study_parser
+from common.options import add_flag, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
@@ -23,6 +23,7 @@ from common.site_runs import add_site_option, site_study
 from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
     add_fem_slope_options,
+    add_ground_option,
     check_fem_slope_options,
     mesh_sizes,
     slope_fem,
@@ -45,6 +46,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
+    add_ground_option(p)
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
     add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
     add_flow_options(p)
@@ -57,6 +59,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_fem_slope_options(p, options)
+    check(p, options.depth == 0 or not options.particles,
+          lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
     return options
 
 
@@ -73,7 +77,7 @@ def target(factor: float) -> Target:
 
 def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
     """Weaken the soil to the last equilibrium on one mesh."""
-    model = slope_fem(a, comm, cell_size, dilation_angle)
+    model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
     title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"
     return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=step_line(title))
 

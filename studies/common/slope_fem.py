@@ -6,11 +6,14 @@ import argparse
 import sys
 from collections.abc import Callable
 
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+from fenics_bridge.types import MeshTags
 
-from .options import add_choice, add_count, check
+from .options import add_choice, add_count, add_number, check
+from .results import ROOT
 from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_slope_options, soil_of
 
 
@@ -20,6 +23,12 @@ def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
     add_count(parser, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_element_options(parser)
     add_soil_options(parser, dilation_angle=None)
+
+
+def add_ground_option(parser: argparse.ArgumentParser) -> None:
+    """Option ``--depth``."""
+    add_number(parser, "--depth", 0.0, "m", "ground of the same soil below the toe, on a rigid base, and as far before it as the "
+               "slope is high and twice as deep; 0: the slope stands on a rigid base", at_least=0)  # fmt: skip
 
 
 def add_element_options(parser: argparse.ArgumentParser) -> None:
@@ -58,24 +67,43 @@ def mesh_sizes(options: argparse.Namespace) -> list[float]:
     return [size for size in sizes if size <= largest]
 
 
+def slope_on_ground(
+    comm: MPI.Comm, height: float, angle: float, crest: float, cell_size: float, depth: float, runout: float
+) -> tuple[Mesh, MeshTags, list[bridge.Support]]:
+    """Unstructured mesh of a slope with ground below and before its toe [m], with its tags and supports. Collective."""
+    shape = {"height": height, "angle": angle, "crest": crest, "depth": depth, "runout": runout}
+    sizes = {"cell_size": cell_size, "far_size": 4 * cell_size}
+    domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "hillside.geo", comm, parameters=shape | sizes)
+    return domain, facet_tags, [*SUPPORTS, bridge.roller(bridge.RIGHT, (1, 0))]
+
+
 def slope_fem(
-    options: argparse.Namespace, comm: MPI.Comm, cell_size: float, dilation_angle: float | None = None
+    options: argparse.Namespace,
+    comm: MPI.Comm,
+    cell_size: float,
+    dilation_angle: float | None = None,
+    depth: float = 0.0,
 ) -> bridge.QuasiStatic:
-    """Finite elements of the slope, unloaded: rollers on the left, fixed base.
+    """Finite elements of the slope, unloaded: rollers at the sides, fixed base.
 
     Args:
         dilation_angle: [degrees], instead of that in the options.
+        depth: of the ground below the toe [m].
 
     Note:
         Collective.
     """
-    background = bridge.slope_mesh(
-        comm, height=options.height, angle=options.angle, crest=options.crest, cell_size=cell_size, kind=options.mesh,
-        runout=cell_size,
-    )  # fmt: skip
-    domain, _, facet_tags = bridge.soil_mesh(*background)
-    law = soil_of(options, dilation_angle)
-    return bridge.QuasiStatic(domain, law, facet_tags, SUPPORTS, **finite_elements(options))
+    a = options
+    if depth > 0:
+        runout = a.height + 2 * depth
+        domain, facet_tags, supports = slope_on_ground(comm, a.height, a.angle, a.crest, cell_size, depth, runout)
+    else:
+        background = bridge.slope_mesh(
+            comm, height=a.height, angle=a.angle, crest=a.crest, cell_size=cell_size, kind=a.mesh, runout=cell_size
+        )
+        domain, _, facet_tags = bridge.soil_mesh(*background)
+        supports = SUPPORTS
+    return bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, **finite_elements(a))
 
 
 def weight(unit_weight: float) -> bridge.Load:

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 from _case import Check, Result, run_alone
 from common.figures import save_figure
 from common.plots import CURVES, paper_style
-from common.summary import ROOT
+from common.slope_fem import slope_on_ground
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -34,9 +34,7 @@ def soil_body(angle, spiral, cell):
         background = bridge.slope_mesh(MPI.COMM_WORLD, **shape, cell_size=cell, kind="fitted", runout=cell)
         domain, _, facet_tags = bridge.soil_mesh(*background)
         return domain, facet_tags, supports
-    shape |= {"runout": HEIGHT, "depth": 0.5 * HEIGHT, "cell_size": cell, "far_size": 4 * cell}
-    domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "hillside.geo", MPI.COMM_WORLD, parameters=shape)
-    return domain, facet_tags, [*supports, bridge.roller(bridge.RIGHT, (1, 0))]
+    return slope_on_ground(MPI.COMM_WORLD, **shape, cell_size=cell, depth=0.5 * HEIGHT, runout=HEIGHT)
 
 
 def by_finite_elements(angle, friction, spiral, cell):
