@@ -36,6 +36,7 @@ GROUPS = {
     "Limit analysis": (
         "limit_slopes",
         "limit_footing",
+        "cut_slice",
         "published_slopes",
         "pushed_footing",
         "retaining_wall",
@@ -44,7 +45,7 @@ GROUPS = {
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),
-    "Slides": ("slide_convergence", "extruded_slope"),
+    "Slides": ("slide_convergence", "extruded_slope", "hand_over"),
     "The paper": ("paper_slope",),
 }
 CASES = tuple(name for names in GROUPS.values() for name in names)
