@@ -126,7 +126,7 @@ def _not_carried(start, steps):
     carried = max((step.value for step in steps if step.converged), default=0.0)
     return (
         f"start: with the strength divided by {start!r} only {carried:.1%} of the load is carried; at {last.value:.1%}: "
-        f"{last.report.reason}, or take a smaller start"
+        f"{last.report.reason}{', or take a smaller start' if carried > 0 else ''}"
     )
 
 

@@ -72,3 +72,10 @@ def test_strip_footing(friction_angle, factor, tolerance):
 def test_slope_that_cannot_stand_is_refused():
     with pytest.raises(bridge.InputError, match="start.*mechanism.*smaller start"):
         bridge.factor_of_safety(slope_model(), weight(80e3), start=1.0)
+
+
+def test_more_strength_is_not_advised_where_it_would_not_help():
+    model = slope_model()
+    model.law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=0.0, friction_angle=0.0)
+    with pytest.raises(bridge.InputError, match="only 0.0%.*The soil has no strength there: give it[^,]*$"):
+        bridge.factor_of_safety(model, weight(80e3))
