@@ -23,6 +23,7 @@ void find_clearance(const Mesh<D>& mesh, Contact<D>& contact)
 {
   const RigidBody<D>& body = contact.body;
   contact.clearance.resize(static_cast<std::size_t>(mesh.owned_cells));
+  contact.cell_reach.resize(static_cast<std::size_t>(mesh.owned_cells));
   contact.travel = 0;
   contact.cell_size = std::numeric_limits<double>::infinity();
   double farthest = 0;
@@ -36,6 +37,7 @@ void find_clearance(const Mesh<D>& mesh, Contact<D>& contact)
     // for its motion in a step.
     const Vector<D> x = as_at_start<D>(body, centre);
     contact.clearance[static_cast<std::size_t>(c)] = distance<D>(contact.surface, x).value - 3 * reach;
+    contact.cell_reach[static_cast<std::size_t>(c)] = reach;
     contact.cell_size = std::min(contact.cell_size, reach);
     farthest = std::max(farthest, apart<D>(x, body.centre) + reach);
   }

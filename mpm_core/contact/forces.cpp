@@ -2,6 +2,7 @@
 #include "transfer/affine_field.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 namespace mpm::contact
@@ -123,13 +124,25 @@ void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
     reaction.moment[i] -= moment[i];
 }
 
-/// Whether a particle touches the surface or is within its own radius of doing so: compared by volumes, since roots
-/// take their time, and most particles of the cells that are looked at are farther away.
+/// The cube, or square, as large as a particle [m^D].
+template <class G>
+double particle_cube(const Particles<G::dim>& particles, Index p)
+{
+  return particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
+}
+
+/// Whether a cube with this side is smaller: compared by volumes, since roots take their time.
+template <int D>
+bool fits(double side, double volume)
+{
+  return side <= 0 || (D == 3 ? side * side * side : side * side) < volume;
+}
+
+/// Whether a particle touches the surface or is within its own radius of doing so.
 template <class G>
 bool is_near(const Particles<G::dim>& particles, Index p, double distance)
 {
-  const double cube = G::dim == 3 ? distance * distance * distance : distance * distance;
-  return distance <= 0 || cube < particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
+  return fits<G::dim>(distance, particle_cube<G>(particles, p));
 }
 
 /// Lets the slip of a particle go that does not touch the surface.
@@ -185,6 +198,22 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& 
   return force;
 }
 
+/// Whether any particle of a run can be near: not if the largest would not be where the cell, and the step, bring it
+/// nearest. Most cells that a surface may reach before their bounds are found again are not at it now.
+/// @param gap  smallest possible distance of the cell from the surface at the end of the step, if its nodes rest [m]
+template <class G, int D = G::dim>
+bool may_be_near(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double gap,
+                 const Particles<D>& particles)
+{
+  double fastest = 0, largest = 0;
+  for (Index node : mesh.cells[run.cell])
+    fastest =
+        std::max(fastest, dot<D>(velocity[static_cast<std::size_t>(node)], velocity[static_cast<std::size_t>(node)]));
+  for (Index p = run.first; p < run.last; ++p)
+    largest = std::max(largest, particle_cube<G>(particles, p));
+  return fits<D>(gap - dt * std::sqrt(fastest), largest);
+}
+
 /// Forces on the particles of a run, by their moments.
 /// @returns whether any was in contact
 template <class G, int D = G::dim>
@@ -227,9 +256,16 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
   bool touched = false;
   for (const Run& run : runs)
   {
-    if (contact.clearance[static_cast<std::size_t>(run.cell)] > travelled ||
-        movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
+    const double clearance = contact.clearance[static_cast<std::size_t>(run.cell)];
+    if (clearance > travelled || movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
       continue;
+    const double gap = clearance + 2 * contact.cell_reach[static_cast<std::size_t>(run.cell)] - travelled;
+    if (!may_be_near<G, D>(mesh, run, velocity, dt, gap, particles))
+    {
+      for (Index p = run.first; p < run.last; ++p)
+        leave_slip<D>(press, p);
+      continue;
+    }
     TractionMoments<D> moments{};
     if (!press_run<G, D>(mesh, run, velocity, press, particles, contact, moments))
       continue;
