@@ -39,9 +39,9 @@ struct Contact
   // Lower bounds of the gaps in each cell
   std::vector<double> clearance;
   std::vector<double> cell_reach; ///< from the centre of each cell to its farthest vertex [m]
-  double reach = 0;     ///< of the surface from its centre, as far as there is mesh [m]
-  double travel = 0;    ///< path of its fastest point since the bounds were found [m]
-  double cell_size = 0; ///< travel after which they are found again [m]
+  double reach = 0;               ///< of the surface from its centre, as far as there is mesh [m]
+  double travel = 0;              ///< path of its fastest point since the bounds were found [m]
+  double cell_size = 0;           ///< travel after which they are found again [m]
 };
 
 /// Half the side of a square or cube as large as a particle [m].
