@@ -38,7 +38,7 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
                "quadratic ones, or those of degree 4, which are the most accurate for their number of nodes")  # fmt: skip
     add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
                "out-of-balance force that is accepted, over the forces at work: 1e-8 by Newton's method and 1e-5 by "
-               "relaxation, or 1e-2 as in practice")  # fmt: skip
+               "relaxation, or 1e-2 as in practice, where small slopes on large bodies seem too safe")  # fmt: skip
 
 
 def finite_elements(options: argparse.Namespace) -> dict[str, object]:
