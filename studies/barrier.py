@@ -83,7 +83,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     if a.base_friction_angle is None:
         a.base_friction_angle = a.slope
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
-          lambda: f"--length is {a.length:g}, expected more than twice the front's, {1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
+          lambda: f"--length is {a.length:g}, expected more than twice the front's, "
+          f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
 
@@ -220,11 +221,13 @@ def main(arguments: list[str] | None = None) -> int:
     force = full_force(a, history)
     summary = {
         "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
-        "force_N_per_m": None if force is None else force * unit_force(a), "force_of_bore_in_fluid_N_per_m": fluid * unit_force(a),
+        "force_N_per_m": None if force is None else force * unit_force(a),
+        "force_of_bore_in_fluid_N_per_m": fluid * unit_force(a),
         "force_of_bore_in_sand_N_per_m": passive * unit_force(a),
         "largest_force_N_per_m": float(history["force_factor"].max()) * unit_force(a), "velocity_m_per_s": velocity(a),
         "largest_run_up_m": float(history["run_up_m"].max()), "outflow_mass_kg": report.outflow_mass, "time_s": report.time,
-        "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction, "wall_seconds": perf_counter() - begin,
+        "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction,
+        "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
     movies = [Movie("flow and wall", scene, result.frames)] if scene is not None else []
     captions = {"force": "Force on the wall", **body_runs.CAPTIONS}
@@ -233,8 +236,8 @@ def main(arguments: list[str] | None = None) -> int:
         if result.stopped:
             print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
         shown = "no bore yet" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
-        print(f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive pressure "
-              f"{1e-3 * passive * unit_force(a):.2f} kN/m\nresults in {folder}")  # fmt: skip
+        print(f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive "
+              f"pressure {1e-3 * passive * unit_force(a):.2f} kN/m\nresults in {folder}")  # fmt: skip
     return result.exit_code
 
 

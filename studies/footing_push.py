@@ -70,8 +70,8 @@ def parser() -> ArgumentParser:
     add_number(p, "--density", 1800.0, "kg/m3", "density of the clay", above=0)
     add_number(p, "--speed", 1e-3, "-", "speed of the footing over that of elastic waves", above=0, at_most=0.1)
     add_number(p, "--cell-size", 0.02, "m", "cells along the way of the footing's edge", above=0)
-    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that; those far away have four times as much",
-               at_least=1)  # fmt: skip
+    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that; those far away have four times "
+               "as much", at_least=1)  # fmt: skip
     add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
@@ -225,8 +225,8 @@ def main(arguments: list[str] | None = None) -> int:
         if result.stopped:
             print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
         shown = "not reached" if factor is None else f"{factor:.2f}"
-        print(f"{name}: N_c {shown}, exact {EXACT[a.shape, a.base]:.2f}; load factor {history['load_factor'][-1]:.2f} at a settlement "
-              f"of {history['settlement_m'][-1]:.3g} m\nresults in {folder}")  # fmt: skip
+        print(f"{name}: N_c {shown}, exact {EXACT[a.shape, a.base]:.2f}; load factor {history['load_factor'][-1]:.2f} at a "
+              f"settlement of {history['settlement_m'][-1]:.3g} m\nresults in {folder}")  # fmt: skip
     return result.exit_code
 
 

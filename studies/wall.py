@@ -76,8 +76,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     a = p.parse_args(arguments)
     for name in ("dilation_angle", "wall_friction_angle"):
         value = getattr(a, name)
-        check(p, value <= a.friction_angle, lambda name=name, value=value: f"--{name.replace('_', '-')} is {value:g}, expected at "
-              f"most --friction-angle, {a.friction_angle:g} degrees")  # fmt: skip
+        check(p, value <= a.friction_angle, lambda name=name, value=value: f"--{name.replace('_', '-')} is {value:g}, expected "
+              f"at most --friction-angle, {a.friction_angle:g} degrees")  # fmt: skip
     if a.movement is None:
         a.movement = 0.03 if a.motion == "passive" else 0.008
     check_restart(p, a, body_runs.MAY_CHANGE)
@@ -263,8 +263,9 @@ def main(arguments: list[str] | None = None) -> int:
         "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
         "coefficient_in_the_end": coefficient, "coefficient_by_stress_field": field, "coefficient_by_plane_wedge": wedge,
         "coefficient_at_rest": history["coefficient"][0], "wall_displacement_m": history["wall_displacement_m"][-1],
-        "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), "time_s": report.time, "steps": report.steps,
-        **accelerations(a, history), "unexplained_fraction_of_energy": report.unexplained_fraction, "wall_seconds": perf_counter() - begin,
+        "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), "time_s": report.time,
+        "steps": report.steps, **accelerations(a, history), "unexplained_fraction_of_energy": report.unexplained_fraction,
+        "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
     movies = [Movie(f"{a.motion} wall", scene, result.frames)] if scene is not None else []
     captions = {"pressure": "Coefficient of the horizontal earth pressure on the wall", **body_runs.CAPTIONS}
@@ -272,8 +273,9 @@ def main(arguments: list[str] | None = None) -> int:
     if comm.rank == 0:
         if result.stopped:
             print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
-        print(f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane wedge {wedge:.3f}; "
-              f"the wall moved by {abs(history['wall_displacement_m'][-1]):.3g} m\nresults in {folder}")  # fmt: skip
+        print(f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane "
+              f"wedge {wedge:.3f}; the wall moved by {abs(history['wall_displacement_m'][-1]):.3g} m\n"
+              f"results in {folder}")  # fmt: skip
     return result.exit_code
 
 

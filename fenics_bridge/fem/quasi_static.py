@@ -46,8 +46,9 @@ class QuasiStatic(PointFunctions):
         law: law of `mpm_core`, or laws by cell tag or name.
         facet_tags: tags of the boundary.
         supports: boundary conditions from `fixed`, `roller` and `prescribed`; enough of them to prevent rigid-body motion.
-        degree: degree of the displacement: 1, 2 or, for triangles, 4. Collapse loads by triangles of degree 4 are the most accurate
-            for their number of nodes, above all of undrained and axisymmetric bodies (Sloan and Randolph 1982, IJNAMG 6, 47-76).
+        degree: degree of the displacement: 1, 2 or, for triangles, 4. Collapse loads by triangles of degree 4 are the most
+            accurate for their number of nodes, above all of undrained and axisymmetric bodies (Sloan and Randolph 1982, IJNAMG
+            6, 47-76).
         nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1. Not for soil with friction, little
             cohesion and no dilation, whose surface then fails too early; degree 2 and 4 do not have this limit.
         options_prefix: prefix of the PETSc options of the linear solver.

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from mpm_core.output import PARTICLE_FIELDS, ModelOutput
 from mpm_core.probes import ProbeFile
 

@@ -7,13 +7,12 @@ rest comes from the cells below it and from the settlement: a strip gains about 
 width. So the factors come from above, and the error falls with the cells.
 """
 
+import footing_push
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
 from common.body_runs import scheme
 from mpi4py import MPI
-
-import footing_push
 
 RIGIDITY, WIDTH = 2000.0, 1.0
 SOURCES = {"strip": "Prandtl 1920", "circular": "slip lines, tests/python/studies/test_circular_footing.py"}
@@ -60,8 +59,8 @@ def run(quick: bool, folder) -> Result:
     if not quick:
         exact, coarse = footing_push.EXACT["strip", "smooth"], pushed("strip", "smooth", COARSE)[0]
         ratio = (checks[0].computed - exact) / (coarse - exact)
-        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6, "falls with the cells", ratio, 0.0,
-                            kind=Kind.AT_MOST))  # fmt: skip
+        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6, "falls with the cells", ratio,
+                            0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Picture --------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

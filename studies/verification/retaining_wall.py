@@ -8,13 +8,12 @@ friction that acts.
 """
 
 import numpy as np
+import wall
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
 from common.body_runs import scheme
 from common.earth_pressure import stress_field
 from mpi4py import MPI
-
-import wall
 
 ROUGH = 20.0  # degrees
 RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "field of stresses, Lancellotta 2002", "plane wedge, Coulomb 1776"

@@ -26,8 +26,8 @@ def outline(surface: Surface, lower: ArrayLike, upper: ArrayLike) -> Outline:
 
     Args:
         surface: the rigid surface.
-        lower, upper: corners of the box in which planes and the ends of open polylines, which have no end, are shown [m],
-            shape (D,).
+        lower: corner of the box in which planes and the ends of open polylines, which have no end, are shown [m], shape (D,).
+        upper: its opposite corner.
 
     Returns:
         Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D). There are none of a

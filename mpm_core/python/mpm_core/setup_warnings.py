@@ -38,8 +38,8 @@ def _nothing_acts(model: Model) -> str:
     if model.comm.allreduce(int(acts)):
         return ""
     return (
-        "nothing acts on the particles: gravity is zero, and so are tractions, velocities of supports and of rigid surfaces, and the "
-        "particles' own velocities and stresses; gravity is given by model.set_gravity"
+        "nothing acts on the particles: gravity is zero, and so are tractions, velocities of supports and of rigid surfaces, and "
+        "the particles' own velocities and stresses; gravity is given by model.set_gravity"
     )
 
 

@@ -10,8 +10,8 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 import collapse  # noqa: E402
 import safety  # noqa: E402
 
-FLAT_CLAY = ["--angle", "30", "--friction-angle", "0", "--cohesion", "1000", "--height", "1", "--crest", "2", "--cell-size", "0.2",
-             "--meshes", "1"]  # fmt: skip
+FLAT_CLAY = ["--angle", "30", "--friction-angle", "0", "--cohesion", "1000", "--height", "1", "--crest", "2",
+             "--cell-size", "0.2", "--meshes", "1"]  # fmt: skip
 
 
 def stability_factor(depth):
