@@ -7,6 +7,7 @@
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
+#include "model/resting_nodes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -67,7 +68,8 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
     clock.begin(Phase::mapping);
     find_velocity_change(field, options.pic_fraction, dt);
-    scatter_momentum<G>(mesh, field.part, field.moments, field.velocity_change, field.velocity);
+    scatter_momentum<G>(mesh, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
+    map_resting_change<G>(field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - options.pic_fraction, field);
     clock.begin(Phase::momentum);
@@ -227,19 +229,21 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
 }
 
-template <int D>
-double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, MPI_Comm comm)
+template <class G>
+double critical_time_step(const Model<G>& model)
 {
+  constexpr int D = G::dim;
   double squared = std::numeric_limits<double>::infinity();
-  for (const Run& run : points.runs)
-  {
-    const double h = smallest_altitude<D>(mesh.shapes[run.cell]);
-    double density = std::numeric_limits<double>::infinity();
-    for (Index p = run.first; p < run.last; ++p)
-      density = std::min(density, points.particles.mass[p] / points.particles.volume[p]);
-    squared = std::min(squared, h * h * density / p_wave_modulus(points.laws[run.material]));
-  }
-  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, comm);
+  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
+    for (const Run& run : points.runs)
+    {
+      const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
+      double density = std::numeric_limits<double>::infinity();
+      for (Index p = run.first; p < run.last; ++p)
+        density = std::min(density, points.particles.mass[p] / points.particles.volume[p]);
+      squared = std::min(squared, h * h * density / p_wave_modulus(points.laws[run.material]));
+    }
+  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
   return std::sqrt(squared);
 }
 
@@ -250,10 +254,9 @@ double pic_fraction_of_step(double fraction, double dt, double critical)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
-  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);
+  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
+  template double critical_time_step(const Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
-template double critical_time_step(const Mesh<2>&, const MaterialPoints<2>&, MPI_Comm);
-template double critical_time_step(const Mesh<3>&, const MaterialPoints<3>&, MPI_Comm);
 } // namespace mpm::explicit_scheme

@@ -37,10 +37,11 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt);
 template <class G>
 double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 
-/// Critical time step (16): the smallest of h_min / c_d over the particles, c_d = sqrt((K + 4G/3) / rho_p). [s]
+/// Critical time step (16): the smallest of h_min / c_d over the particles and resting cells, c_d = sqrt((K + 4G/3) /
+/// rho_p). [s]
 /// @note Collective
-template <int D>
-double critical_time_step(const Mesh<D>& mesh, const MaterialPoints<D>& points, MPI_Comm comm);
+template <class G>
+double critical_time_step(const Model<G>& model);
 
 /// The PIC fraction of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the
 /// step: 1 - (1 - fraction)^(dt / dt_cr).

@@ -1,6 +1,7 @@
 #include "explicit/run.h"
 
 #include "materials/laws/substeps.h"
+#include "model/resting_nodes.h"
 #include "parallel/agreement.h"
 
 #include <algorithm>
@@ -99,15 +100,19 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
     {
       if (run.conversion)
         convert_failing(model, *run.conversion);
-      const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
+      const double critical = critical_time_step(model);
       dt = next_step(model, run, critical);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }
     explicit_step(model, of_step, dt);
     if (model.failure)
-      throw RunError(failure_text(model, *model.failure));
+      break;
     ++done;
   }
+  update_resting_rows(model);
+  if (model.failure)
+    throw RunError(failure_text(model, *model.failure));
+  make_resting_cells(model.mesh, model.particles, model.fields.front()); // as a run that goes on from a file begins
   if (run.until - model.time <= closeness)
     model.time = run.until;
   return done;
@@ -201,7 +206,7 @@ Diagnostics diagnostics(const Model<G>& model)
   d.outflow_mass = model.totals.outflow_mass;
   d.particle_steps = static_cast<double>(model.totals.particle_steps);
   d.plastic_fraction = static_cast<double>(model.last.plastic);
-  d.resting_cells = static_cast<double>(std::ranges::count(model.order.resting, 1));
+  d.resting_cells = static_cast<double>(model.fields.front().resting.runs.size());
   d.converted_cells = static_cast<double>(model.totals.converted_cells);
   std::array<double, sizeof(Diagnostics) / sizeof(double)> sums;
   std::copy_n(&d.particles, sums.size(), sums.begin());

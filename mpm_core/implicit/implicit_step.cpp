@@ -136,7 +136,7 @@ double pic_fraction(const Model<G>& model, const ImplicitStep<G>& step)
     return 1;
   if (step.options.pic == 0)
     return 0;
-  const double critical = critical_time_step(model.mesh, material_points(model), model.exchange.comm);
+  const double critical = critical_time_step(model);
   return pic_fraction_of_step(step.options.pic, step.dt, critical);
 }
 

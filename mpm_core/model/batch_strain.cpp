@@ -3,7 +3,6 @@
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "transfer/affine_field.h"
-#include "transfer/resting.h"
 
 #include <algorithm>
 
@@ -105,19 +104,6 @@ void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
 }
 
 template <class G, int D>
-void strain_resting(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                    const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
-{
-  find_cell_strains(mesh, field, runs, options, batch, scratch);
-  const Index n = batch.last - batch.first;
-  for (Index i = 0; i < n; i += lanes)
-    for (int k : working_component<G>)
-      std::memcpy(scratch.strain[k] + i, &scratch.cells[static_cast<std::size_t>(i / lanes)].increment[k],
-                  sizeof(Lanes));
-  strain_rows<D>(particles, batch.first, batch.last, scratch.cells);
-}
-
-template <class G, int D>
 void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                          const PassOptions& options, const Batch& batch, Particles<D>& particles,
                          BatchScratch<D>& scratch)
@@ -142,8 +128,6 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
                              const PassOptions&, const Batch&, BatchScratch<G::dim>&);                                 \
   template void strain_cells(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                    \
                              const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);             \
-  template void strain_resting(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,                  \
-                               const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);           \
   template void strain_dual_domains(const Mesh<G::dim>&, const VelocityField<G>&, const std::vector<Run>&,             \
                                     const PassOptions&, const Batch&, Particles<G::dim>&, BatchScratch<G::dim>&);
 INSTANTIATE(PlaneStrain)

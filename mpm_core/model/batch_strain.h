@@ -44,11 +44,6 @@ template <class G, int D = G::dim>
 void strain_cells(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                   const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch);
 
-/// The same for a batch of resting cells, whose rows have a cell each.
-template <class G, int D = G::dim>
-void strain_resting(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                    const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch);
-
 /// The same for each particle by the gradient at its own place.
 /// @pre average_gradients has been called for the field
 template <class G, int D = G::dim>

@@ -2,6 +2,7 @@
 
 #include "mesh/search.h"
 #include "model/resting.h"
+#include "model/resting_nodes.h"
 
 #include <numeric>
 
@@ -78,12 +79,12 @@ void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<c
 template <class G>
 void note_disturbed(Model<G>& model, std::span<const Index> entered)
 {
+  const auto& marks = model.fields.front().resting.marks;
   for (Index p : entered)
-  {
-    const Index cell = model.particles.cell[p];
-    if (!model.order.resting.empty() && model.order.resting[static_cast<std::size_t>(cell)])
+    if (const Index cell = model.particles.cell[p]; !marks.empty() && marks[static_cast<std::size_t>(cell)])
       model.migration.disturbed.push_back(cell);
-  }
+  if (!model.migration.disturbed.empty())
+    update_resting_rows(model);
 }
 
 namespace
@@ -120,8 +121,8 @@ void migrate_particles(Model<G>& model)
   migration.far_partners.clear();
   std::vector<Index> arrivals(static_cast<std::size_t>(arrived));
   std::iota(arrivals.begin(), arrivals.end(), model.particles.size() - arrived);
-  add_entered(model.mesh, model.particles, arrivals, model.field_of_law, model.fields);
   note_disturbed(model, arrivals);
+  add_entered(model.mesh, model.particles, arrivals, model.field_of_law, model.fields);
 
   // Particles out of order cut the runs of two cells. Sorting is due when they have cost as much as it does.
   CellOrder& order = model.order;

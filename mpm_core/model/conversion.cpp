@@ -1,5 +1,6 @@
 #include "model/resting.h"
 
+#include "model/resting_nodes.h"
 #include "particles/seed.h"
 #include "transfer/resting.h"
 
@@ -112,6 +113,7 @@ void convert_cells(Model<G>& model, std::span<const unsigned char> chosen)
     }
   if (rows.empty())
     return;
+  update_resting_rows(model);
   Index end = particles.size();
   resize(particles, end + more);
   for (Index row : rows)
@@ -123,6 +125,7 @@ void convert_cells(Model<G>& model, std::span<const unsigned char> chosen)
   model.totals.converted_cells += static_cast<std::int64_t>(rows.size());
   model.totals.gained_particles += more;
   sort_particles(model);
+  make_resting_cells(model.mesh, particles, model.fields.front());
 }
 
 template <class G>
@@ -132,6 +135,7 @@ void convert_failing(Model<G>& model, const Conversion& conversion)
   const Mesh<D>& mesh = model.mesh;
   if (!model.particles.resting.present)
     return;
+  update_resting_rows(model);
   std::vector<unsigned char> chosen(static_cast<std::size_t>(mesh.owned_cells), 0);
   for (Index p = 0; p < model.particles.size(); ++p)
     if (fails(mesh, model.particles, p, conversion))

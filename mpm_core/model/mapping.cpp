@@ -2,6 +2,7 @@
 
 #include "model/integration.h"
 #include "model/pore_forces.h"
+#include "model/resting_nodes.h"
 
 #include <algorithm>
 #include <utility>
@@ -20,6 +21,7 @@ void shrink_part(const Mesh<D>& mesh, const NodeExchange& exchange, VelocityFiel
       cells.push_back(c);
   const std::vector<Index> before = std::move(field.part.nodes);
   field.part = make_part<D>(mesh, cells, exchange.shared_nodes);
+  field.resting.others = {};
   for (Index node : before)
     if (!field.part.has_node[node])
     {
@@ -62,15 +64,17 @@ double change_by_averaging(const Mesh<D>& mesh, const VelocityField<G>& field, I
 
 /// The fraction of averaging in each cell, the least of its soils; none where all are averaged in full.
 template <class G, int D = G::dim>
-void find_averaged_fractions(const Mesh<D>& mesh, const std::vector<Run>& runs, CellIntegration<D>& integration)
+void find_averaged_fractions(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field)
 {
+  CellIntegration<D>& integration = field.integration;
   const auto& by_law = integration.averaged_by_law;
   integration.averaged_of_cell.clear();
   if (std::ranges::all_of(by_law, [](double fraction) { return fraction == 1; }))
     return;
   integration.averaged_of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
-  for (const Run& run : runs)
-    integration.averaged_of_cell[run.cell] = std::min(integration.averaged_of_cell[run.cell], by_law[run.material]);
+  for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
+    for (const Run& run : each)
+      integration.averaged_of_cell[run.cell] = std::min(integration.averaged_of_cell[run.cell], by_law[run.material]);
 }
 
 /// Averages the mean stresses of the cells over nodes, in each cell by the fraction that its soils have in
@@ -80,7 +84,7 @@ template <class G, int D = G::dim>
 void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
                              VelocityField<G>& field)
 {
-  find_averaged_fractions<G>(mesh, runs, field.integration);
+  find_averaged_fractions(mesh, runs, field);
   const auto& fraction = field.integration.averaged_of_cell;
   const auto stress_of = [&](Index c)
   {
@@ -112,11 +116,19 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
         stress[k] += change;
       return stress;
     };
-    scatter<G>(mesh, field.part, field.moments, averaged, field.tractions, field.nodes);
+    scatter<G>(mesh, part_of_particles(field), field.moments, averaged, field.tractions, field.nodes);
+    add_resting_sums(mesh, averaged, field);
   }
   else
-    scatter<G>(mesh, field.part, field.moments, integrated, field.tractions, field.nodes);
+  {
+    scatter<G>(mesh, part_of_particles(field), field.moments, integrated, field.tractions, field.nodes);
+    if (field.integration.kind == Integration::particles)
+      add_resting_sums(field);
+    else
+      add_resting_sums(mesh, integrated, field);
+  }
   add_pore_forces(mesh, particles, runs, field);
+  add_pore_forces(mesh, particles, field.resting.runs, field);
 }
 
 template <class G>

@@ -20,4 +20,11 @@ MaterialPoints<D> material_points(const Model<G>& model)
 {
   return {model.particles, model.order.runs, model.laws};
 }
+
+/// The rows of resting cells likewise.
+template <class G, int D = G::dim>
+MaterialPoints<D> resting_points(const Model<G>& model)
+{
+  return {model.particles, model.fields.front().resting.runs, model.laws};
+}
 } // namespace mpm::model

@@ -1,6 +1,7 @@
 #include "model/model.h"
 
 #include "model/mapping.h"
+#include "model/resting_nodes.h"
 #include "parallel/agreement.h"
 #include "transfer/resting.h"
 
@@ -95,18 +96,6 @@ void find_first_runs(Model<G>& model, VelocityField<G>& field)
 }
 } // namespace
 
-namespace
-{
-template <int D>
-void find_resting_cells(const Mesh<D>& mesh, CellOrder& order)
-{
-  order.resting.assign(static_cast<std::size_t>(mesh.owned_cells), 0);
-  for (const Run& run : order.runs)
-    if (run.resting)
-      order.resting[static_cast<std::size_t>(run.cell)] = 1;
-}
-} // namespace
-
 template <class G>
 void find_cell_runs(Model<G>& model, bool again)
 {
@@ -114,9 +103,11 @@ void find_cell_runs(Model<G>& model, bool again)
   if (again)
     find_runs_again(model.particles, batch_size, order.runs);
   else
+  {
     find_runs(model.particles, batch_size, order.runs);
-  if (model.particles.resting.present)
-    find_resting_cells(model.mesh, order);
+    if (model.particles.resting.present)
+      take_resting_runs(model.mesh, order.runs, model.fields.front());
+  }
   order.marks.resize(model.mesh.cells.size(), 0);
   for (VelocityField<G>& field : model.fields)
     find_first_runs(model, field);
@@ -146,6 +137,7 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
     values->assign(nodes, {});
   field.volumetric_strain.resize(nodes);
   field.part = {};
+  field.resting = {};
   field.left.clear();
   field.moments.assign(cells, CellMoments<G>{});
   field.tractions.assign(loaded ? cells : 0, TractionMoments<G::dim>{});
@@ -173,12 +165,19 @@ namespace
 {
 /// @throws InputError where a cell holds a row beside that of the resting cell
 template <int D>
-void check_resting_cells(const Particles<D>& particles, const std::vector<Run>& runs)
+void check_resting_cells(const Particles<D>& particles, const std::vector<Run>& runs, const RestingCells<D>& resting)
 {
-  for (std::size_t r = 1; r < runs.size(); ++r)
-    if (runs[r].cell == runs[r - 1].cell && (runs[r].resting || runs[r - 1].resting))
-      throw InputError("particle " + std::to_string(particles.id[runs[r].resting ? runs[r - 1].first : runs[r].first]) +
-                       " is in a cell that rests, expected such cells without particles");
+  const auto refuse = [&](Index p)
+  {
+    throw InputError("particle " + std::to_string(particles.id[p]) +
+                     " is in a cell that rests, expected such cells without particles");
+  };
+  for (const Run& run : runs)
+    if (!resting.marks.empty() && resting.marks[static_cast<std::size_t>(run.cell)])
+      refuse(run.first);
+  for (std::size_t r = 1; r < resting.runs.size(); ++r)
+    if (resting.runs[r].cell == resting.runs[r - 1].cell)
+      refuse(resting.runs[r].first);
 }
 
 /// The moments of all cells from their particles.
@@ -190,18 +189,18 @@ void sum_moments(Model<G>& model)
   for (const Run& run : model.order.runs)
   {
     VelocityField<G>& field = field_of(model, run.material);
-    CellMoments<G>& moments = field.moments[run.cell];
     const auto& shape = model.mesh.shapes[run.cell];
-    if (run.resting)
-    {
-      const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
-      moments.mass_xixi = second_moment<D>(model.mesh, run.cell, particles.mass[run.first], rule);
-      take_row<G>(particles, run.first, moments);
-    }
-    else
-      add_moments<G>(particles, run.first, run.last, shape, moments);
+    add_moments<G>(particles, run.first, run.last, shape, field.moments[run.cell]);
     if (!field.tractions.empty())
       add_moments(particles, run.first, run.last, shape, field.tractions[run.cell]);
+  }
+  VelocityField<G>& field = model.fields.front();
+  for (const Run& run : field.resting.runs)
+  {
+    CellMoments<G>& moments = field.moments[run.cell];
+    const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
+    moments.mass_xixi = second_moment<D>(model.mesh, run.cell, particles.mass[run.first], rule);
+    take_row<G>(particles, run.first, moments);
   }
 }
 } // namespace
@@ -218,8 +217,10 @@ void prepare(Model<G>& model)
     clear_field(model.mesh, loaded, field);
   model.migration.owned_cells = owned_cell_numbers(model.mesh);
   sort_particles(model);
-  collectively(model.exchange.comm, [&] { check_resting_cells(model.particles, model.order.runs); });
+  collectively(model.exchange.comm,
+               [&] { check_resting_cells(model.particles, model.order.runs, model.fields.front().resting); });
   sum_moments(model);
+  make_resting_cells(model.mesh, model.particles, model.fields.front());
   find_least_masses(model);
   model.inventory = taken_inventory(model);
   model.ready = true;

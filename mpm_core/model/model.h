@@ -72,11 +72,10 @@ struct Inventory
 /// The order of the particles by cells.
 struct CellOrder
 {
-  std::vector<Run> runs;              ///< of the particles as they are now
-  std::vector<unsigned char> marks;   ///< scratch, one per cell; all zero
-  std::vector<unsigned char> resting; ///< per owned cell: 1 where it rests; empty where no cell of the model may
-  Index out_of_order = 0;             ///< particles that changed cell since the last sort
-  std::int64_t cost = 0;              ///< their sum over the steps since
+  std::vector<Run> runs;            ///< of the particles as they are now, without the rows of resting cells
+  std::vector<unsigned char> marks; ///< scratch, one per cell; all zero
+  Index out_of_order = 0;           ///< particles that changed cell since the last sort
+  std::int64_t cost = 0;            ///< their sum over the steps since
 };
 
 /// What changes cells or ranks in a step.

@@ -1,10 +1,10 @@
 #include "model/particle_pass.h"
 
-#include "materials/laws/substeps.h"
 #include "model/cell_change.h"
+#include "model/law_update.h"
+#include "model/resting_pass.h"
 #include "model/strain_kind.h"
 #include "transfer/affine_field.h"
-#include "transfer/resting.h"
 
 #include <algorithm>
 
@@ -14,23 +14,6 @@ namespace
 {
 /// Steps after which the moments of all cells are summed over the particles again, so that round-off does not add up.
 constexpr std::int64_t summation_interval = 64;
-
-/// A second chance for the particles whose law failed, unless the step is lost anyway.
-template <class G, int D = G::dim>
-void update_failed(Model<G>& model, const Batch& batch, const PointBatch<D>& points, const std::vector<Index>& failed)
-{
-  if (model.failure)
-    return;
-  const BatchReport report = update_in_parts<D>(model.laws[batch.material], points, failed);
-  model.last.plastic += report.plastic;
-  if (report.failed.empty())
-    return;
-  SymTensor<D> increment;
-  for (int k = 0; k < n_stress<D>; ++k)
-    increment[k] = points.strain_increment[k][report.failed.front()];
-  note_failure<D>(model.failure, model.particles, Failure<D>::Kind::law_failed_in_parts,
-                  batch.first + report.failed.front(), increment);
-}
 
 /// Kinetic energy that PIC takes out of the particles of a run: their own velocities v go towards those of the nodes,
 /// v + s (w - v), which costs m s d . (v - s d / 2) with d = v - w.
@@ -61,28 +44,9 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
   const VelocityField<G>& field = field_of(model, batch.material);
   Kind::strain(model.mesh, field, model.order.runs, options, batch, particles, scratch);
   model.energy.stress_work += Kind::template half_work_of_batch<G>(particles, batch, scratch);
-
-  PointBatch<D> points;
-  points.size = batch.last - batch.first;
-  for (int k = 0; k < n_stress<D>; ++k)
-  {
-    points.strain_increment[k] = scratch.strain[k];
-    points.stress[k] = particles.stress[k].data() + batch.first;
-  }
-  std::array<double*, max_states> state;
-  for (std::size_t k = 0; k < particles.state.size(); ++k)
-    state[k] = particles.state[k].data() + batch.first;
-  points.state = state.data();
-  points.time = model.time;
-  points.dt = options.law_dt;
-  LawIncrement<D> columns;
-  give_cell_sizes(model.mesh, material_points(model), batch, columns, points);
-  if (!options.small)
-    Kind::deform(material_points(model), batch, scratch, columns, points);
-  const BatchReport report = update<D>(model.laws[batch.material], points);
-  model.last.plastic += report.plastic;
-  if (!report.failed.empty())
-    update_failed(model, batch, points, report.failed);
+  update_law<G>(model, material_points(model), options, batch, scratch.strain,
+                [&](const MaterialPoints<D>& material, LawIncrement<D>& columns, PointBatch<D>& points)
+                { Kind::deform(material, batch, scratch, columns, points); });
   model.energy.ahead += Kind::template half_work_of_batch<G>(particles, batch, scratch);
 }
 
@@ -116,51 +80,18 @@ void update_moments(const Particles<D>& particles, const PassOptions& options, c
   }
 }
 
-/// The same of a resting cell, whose particles have velocities v + grad v . xi.
-template <class G, int D = G::dim>
-double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& field, const Mesh<D>& mesh,
-                        const Run& run, double pic_fraction)
-{
-  const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
-  const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
-  Matrix<D> half = gradient_at<D>(particles.velocity_gradient, run.first), change;
-  double sum = 0;
-  for (int a = 0; a < D; ++a)
-  {
-    const double v = particles.velocity[a][run.first], of_centre = pic_fraction * (v - nodal.value[a]);
-    sum += particles.mass[run.first] * of_centre * (v - 0.5 * of_centre);
-    for (int b = 0; b < D; ++b)
-    {
-      change[a][b] = pic_fraction * (half[a][b] - nodal.gradient[a][b]);
-      half[a][b] -= 0.5 * change[a][b];
-    }
-  }
-  return sum + relative_product<D>(change, half, field.moments[run.cell].mass_xixi);
-}
-
 /// Moves the particles of a batch, and marks the runs that some have left.
-template <class Kind, class G, int D = G::dim>
+template <class G, int D = G::dim>
 void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
                 const BatchScratch<D>& scratch)
 {
   auto& runs = model.order.runs;
   Particles<D>& particles = model.particles;
   for (std::size_t r = batch.first_run; options.pic_fraction > 0 && r < batch.last_run; ++r)
-    if constexpr (Kind::at_rest)
-      model.energy.pic_loss += pic_loss_at_rest(particles, field, model.mesh, runs[r], options.pic_fraction);
-    else
-      model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction);
-  if constexpr (Kind::at_rest)
-  {
-    const Index failed =
-        move_rows<D>(particles, batch.first, std::span(scratch.motion).first(batch.last_run - batch.first_run));
-    if (failed < batch.last)
-      note_failure<D>(model.failure, particles, Failure<D>::Kind::not_finite, failed, {});
-  }
-  else
-    for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-      runs[r].out_of_order = !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell],
-                                                scratch.motion[r - batch.first_run]);
+    model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction);
+  for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
+    runs[r].out_of_order = !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell],
+                                              scratch.motion[r - batch.first_run]);
 }
 
 /// Moves and strains the particles of a batch, and brings the moments of their cells to where they are then.
@@ -173,7 +104,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   auto& runs = model.order.runs;
   find_motions(model.mesh, field, runs, options, batch, scratch);
   if (options.move)
-    move_batch<Kind>(model, field, options, batch, scratch);
+    move_batch(model, field, options, batch, scratch);
   if (options.stress)
     update_stress<Kind>(model, options, batch, scratch);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
@@ -183,12 +114,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
     const std::size_t i = r - batch.first_run;
     CellMoments<G>& moments = field.moments[run.cell];
     note<G>(run.first_in_cell ? moments.stress : Working<G>{}, i, scratch.stress_before);
-    if constexpr (Kind::at_rest)
-    {
-      take_row<G>(model.particles, run.first, moments);
-      note<G>(moments.stress, i, scratch.stress_after);
-    }
-    else if (from_particles)
+    if (from_particles)
     {
       if (run.first_in_cell)
         moments = {};
@@ -218,10 +144,7 @@ void pass_batches(Model<G>& model, const PassOptions& options)
   for (std::size_t r = 0; r < model.order.runs.size();)
   {
     const Batch batch = next_batch(model.order.runs, r);
-    if (batch.resting)
-      pass_batch<StrainAtRest>(model, options, batch, from_particles, scratch);
-    else
-      pass_batch<Kind>(model, options, batch, from_particles, scratch);
+    pass_batch<Kind>(model, options, batch, from_particles, scratch);
     r = batch.last_run;
   }
 }
@@ -243,13 +166,14 @@ void particle_pass(Model<G>& model, const PassOptions& options)
     pass_batches<StrainPerParticle>(model, options);
   else
     pass_batches<StrainPerCell>(model, options);
+  resting_pass(model, options);
   if (options.stress)
     model.energy.stress_work += model.energy.ahead;
   Migration& migration = model.migration;
   if (migration.entered.empty())
     return;
-  add_entered(model.mesh, model.particles, migration.entered, model.field_of_law, model.fields);
   note_disturbed(model, migration.entered);
+  add_entered(model.mesh, model.particles, migration.entered, model.field_of_law, model.fields);
   model.order.out_of_order += static_cast<Index>(migration.entered.size());
   migration.entered.clear();
   if (migration.migrating.empty() && migration.lost.empty())

@@ -1,6 +1,7 @@
 #include "model/state.h"
 
 #include "model/mapping.h"
+#include "model/resting_nodes.h"
 
 #include <algorithm>
 #include <cstring>
@@ -220,6 +221,7 @@ void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<T
         take(model.migration, table, field.moments);
       else if (table.name == numbered("traction_moments", k))
         take(model.migration, table, field.tractions);
+    make_resting_cells(model.mesh, model.particles, field);
   }
   for (const Table& table : ranks)
     set_number(model, table, table.values.front());

@@ -44,7 +44,6 @@ inline double half_work(const double (&stress)[n_stress<D>][batch_size], const B
 /// Integration over particles, or mixed: volumes and work follow from the moments of a cell and its one strain.
 struct StrainPerCell
 {
-  static constexpr bool at_rest = false;
   static constexpr bool moves_moments = true; ///< the moments of cells can follow the motion of the nodes
 
   template <class G, int D = G::dim>
@@ -77,23 +76,9 @@ struct StrainPerCell
   }
 };
 
-/// Resting cells: the same, for rows that have a cell each and do not move through the mesh.
-struct StrainAtRest : StrainPerCell
-{
-  static constexpr bool at_rest = true;
-
-  template <class G, int D = G::dim>
-  static void strain(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                     const PassOptions& options, const Batch& batch, Particles<D>& particles, BatchScratch<D>& scratch)
-  {
-    strain_resting(mesh, field, runs, options, batch, particles, scratch);
-  }
-};
-
 /// Dual domains: each particle has its own strain and its own work, and no deformation gradient is known of it.
 struct StrainPerParticle
 {
-  static constexpr bool at_rest = false;
   static constexpr bool moves_moments = false;
 
   template <class G, int D = G::dim>

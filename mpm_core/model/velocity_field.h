@@ -5,6 +5,7 @@
 #include "transfer/dual_domain.h"
 #include "transfer/nodal_mixed_discretisation.h"
 #include "transfer/nodes.h"
+#include "transfer/resting.h"
 #include "transfer/supports.h"
 
 namespace mpm::model
@@ -55,6 +56,7 @@ struct VelocityField
   Array<CellMoments<G>> moments;       ///< of the particles as they are now; zero outside of `part`
   Array<TractionMoments<D>> tractions; ///< likewise; empty where no particle carries any
   Array<NodeSums<D>> nodes;
+  RestingCells<D> resting; ///< the cells without particles of their own
   CellIntegration<D> integration;
   std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
   double least_mass = 0;                ///< nodes below this mass are not moved [kg]

@@ -114,7 +114,7 @@ namespace
 void append(std::vector<Run>& runs, Run piece, Index longest)
 {
   if (!runs.empty() && runs.back().cell == piece.cell && runs.back().material == piece.material &&
-      !runs.back().resting && !piece.resting)
+      runs.back().last == piece.first && !runs.back().resting && !piece.resting)
   {
     const Index joining = std::min(piece.last - piece.first, longest - (runs.back().last - runs.back().first));
     runs.back().last += joining;

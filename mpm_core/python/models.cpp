@@ -185,7 +185,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            [](M& model)
            {
              prepare(model);
-             return critical_time_step(model.mesh, material_points(model), model.exchange.comm);
+             return critical_time_step(model);
            })
       .def("out_of_balance",
            [](M& model, const Vector<D>& gravity)

@@ -1,9 +1,6 @@
 #include "transfer/resting.h"
 
 #include "particles/seed.h"
-#include "transfer/kinematics.h"
-#include "transfer/lanes.h"
-#include "transfer/turn.h"
 
 namespace mpm::transfer
 {
@@ -63,100 +60,28 @@ void take_row(const Particles<D>& particles, Index row, CellMoments<G>& moments)
   }
 }
 
-namespace
-{
-/// Calls `change(piece, group)` on consecutive rows, `lanes` of them together, and writes them back.
-template <std::size_t N, class Change>
-void change_rows(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
-{
-  for (Index i = first; i < last; i += lanes)
-  {
-    const int count = std::min<Index>(lanes, last - i);
-    Piece<N> piece = count == lanes ? load(columns, i) : load_few(columns, i, last);
-    change(piece, static_cast<std::size_t>(i - first));
-    if (count == lanes)
-      for (std::size_t k = 0; k < N; ++k)
-        std::memcpy(columns[k] + i, &piece[k], sizeof(Lanes));
-    else
-      for (std::size_t k = 0; k < N; ++k)
-        for (int l = 0; l < count; ++l)
-          columns[k][i + l] = piece[k][l];
-  }
-}
-
-/// Columns that the motion of rows changes: velocity, initial position, displacement, and the two gradients.
 template <int D>
-std::array<double*, 3 * D + 2 * D * D> motion_columns(Particles<D>& particles)
+void move_row(Particles<D>& particles, Index row, const CellMotion<D>& motion)
 {
-  std::array<double*, 3 * D + 2 * D * D> columns;
-  std::size_t k = 0;
-  for (auto* vectors : {&particles.velocity, &particles.initial_position, &particles.resting_displacement.columns})
-    for (Column& column : *vectors)
-      columns[k++] = column.data();
-  for (auto* gradients : {&particles.velocity_gradient, &particles.displacement_gradient})
-    for (Column& column : gradients->columns)
-      columns[k++] = column.data();
-  return columns;
-}
-} // namespace
-
-template <int D>
-Index move_rows(Particles<D>& particles, Index first, std::span<const CellMotion<D>> motions)
-{
-  const Index last = first + static_cast<Index>(motions.size());
-  Index failed = last;
-  const auto move_piece = [&](Piece<3 * D + 2 * D * D>& piece, std::size_t group)
+  const auto& [flip, change, displacement] = motion;
+  for (int a = 0; a < D; ++a)
   {
-    std::array<const CellMotion<D>*, lanes> of;
-    for (std::size_t l = 0; l < lanes; ++l)
-      of[l] = &motions[std::min(group + l, motions.size() - 1)];
-    static_assert(lanes == 4);
-    const auto each = [&of](auto&& number) -> Lanes {
-      return Lanes{number(*of[0]), number(*of[1]), number(*of[2]), number(*of[3])};
-    };
-    const double flip = of[0]->flip_fraction;
-    for (int a = 0; a < D; ++a)
+    particles.velocity[a][row] = flip * particles.velocity[a][row] + change.value[a];
+    particles.initial_position[a][row] -= displacement.value[a];
+    particles.resting_displacement[a][row] += displacement.value[a];
+    for (int b = 0; b < D; ++b)
     {
-      const Lanes u = each([a](const CellMotion<D>& m) { return m.displacement.value[a]; });
-      piece[a] = flip * piece[a] + each([a](const CellMotion<D>& m) { return m.change.value[a]; });
-      piece[D + a] -= u;
-      piece[2 * D + a] += u;
-      for (int b = 0; b < D; ++b)
-      {
-        Lanes& gradient = piece[3 * D + a * D + b];
-        gradient = flip * gradient + each([a, b](const CellMotion<D>& m) { return m.change.gradient[a][b]; });
-        piece[3 * D + D * D + a * D + b] +=
-            each([a, b](const CellMotion<D>& m) { return m.displacement.gradient[a][b]; });
-      }
+      double& gradient = particles.velocity_gradient[a * D + b][row];
+      gradient = flip * gradient + change.gradient[a][b];
+      particles.displacement_gradient[a * D + b][row] += displacement.gradient[a][b];
     }
-    for (int l = 0; l < lanes; ++l)
-      for (int a = 0; a < D; ++a)
-        if (!std::isfinite(piece[a][l]))
-          failed = std::min(failed, std::min(first + static_cast<Index>(group) + l, last - 1));
-  };
-  change_rows(motion_columns(particles), first, last, move_piece);
-  return failed;
-}
-
-template <int D>
-void strain_rows(Particles<D>& particles, Index first, Index last, std::span<const CellStrain<D, Lanes>> strains)
-{
-  constexpr int S = n_symmetric<D>;
-  change_rows(strain_columns(particles), first, last,
-              [&](Piece<S + 2>& piece, std::size_t group)
-              {
-                const CellStrain<D, Lanes>& strain = strains[group / lanes];
-                turn<D>(piece, strain.rotation);
-                piece[S] *= 1 + strain.volumetric;
-                piece[S + 1] += strain.deviatoric;
-              });
+  }
 }
 
 #define INSTANTIATE(D)                                                                                                 \
   template const RuleMoments<D>& rule_moments<D>(int, Rules<D>&);                                                      \
   template std::array<double, n_symmetric<D>> second_moment(const Mesh<D>&, Index, double, const RuleMoments<D>&);     \
-  template Index move_rows(Particles<D>&, Index, std::span<const CellMotion<D>>);                                      \
-  template void strain_rows(Particles<D>&, Index, Index, std::span<const CellStrain<D, Lanes>>);
+  template void move_row(Particles<D>&, Index, const CellMotion<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
 template void take_row(const Particles<2>&, Index, CellMoments<PlaneStrain>&);

@@ -1,14 +1,18 @@
 #pragma once
 /// @file
-/// What the nodes need to know of a resting cell, from its one row.
+/// What the nodes need to know of resting cells, each with its one row.
 ///
 /// A resting cell stands for n particles of equal mass at the points of a rule (`even_points`), which do not move
 /// relative to the cell. Its moments are those of these particles: volume and mass of the row, no first moment of mass,
 /// the second moment of the rule, and the velocities v + grad v . xi. So nodes cannot tell a resting cell from its
 /// particles, and nothing changes for them when one takes the place of the other.
+///
+/// As these particles stay where they are, neither the mass of nodes nor the mass matrix changes. So a step is that of
+/// linear finite elements: nodes keep the momentum of resting cells, and what has been added to velocities and
+/// displacements; rows learn of it only when somebody asks (model/resting_nodes.h).
 
-#include "transfer/cell_strain.h"
 #include "transfer/moments.h"
+#include "transfer/nodes.h"
 
 #include <map>
 
@@ -31,22 +35,41 @@ template <int D>
 std::array<double, n_symmetric<D>> second_moment(const Mesh<D>& mesh, Index cell, double mass,
                                                  const RuleMoments<D>& rule);
 
+/// The resting cells of a velocity field, in rising order. Entries per cell are followed by some of zero, so that the
+/// last ones fill a vector.
+template <int D>
+struct RestingCells
+{
+  std::vector<unsigned char> marks; ///< per owned cell: 1 where it rests; empty where no cell of the model may
+  std::vector<Run> runs;            ///< the row of each
+
+  MeshPart others; ///< the field's part of the mesh without them; nodes are those of the whole part
+
+  // Per cell
+  std::vector<std::array<Index, D + 1>> vertices;
+  std::array<std::vector<double>, D * D> gradient; ///< of the shape functions of all vertices but the first
+  std::vector<double> mass;                        ///< of a vertex by the sum over all of them: m_kl without k = l
+  std::vector<double> own_mass;                    ///< the rest of m_kk
+
+  // Per node
+  std::vector<Index> nodes;            ///< of these cells
+  std::vector<NodeSums<D>> sums;       ///< of these cells as they are now; without tractions
+  std::vector<Vector<D>> mapped;       ///< mass matrix times `velocity_change` of the field in this step
+  std::vector<Vector<D>> change;       ///< of velocities, that rows do not know yet
+  std::vector<Vector<D>> displacement; ///< likewise [m]
+
+  double flip_fraction = 1; ///< by which the velocities of rows are to be multiplied before `change` is added
+  bool is_mapped = false;   ///< `mapped` is that of this step
+  bool is_behind = false;   ///< rows are behind their nodes
+};
+
 /// Gives moments what the row of a resting cell says; the second moment of mass stays.
 template <class G, int D = G::dim>
 void take_row(const Particles<D>& particles, Index row, CellMoments<G>& moments);
 
-/// Moves resting cells with the nodes: velocities as (18), while centres stay and displacements add up.
-/// @param first    the first of consecutive rows
-/// @param motions  of each of them
-/// @returns the first row whose velocity is not finite; that behind the last if all are
+/// Moves a resting cell with its nodes: velocities as (18), while its centre stays and displacements add up.
 template <int D>
-Index move_rows(Particles<D>& particles, Index first, std::span<const CellMotion<D>> motions);
-
-/// Rotates the stresses of consecutive rows, each with its cell, grows their volumes and accumulates their deviatoric
-/// strain.
-/// @param strains  of `lanes` rows together
-template <int D>
-void strain_rows(Particles<D>& particles, Index first, Index last, std::span<const CellStrain<D, Lanes>> strains);
+void move_row(Particles<D>& particles, Index row, const CellMotion<D>& motion);
 
 /// Gradient in the row of a resting cell.
 template <int D>

@@ -266,6 +266,23 @@ def test_a_cell_that_a_particle_enters_turns_into_particles_and_mass_and_momentu
     assert not model.resting_cells[model.particles.cell[~model.particles.is_resting]].any()
 
 
+def test_particles_fly_through_empty_cells_while_others_rest():
+    # Cells that particles leave and enter come and go from step to step, also as many at once: none may be forgotten.
+    model = mpm.Model(box((16, 8), (4.0, 2.0), diagonals="alternating", body=((0.0, 0.0), (1.0, 1.0))), ELASTIC)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.rest(where=lambda x: x[:, 1] < 0.5)
+    flies = ~model.particles.is_resting & (model.particles.position[:, 1] > 0.75)
+    model.remove(~flies & ~model.particles.is_resting)
+    flies = ~model.particles.is_resting
+    velocity = np.where(flies, 1.0, 0.0)[:, None] * [1.0, 0.3]
+    model.particles.set("velocity", velocity)
+    for report in model.explicit(1.2, every=0.4, conversion=None, dt=2e-3):
+        model.particles.set("velocity", model.particles.velocity)  # sums of all cells anew, sorted
+        v = model.particles.velocity[~model.particles.is_resting]
+        np.testing.assert_allclose(v, np.tile([1.0, 0.3], (len(v), 1)), rtol=0, atol=1e-10)
+        assert report.converted_cells == 0 and report.resting_cells > 0
+
+
 def test_a_run_goes_on_from_a_checkpoint_with_both_kinds(tmp_path):
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=20.0)
     ways = []

@@ -1,0 +1,257 @@
+#include "model/resting_nodes.h"
+
+#include "transfer/affine_field.h"
+#include "transfer/resting.h"
+
+#include <algorithm>
+
+namespace mpm::model
+{
+template <class G, int D>
+void take_resting_runs(const Mesh<D>& mesh, std::vector<Run>& runs, VelocityField<G>& field)
+{
+  RestingCells<D>& resting = field.resting;
+  resting.marks.assign(static_cast<std::size_t>(mesh.owned_cells), 0);
+  resting.runs.clear();
+  std::ranges::copy_if(runs, std::back_inserter(resting.runs), &Run::resting);
+  std::erase_if(runs, [](const Run& run) { return run.resting; });
+  for (const Run& run : resting.runs)
+    resting.marks[static_cast<std::size_t>(run.cell)] = 1;
+  std::ranges::sort(resting.runs, {}, &Run::cell);
+}
+
+namespace
+{
+/// Shape functions and masses of the cells. By symmetry of the rule the mass matrix of a cell has one number on its
+/// diagonal and one elsewhere, and its rows sum up to m / (D + 1).
+template <int D>
+void make_elements(const Mesh<D>& mesh, const Particles<D>& particles, RestingCells<D>& resting)
+{
+  const std::size_t n = resting.runs.size() + lanes;
+  resting.vertices.assign(n, {});
+  for (auto& column : resting.gradient)
+    column.assign(n, 0.0);
+  resting.mass.assign(n, 0.0);
+  resting.own_mass.assign(n, 0.0);
+  Rules<D> rules;
+  for (std::size_t r = 0; r < resting.runs.size(); ++r)
+  {
+    const Run& run = resting.runs[r];
+    resting.vertices[r] = mesh.cells[run.cell];
+    for (int k = 0; k < D; ++k)
+      for (int b = 0; b < D; ++b)
+        resting.gradient[k * D + b][r] = mesh.shapes[run.cell].gradient[k + 1][b];
+    const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
+    resting.mass[r] = particles.mass[run.first] * rule[0][1];
+    resting.own_mass[r] = particles.mass[run.first] * (rule[0][0] - rule[0][1]);
+  }
+}
+
+template <class G, int D = G::dim>
+void sum_nodes(const Mesh<D>& mesh, VelocityField<G>& field)
+{
+  RestingCells<D>& resting = field.resting;
+  resting.sums.assign(mesh.points.size(), {});
+  resting.nodes.clear();
+  for (const Run& run : resting.runs)
+  {
+    const CellMoments<G>& moments = field.moments[run.cell];
+    const CellShape<D>& shape = mesh.shapes[run.cell];
+    for (int k = 0; k <= D; ++k)
+    {
+      const Index node = mesh.cells[run.cell][k];
+      NodeSums<D>& sums = resting.sums[node];
+      if (sums.mass == 0)
+        resting.nodes.push_back(node);
+      sums.mass += moments.mass / (D + 1);
+      const Vector<D> force = internal_force<G>(moments.stress, shape, k);
+      for (int a = 0; a < D; ++a)
+      {
+        sums.momentum[a] += at_vertex<D>(moments.momentum[a], moments.momentum_xi[a], shape.gradient[k]);
+        sums.internal[a] += force[a];
+      }
+    }
+  }
+  std::ranges::sort(resting.nodes);
+}
+} // namespace
+
+template <class G, int D>
+void make_resting_cells(const Mesh<D>& mesh, const Particles<D>& particles, VelocityField<G>& field)
+{
+  RestingCells<D>& resting = field.resting;
+  if (!particles.resting.present)
+    return;
+  make_elements(mesh, particles, resting);
+  sum_nodes(mesh, field);
+  for (auto* values : {&resting.mapped, &resting.change, &resting.displacement})
+    values->assign(mesh.points.size(), {});
+  resting.flip_fraction = 1;
+  resting.is_mapped = resting.is_behind = false;
+  resting.others = {};
+}
+
+template <class G>
+void update_resting_rows(Model<G>& model)
+{
+  constexpr int D = G::dim;
+  VelocityField<G>& field = model.fields.front();
+  RestingCells<D>& resting = field.resting;
+  if (!resting.is_behind)
+    return;
+  const auto change = [&](Index i) -> const Vector<D>& { return resting.change[i]; };
+  const auto displacement = [&](Index i) -> const Vector<D>& { return resting.displacement[i]; };
+  for (const Run& run : resting.runs)
+  {
+    const CellMotion<D> motion{resting.flip_fraction, affine_field<D>(model.mesh, run.cell, change),
+                               affine_field<D>(model.mesh, run.cell, displacement)};
+    move_row<D>(model.particles, run.first, motion);
+    take_row<G>(model.particles, run.first, field.moments[run.cell]);
+  }
+  for (Index node : resting.nodes)
+    resting.change[node] = resting.displacement[node] = {};
+  resting.flip_fraction = 1;
+  resting.is_behind = false;
+}
+
+template <class G>
+void add_resting_sums(VelocityField<G>& field)
+{
+  constexpr int D = G::dim;
+  for (Index i : field.resting.nodes)
+  {
+    NodeSums<D>& node = field.nodes[i];
+    const NodeSums<D>& sums = field.resting.sums[i];
+    node.mass += sums.mass;
+    for (int a = 0; a < D; ++a)
+    {
+      node.momentum[a] += sums.momentum[a];
+      node.internal[a] += sums.internal[a];
+    }
+  }
+}
+
+template <class G>
+const MeshPart& part_of_particles(VelocityField<G>& field)
+{
+  RestingCells<G::dim>& resting = field.resting;
+  if (resting.runs.empty())
+    return field.part;
+  MeshPart& others = resting.others;
+  if (others.cells.size() + resting.runs.size() != field.part.cells.size() ||
+      others.nodes.size() != field.part.nodes.size())
+  {
+    others = field.part;
+    std::erase_if(others.cells, [&](Index c) { return resting.marks[static_cast<std::size_t>(c)] != 0; });
+  }
+  return others;
+}
+
+template <class G>
+void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
+{
+  constexpr int D = G::dim;
+  RestingCells<D>& resting = field.resting;
+  for (Index i : resting.nodes)
+    resting.mapped[i] = {};
+  for (std::size_t r = 0; r < resting.runs.size(); ++r)
+  {
+    const auto& vertices = resting.vertices[r];
+    std::array<Components<D>, D + 1> change;
+    for (int k = 0; k <= D; ++k)
+      change[k] = components<D>(field.velocity_change[vertices[k]]);
+    Components<D> all = change[0];
+    for (int k = 1; k <= D; ++k)
+      all += change[k];
+    all *= resting.mass[r];
+    for (int k = 0; k <= D; ++k)
+    {
+      const Components<D> gained = all + resting.own_mass[r] * change[k];
+      for (int a = 0; a < D; ++a)
+        resting.mapped[vertices[k]][a] += gained[a];
+    }
+  }
+  resting.is_mapped = true;
+  if (momentum.empty())
+    return;
+  for (Index i : resting.nodes)
+    for (int a = 0; a < D; ++a)
+      momentum[i][a] += resting.mapped[i][a];
+}
+
+namespace
+{
+/// Kinetic energy that PIC takes out of a resting cell, whose particles have velocities v + grad v . xi: see
+/// `pic_loss` of particles.
+template <class G, int D = G::dim>
+double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& field, const Mesh<D>& mesh,
+                        const Run& run, double pic_fraction)
+{
+  const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
+  const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
+  Matrix<D> half = gradient_at<D>(particles.velocity_gradient, run.first), change;
+  double sum = 0;
+  for (int a = 0; a < D; ++a)
+  {
+    const double v = particles.velocity[a][run.first], of_centre = pic_fraction * (v - nodal.value[a]);
+    sum += particles.mass[run.first] * of_centre * (v - 0.5 * of_centre);
+    for (int b = 0; b < D; ++b)
+    {
+      change[a][b] = pic_fraction * (half[a][b] - nodal.gradient[a][b]);
+      half[a][b] -= 0.5 * change[a][b];
+    }
+  }
+  return sum + relative_product<D>(change, half, field.moments[run.cell].mass_xixi);
+}
+
+template <class G>
+void add_pic_loss(Model<G>& model, const PassOptions& options)
+{
+  if (options.pic_fraction == 0)
+    return;
+  update_resting_rows(model);
+  const VelocityField<G>& field = model.fields.front();
+  for (const Run& run : field.resting.runs)
+    model.energy.pic_loss += pic_loss_at_rest(model.particles, field, model.mesh, run, options.pic_fraction);
+}
+
+/// The gains of the nodes in a step: momentum, and velocities and displacements that the rows do not know yet.
+template <class G>
+void move_nodes(const PassOptions& options, VelocityField<G>& field)
+{
+  RestingCells<G::dim>& resting = field.resting;
+  if (!resting.is_mapped)
+    map_resting_change<G>(field, {});
+  const double flip = 1 - options.pic_fraction;
+  for (Index i : resting.nodes)
+    for (int a = 0; a < G::dim; ++a)
+    {
+      resting.sums[i].momentum[a] = flip * resting.sums[i].momentum[a] + resting.mapped[i][a];
+      resting.change[i][a] = flip * resting.change[i][a] + field.velocity_change[i][a];
+      resting.displacement[i][a] += options.dt * field.velocity[i][a];
+    }
+  resting.flip_fraction *= flip;
+  resting.is_mapped = false;
+  resting.is_behind = true;
+}
+} // namespace
+
+template <class G>
+void move_resting_nodes(Model<G>& model, const PassOptions& options)
+{
+  add_pic_loss(model, options);
+  move_nodes(options, model.fields.front());
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void take_resting_runs(const Mesh<G::dim>&, std::vector<Run>&, VelocityField<G>&);                          \
+  template void make_resting_cells(const Mesh<G::dim>&, const Particles<G::dim>&, VelocityField<G>&);                  \
+  template void update_resting_rows(Model<G>&);                                                                        \
+  template void add_resting_sums(VelocityField<G>&);                                                                   \
+  template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
+  template void map_resting_change(VelocityField<G>&, std::span<Vector<G::dim>>);                                      \
+  template void move_resting_nodes(Model<G>&, const PassOptions&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::model

@@ -1,0 +1,256 @@
+#include "model/resting_pass.h"
+
+#include "model/law_update.h"
+#include "model/mapping.h"
+#include "model/resting_nodes.h"
+#include "transfer/kinematics.h"
+#include "transfer/resting.h"
+#include "transfer/turn.h"
+
+#include <cmath>
+#include <numeric>
+
+namespace mpm::model
+{
+namespace
+{
+/// Scratch of a batch, in the first-level cache.
+template <int D>
+struct RestingScratch
+{
+  // Per cell, one column per component
+  alignas(64) double gradient[D * D][batch_size + lanes]; ///< of displacement
+  alignas(64) double volumetric[batch_size + lanes];
+  alignas(64) double strain[n_stress<D>][batch_size + lanes];
+};
+
+/// Entries of a column side by side; beyond a batch there are those of the next cells.
+inline Lanes entries(const double* column)
+{
+  Lanes numbers;
+  std::memcpy(&numbers, column, sizeof(Lanes));
+  return numbers;
+}
+
+/// Gradient of the displacement over dt of `lanes` cells.
+template <class G, int D = G::dim>
+std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>& field, double dt, std::size_t first)
+{
+  static_assert(lanes == 4);
+  const auto* v = &field.resting.vertices[first];
+  std::array<std::array<Lanes, D>, D> gradient{};
+  for (int a = 0; a < D; ++a)
+  {
+    const auto at = [&](int k) -> Lanes
+    {
+      return Lanes{field.velocity[v[0][k]][a], field.velocity[v[1][k]][a], field.velocity[v[2][k]][a],
+                   field.velocity[v[3][k]][a]};
+    };
+    const Lanes u = at(0);
+    for (int k = 0; k < D; ++k)
+    {
+      const Lanes relative = dt * (at(k + 1) - u);
+      for (int b = 0; b < D; ++b)
+        gradient[a][b] += relative * entries(&field.resting.gradient[k * D + b][first]);
+    }
+  }
+  return gradient;
+}
+
+/// Calls `change(piece, group)` on consecutive rows of columns, `lanes` of them together, and writes them back.
+template <std::size_t N, class Change>
+void change_rows(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
+{
+  for (Index i = first; i < last; i += lanes)
+  {
+    const int count = std::min<Index>(lanes, last - i);
+    Piece<N> piece = count == lanes ? load(columns, i) : load_few(columns, i, last);
+    change(piece, static_cast<std::size_t>(i - first));
+    for (std::size_t k = 0; k < N; ++k)
+      if (count == lanes)
+        std::memcpy(columns[k] + i, &piece[k], sizeof(Lanes));
+      else
+        for (int l = 0; l < count; ++l)
+          columns[k][i + l] = piece[k][l];
+  }
+}
+
+/// Volumetric strains by nodal mixed discretisation of cells side by side.
+template <class G, int D = G::dim>
+Lanes averaged_strains(const Mesh<D>& mesh, const VelocityField<G>& field, std::size_t first, const Lanes& own)
+{
+  Lanes averaged = own;
+  for (std::size_t l = 0; l < lanes && first + l < field.resting.runs.size(); ++l)
+    averaged[l] = averaged_strain<G>(mesh, field, field.resting.runs[first + l].cell, own[l]);
+  return averaged;
+}
+
+/// Work of stress times volume on the strain of cells side by side, without those beyond the last.
+template <class G, std::size_t N>
+Lanes work(const Piece<N>& stress, const Lanes& volume, const std::array<Lanes, G::n_working>& strain, Index cells)
+{
+  Lanes sum{};
+  for (int k = 0; k < G::n_working; ++k)
+    sum += stress[k] * strain[k];
+  constexpr LaneMask number{0, 1, 2, 3};
+  return number < static_cast<std::int64_t>(cells) ? sum * volume : Lanes{};
+}
+
+/// Strains the cells of a batch: rotates their stresses, grows their volumes, accumulates deviatoric strains, and
+/// leaves the increments in the scratch.
+/// @returns work of the stresses before on the strains
+template <class G, int D = G::dim>
+double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
+                    Particles<D>& particles, RestingScratch<D>& scratch)
+{
+  constexpr int S = n_symmetric<D>;
+  Lanes work_before{};
+  const auto strain_piece = [&](Piece<S + 2>& piece, std::size_t i)
+  {
+    const auto gradient = displacement_gradient(field, options.dt, batch.first_run + i);
+    CellStrain<D, Lanes> strain = strain_increment<D>(gradient, 1);
+    if (options.nmd)
+      set_volumetric<G>(strain, averaged_strains(mesh, field, batch.first_run + i, strain.volumetric));
+    std::array<Lanes, S> increment;
+    for (int k = 0; k < S; ++k)
+    {
+      increment[k] = strain.increment[stress_component<D>[k]];
+      std::memcpy(scratch.strain[stress_component<D>[k]] + i, &increment[k], sizeof(Lanes));
+    }
+    std::memcpy(scratch.volumetric + i, &strain.volumetric, sizeof(Lanes));
+    for (int k = 0; k < D * D; ++k)
+      std::memcpy(scratch.gradient[k] + i, &gradient[k / D][k % D], sizeof(Lanes));
+    work_before += work<G>(piece, piece[S], increment, batch.last - batch.first - static_cast<Index>(i));
+    turn<D>(piece, strain.rotation);
+    piece[S] *= 1 + strain.volumetric;
+    piece[S + 1] += strain.deviatoric;
+  };
+  change_rows(strain_columns(particles), batch.first, batch.last, strain_piece);
+  return sum(work_before);
+}
+
+/// Adds the forces of the stresses of `n` cells, at most `lanes`, to their nodes.
+template <int D>
+void add_forces(const std::array<Lanes, n_symmetric<D>>& stress, std::size_t first, std::size_t n,
+                RestingCells<D>& resting)
+{
+  std::array<std::array<Lanes, D>, D + 1> force{};
+  for (int k = 0; k < D; ++k)
+    for (int b = 0; b < D; ++b)
+    {
+      const Lanes gradient = entries(&resting.gradient[k * D + b][first]);
+      for (int a = 0; a < D; ++a)
+        force[k + 1][a] += stress[symmetric_index<D>(a, b)] * gradient;
+    }
+  for (int k = 1; k <= D; ++k)
+    for (int a = 0; a < D; ++a)
+      force[0][a] -= force[k][a];
+  for (std::size_t l = 0; l < n; ++l)
+    for (int k = 0; k <= D; ++k)
+    {
+      Vector<D>& internal = resting.sums[resting.vertices[first + l][k]].internal;
+      for (int a = 0; a < D; ++a)
+        internal[a] += force[k][a][l];
+    }
+}
+
+/// Sums the forces of the stresses of a batch at the nodes.
+/// @returns work of the stresses on the strains
+template <class G, int D = G::dim>
+double integrate_batch(const Particles<D>& particles, const Batch& batch, const RestingScratch<D>& scratch,
+                       RestingCells<D>& resting)
+{
+  constexpr int S = n_symmetric<D>;
+  std::array<const double*, S + 1> columns;
+  for (int k = 0; k < S; ++k)
+    columns[k] = particles.stress[stress_component<D>[k]].data();
+  columns[S] = particles.volume.data();
+  Lanes work_after{};
+  for (Index row = batch.first; row < batch.last; row += lanes)
+  {
+    const auto i = static_cast<std::size_t>(row - batch.first);
+    const Index count = std::min<Index>(lanes, batch.last - row);
+    const Piece<S + 1> piece = count == lanes ? load(columns, row) : load_few(columns, row, batch.last);
+    std::array<Lanes, S> increment, stress;
+    for (int k = 0; k < S; ++k)
+    {
+      increment[k] = entries(scratch.strain[stress_component<D>[k]] + i);
+      stress[k] = piece[k] * piece[S];
+    }
+    work_after += work<G>(piece, piece[S], increment, count);
+    add_forces<D>(stress, batch.first_run + i, static_cast<std::size_t>(count), resting);
+  }
+  return sum(work_after);
+}
+
+/// Strains and stresses of a batch, their work, and the forces of the stresses.
+template <class G, int D = G::dim>
+void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch, RestingScratch<D>& scratch)
+{
+  VelocityField<G>& field = model.fields.front();
+  model.energy.stress_work += 0.5 * strain_batch(model.mesh, field, options, batch, model.particles, scratch);
+  const double growth = std::accumulate(scratch.volumetric, scratch.volumetric + (batch.last - batch.first), 0.0);
+  if (!std::isfinite(growth))
+    note_failure<D>(model.failure, model.particles, Failure<D>::Kind::not_finite, batch.first, {});
+  const auto deform = [&](const MaterialPoints<D>& material, LawIncrement<D>& columns, PointBatch<D>& points)
+  {
+    const auto gradient = [&](std::size_t r)
+    {
+      Matrix<D> f;
+      for (int k = 0; k < D * D; ++k)
+        f[k / D][k % D] = scratch.gradient[k][r];
+      return f;
+    };
+    give_deformation(
+        material, batch, gradient, [&](std::size_t r) { return scratch.volumetric[r]; }, columns, points);
+  };
+  update_law<G>(model, resting_points(model), options, batch, scratch.strain, deform);
+  model.energy.ahead += 0.5 * integrate_batch<G>(model.particles, batch, scratch, field.resting);
+}
+
+/// Stresses and volumes in the moments of resting cells, for what is averaged or integrated over whole cells.
+template <class G, int D = G::dim>
+void update_moments(const Particles<D>& particles, VelocityField<G>& field)
+{
+  for (const Run& run : field.resting.runs)
+  {
+    CellMoments<G>& moments = field.moments[run.cell];
+    moments.volume = particles.volume[run.first];
+    for (int k = 0; k < G::n_working; ++k)
+      moments.stress[k] = moments.volume * particles.stress[working_component<G>[k]][run.first];
+  }
+}
+} // namespace
+
+template <class G>
+void resting_pass(Model<G>& model, const PassOptions& options)
+{
+  if constexpr (!G::has_hoop)
+  {
+    VelocityField<G>& field = model.fields.front();
+    RestingCells<G::dim>& resting = field.resting;
+    if (resting.runs.empty())
+      return;
+    if (options.move)
+      move_resting_nodes(model, options);
+    if (!options.stress)
+      return;
+    for (Index i : resting.nodes)
+      resting.sums[i].internal = {};
+    RestingScratch<G::dim> scratch{};
+    for (std::size_t r = 0; r < resting.runs.size();)
+    {
+      const Batch batch = next_batch(resting.runs, r);
+      pass_batch(model, options, batch, scratch);
+      r = batch.last_run;
+    }
+    if (options.nmd || field.integration.kind != Integration::particles)
+      update_moments(model.particles, field);
+  }
+}
+
+#define INSTANTIATE(G) template void resting_pass(Model<G>&, const PassOptions&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::model
