@@ -2,6 +2,7 @@
 
 #include "explicit/momentum.h"
 #include "materials/laws/association.h"
+#include "model/absorbing.h"
 #include "model/cell_change.h"
 #include "model/contacts.h"
 #include "model/integration.h"
@@ -61,6 +62,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     sum_shared(exchange, field.nodes);
     find_start_velocity(field);
     add_contact_forces(model, dt, field);
+    add_dashpot_forces(gravity, model.time, dt, field);
     // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
@@ -93,6 +95,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     sum_shared(model.exchange, field.nodes);
     find_start_velocity(field);
     add_contact_forces(model, dt, field);
+    add_dashpot_forces(gravity, model.time, dt, field);
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
@@ -127,6 +130,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   for (VelocityField<G>& field : model.fields)
   {
     add_contact_forces(model, dt, field);
+    add_dashpot_forces(gravity, model.time, dt, field);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
@@ -177,6 +181,8 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   if (model.failure)
     return;
   end_contacts(model, {model.time, dt});
+  for (VelocityField<G>& field : model.fields)
+    move_springs(dt, field);
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();

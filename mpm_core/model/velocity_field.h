@@ -2,6 +2,7 @@
 /// @file
 /// One velocity on the nodes: what the particles that move with it give them, and how they move.
 
+#include "transfer/dashpots.h"
 #include "transfer/dual_domain.h"
 #include "transfer/nodal_mixed_discretisation.h"
 #include "transfer/nodes.h"
@@ -63,6 +64,8 @@ struct VelocityField
 
   // How its nodes move
   std::vector<Support<D>> supports;          ///< its boundary conditions
+  std::vector<DashpotNode<D>> dashpots;      ///< of its absorbing sides, by rising node
+  IncomingWave<D> incoming;                  ///< through them
   std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it

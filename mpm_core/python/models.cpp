@@ -2,6 +2,7 @@
 
 #include "explicit/run.h"
 #include "mesh/search.h"
+#include "model/absorbing.h"
 #include "model/mapping.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
@@ -67,6 +68,10 @@ py::array_t<Index> cells_of(const Mesh<D>& mesh, const py::array& points)
   }
   return cells;
 }
+
+/// Damping, stiffness, force that holds it and displacement of a node on absorbing sides
+template <int D>
+using DashpotEntry = std::tuple<Matrix<D>, Matrix<D>, Vector<D>, Vector<D>>;
 
 /// A row for each cell, a number for each of its vertices.
 template <std::size_t N>
@@ -170,6 +175,39 @@ void bind_model(py::module_& m, const std::string& suffix)
              for (const auto& [tag, whole, vector] : conditions)
                requests.push_back({tag, whole, vector});
              set_supports(model, requests);
+           })
+      .def("set_absorbing_sides",
+           [](M& model, const std::vector<std::tuple<Index, double, double, double>>& given)
+           {
+             std::vector<AbsorbingSide> sides;
+             for (const auto& [tag, normal, shear, thickness] : given)
+               sides.push_back({tag, normal, shear, thickness});
+             set_absorbing_sides(model, sides, gravity_at(model, model.time));
+           })
+      .def("set_incoming_wave",
+           [](M& model, const std::vector<double>& times, const std::vector<double>& velocities,
+              const Vector<D>& direction) { model.fields.front().incoming = {times, velocities, direction}; })
+      .def("dashpots",
+           [](const M& model) // by node over all ranks: damping, stiffness, force that holds it, displacement
+           {
+             std::map<GlobalIndex, DashpotEntry<D>> entries;
+             for (const auto& d : model.fields.front().dashpots)
+               entries[model.mesh.global_nodes[static_cast<std::size_t>(d.node)]] = {d.damping, d.stiffness, d.held,
+                                                                                      d.displacement};
+             return entries;
+           })
+      .def("set_dashpots",
+           [](M& model, const std::map<GlobalIndex, DashpotEntry<D>>& entries)
+           {
+             auto& dashpots = model.fields.front().dashpots;
+             dashpots.clear();
+             for (Index i = 0; i < model.mesh.n_nodes(); ++i)
+               if (const auto found = entries.find(model.mesh.global_nodes[static_cast<std::size_t>(i)]);
+                   found != entries.end())
+               {
+                 const auto& [damping, stiffness, held, displacement] = found->second;
+                 dashpots.push_back({i, damping, stiffness, held, displacement});
+               }
            })
       .def("set_partition", &set_partition<G>)
       .def_readwrite("water", &M::water)

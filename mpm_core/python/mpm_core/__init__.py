@@ -45,6 +45,7 @@ from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
+from .motion import Motion, motion_of_acceleration, read_accelerogram
 from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
@@ -77,6 +78,7 @@ __all__ = [
     "Mesh",
     "Model",
     "MohrCoulomb",
+    "Motion",
     "Newton",
     "Particles",
     "Plane",
@@ -105,7 +107,9 @@ __all__ = [
     "distances",
     "log_preconsolidation",
     "matched_drucker_prager",
+    "motion_of_acceleration",
     "parts",
+    "read_accelerogram",
     "space",
     "tresca",
     "von_mises",

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, partition
 from ._core import Geometry, InputError
+from .absorbing import AbsorbingSides
 from .checks import positive, renamed
 from .collective import collectively
 from .mesh import Mesh, Tag, floats
@@ -43,7 +44,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body(PoreWater, RestingCells):
+class Body(PoreWater, RestingCells, AbsorbingSides):
     """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
@@ -77,6 +78,7 @@ class Body(PoreWater, RestingCells):
         self._velocity_fields = fields or [0] * len(self.laws)
         self._space_watch: SpaceWatch | None = None
         self._water_conditions = []
+        self._absorbing, self._incoming = [], None
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0

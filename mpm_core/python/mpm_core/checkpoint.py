@@ -194,6 +194,7 @@ def _description(model: Model) -> dict[str, Any]:
         "left_imbalance": model._left_imbalance,
         "contacts": model._contacts,
         "water": _water(model),
+        "absorbing": model._absorbing_state(),
         "implicit": None if model._control is None else vars(model._control),
     }
 
@@ -264,3 +265,4 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._control = None
     model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
     collectively(model.comm, lambda: core.set_supports(model._conditions))
+    model._take_absorbing(there.get("absorbing"))

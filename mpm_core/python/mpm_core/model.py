@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from . import checkpoint
 from ._core import Integration, StressUpdate
+from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import positive
 from .collective import collectively
@@ -327,6 +328,7 @@ class Model(Body):
         """
         refuse_contacts(self, "the implicit scheme")
         refuse_resting(self, "the implicit scheme")
+        refuse_absorbing(self, "the implicit scheme")
         self._check_water()
         if nmd:
             refuse_water(self, "nodal mixed discretisation")
@@ -386,6 +388,7 @@ class Model(Body):
         """
         refuse_contacts(self, "equilibrate()")
         refuse_resting(self, "equilibrate()")
+        refuse_absorbing(self, "equilibrate()")
         options = collectively(
             self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
         )

@@ -75,9 +75,12 @@ def take_partition(body: Body, cells: NDArray) -> None:
 
 def take_mesh(body: Body, mesh: Mesh) -> None:
     """Give the model its mesh under another partition, and update all that depends on it. Collective."""
+    absorbing = body._absorbing_state()
     body._core.set_partition(mesh._core)
     body._core.set_supports(body._conditions)
     body.mesh = mesh
+    if absorbing:
+        body._take_absorbing(absorbing)
     body.repartitions += 1
 
 

@@ -1,0 +1,35 @@
+#pragma once
+/// @file
+/// Sides of the mesh that let waves out: dashpots of Lysmer & Kuhlemeyer (1969) with weak springs.
+
+#include "model/model.h"
+
+namespace mpm::model
+{
+/// The ground behind a side, as it acts on it.
+struct AbsorbingSide
+{
+  Index facet_tag;
+  double normal_impedance; ///< rho c_p [kg/(m2 s)]; 0 for that of the soil at the side
+  double shear_impedance;  ///< rho c_s; likewise
+  double thickness; ///< of ground behind that acts as springs (lambda + 2 mu) / thickness and mu / thickness [m];
+                    ///< infinite for none
+};
+
+/// Puts dashpots and springs at the nodes on the facets of soil with the tags of these sides. Forces that hold these
+/// nodes now, under gravity [m/s2], are kept.
+/// @throws InputError on all ranks: several velocity fields, axial symmetry, a side where no soil is
+/// @note Collective
+template <class G>
+void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, const Vector<G::dim>& gravity);
+
+/// Adds the forces of dashpots and springs over a step to the tractions at the nodes of a field: the mean over the step
+/// of the velocity that they lead to, so that no dashpot limits the step.
+/// @pre nodes have the sums of all ranks
+template <class G>
+void add_dashpot_forces(const Vector<G::dim>& gravity, double time, double dt, VelocityField<G>& field);
+
+/// Moves the springs with their nodes.
+template <class G>
+void move_springs(double dt, VelocityField<G>& field);
+} // namespace mpm::model
