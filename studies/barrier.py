@@ -8,7 +8,6 @@ along the plane and away from it.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
@@ -25,12 +24,10 @@ from common.flow_impact import bore
 from common.history import History
 from common.movie import Movie
 from common.options import add_count, add_number, check, study_parser
-from common.page import Page
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
-from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -216,29 +213,26 @@ def main(arguments: list[str] | None = None) -> int:
     model = build(a)
     wall = model.contacts[0]
     result = follow(a, model, a.duration * passage(a), COLUMNS, partial(row, a, wall), folder, shown="force_factor")
-    history, report, scene = result.history, model.report(), scene_of(model, [bridge.BODY])
+    history, scene = result.history, scene_of(model, [bridge.BODY])
     (_, fluid), (_, passive) = bores(a)
     force = full_force(a, history)
-    summary = {
-        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
+    results = {
         "force_N_per_m": None if force is None else force * unit_force(a),
-        "force_of_bore_in_fluid_N_per_m": fluid * unit_force(a),
-        "force_of_bore_in_sand_N_per_m": passive * unit_force(a),
+        "force_of_bore_in_fluid_N_per_m": fluid * unit_force(a), "force_of_bore_in_sand_N_per_m": passive * unit_force(a),
         "largest_force_N_per_m": float(history["force_factor"].max()) * unit_force(a), "velocity_m_per_s": velocity(a),
-        "largest_run_up_m": float(history["run_up_m"].max()), "outflow_mass_kg": report.outflow_mass, "time_s": report.time,
-        "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction,
-        "wall_seconds": perf_counter() - begin,
+        "largest_run_up_m": float(history["run_up_m"].max()), "outflow_mass_kg": model.report().outflow_mass,
     }  # fmt: skip
-    movies = [Movie("flow and wall", scene, result.frames)] if scene is not None else []
-    captions = {"force": "Force on the wall", **body_runs.CAPTIONS}
-    write_summary(folder, a, summary, comm, Page(movies=movies, captions=captions), drawn(a, scene, result, folder))
-    if comm.rank == 0:
-        if result.stopped:
-            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
-        shown = "no bore yet" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
-        print(f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive "
-              f"pressure {1e-3 * passive * unit_force(a):.2f} kN/m\nresults in {folder}")  # fmt: skip
-    return result.exit_code
+    shown = "no bore yet" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
+    said = (
+        f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive pressure "
+        f"{1e-3 * passive * unit_force(a):.2f} kN/m"
+    )
+    return body_runs.write_results(
+        a, model, result, folder, results, said, begin=begin,
+        movies=[Movie("flow and wall", scene, result.frames)] if scene is not None else [],
+        captions={"force": "Force on the wall"},
+        pictures=drawn(a, scene, result, folder),
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

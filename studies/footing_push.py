@@ -9,7 +9,6 @@ the penetration the load goes on rising, as that of a footing that is embedded.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
@@ -17,19 +16,17 @@ from time import perf_counter
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.body_runs import CAPTIONS, MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force
+from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
 from common.movie import Movie
 from common.options import add_choice, add_count, add_number, check, study_parser
-from common.page import Page
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
-from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -198,36 +195,22 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     model = build(a)
     (body,) = model.contacts
-    steps = model.report().particle_steps
-    start = perf_counter()
     result = follow(a, model, duration(a), COLUMNS, partial(row, a, body), folder, shown="load_factor")
-    seconds, report, scene = perf_counter() - start, model.report(), scene_of(model, [1])
-    factor, history = collapse_factor(a, result.history), result.history
-    summary = {
-        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
-        "bearing_capacity_factor": factor, "exact_factor": EXACT[a.shape, a.base],
-        "largest_load_factor": float(history["load_factor"].max()), "settlement_m": history["settlement_m"][-1],
-        "load_factor_in_the_end": history["load_factor"][-1], "time_s": report.time, "steps": report.steps,
-        "unexplained_fraction_of_energy": report.unexplained_fraction,
-        "particle_steps_per_second": (report.particle_steps - steps) / seconds, "wall_seconds": perf_counter() - begin,
+    history, scene = result.history, scene_of(model, [1])
+    factor, exact, name = collapse_factor(a, history), EXACT[a.shape, a.base], f"{a.base} {a.shape} footing"
+    settlement, load = (history[column][-1] for column in ("settlement_m", "load_factor"))
+    results = {
+        "bearing_capacity_factor": factor, "exact_factor": exact, "largest_load_factor": float(history["load_factor"].max()),
+        "settlement_m": settlement, "load_factor_in_the_end": load,
     }  # fmt: skip
-    name = f"{a.base} {a.shape} footing"
-    movies = [Movie(name, scene, result.frames)] if scene is not None else []
-    write_summary(
-        folder,
-        a,
-        summary,
-        comm,
-        Page(movies=movies, captions={"load": "Load over area and shear strength, over the settlement", **CAPTIONS}),
-        drawn(a, scene, result, folder),
-    )
-    if comm.rank == 0:
-        if result.stopped:
-            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
-        shown = "not reached" if factor is None else f"{factor:.2f}"
-        print(f"{name}: N_c {shown}, exact {EXACT[a.shape, a.base]:.2f}; load factor {history['load_factor'][-1]:.2f} at a "
-              f"settlement of {history['settlement_m'][-1]:.3g} m\nresults in {folder}")  # fmt: skip
-    return result.exit_code
+    shown = "not reached" if factor is None else f"{factor:.2f}"
+    said = f"{name}: N_c {shown}, exact {exact:.2f}; load factor {load:.2f} at a settlement of {settlement:.3g} m"
+    return write_results(
+        a, model, result, folder, results, said, begin=begin,
+        movies=[Movie(name, scene, result.frames)] if scene is not None else [],
+        captions={"load": "Load over area and shear strength, over the settlement"},
+        pictures=drawn(a, scene, result, folder),
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

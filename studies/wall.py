@@ -8,7 +8,6 @@ plane wedge (Coulomb 1776), which is not. Sand that does not dilate may not make
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
@@ -25,12 +24,10 @@ from common.files import OutputError
 from common.history import History
 from common.movie import Movie
 from common.options import add_choice, add_count, add_number, check, study_parser
-from common.page import Page
 from common.plots import CURVES, GREY, Scene, paper_style
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
-from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -256,27 +253,25 @@ def main(arguments: list[str] | None = None) -> int:
     model = build(a)
     wall = model.contacts[0]
     result = follow(a, model, end(a), COLUMNS, partial(row, a, wall), folder, shown="coefficient", since=at_rest(a))
-    history, report, scene = result.history, model.report(), scene_of(model, [bridge.BODY])
+    history, scene = result.history, scene_of(model, [bridge.BODY])
     coefficient, friction = (in_the_end(a, history, name) for name in ("coefficient", "wall_friction"))
+    moved = history["wall_displacement_m"][-1]
     field, wedge = bounds(a)
-    summary = {
-        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles,
+    results = {
         "coefficient_in_the_end": coefficient, "coefficient_by_stress_field": field, "coefficient_by_plane_wedge": wedge,
-        "coefficient_at_rest": history["coefficient"][0], "wall_displacement_m": history["wall_displacement_m"][-1],
-        "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), "time_s": report.time,
-        "steps": report.steps, **accelerations(a, history), "unexplained_fraction_of_energy": report.unexplained_fraction,
-        "wall_seconds": perf_counter() - begin,
+        "coefficient_at_rest": history["coefficient"][0], "wall_displacement_m": moved,
+        "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), **accelerations(a, history),
     }  # fmt: skip
-    movies = [Movie(f"{a.motion} wall", scene, result.frames)] if scene is not None else []
-    captions = {"pressure": "Coefficient of the horizontal earth pressure on the wall", **body_runs.CAPTIONS}
-    write_summary(folder, a, summary, comm, Page(movies=movies, captions=captions), drawn(a, scene, result, folder))
-    if comm.rank == 0:
-        if result.stopped:
-            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
-        print(f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane "
-              f"wedge {wedge:.3f}; the wall moved by {abs(history['wall_displacement_m'][-1]):.3g} m\n"
-              f"results in {folder}")  # fmt: skip
-    return result.exit_code
+    said = (
+        f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane wedge "
+        f"{wedge:.3f}; the wall moved by {abs(moved):.3g} m"
+    )
+    return body_runs.write_results(
+        a, model, result, folder, results, said, begin=begin,
+        movies=[Movie(f"{a.motion} wall", scene, result.frames)] if scene is not None else [],
+        captions={"pressure": "Coefficient of the horizontal earth pressure on the wall"},
+        pictures=drawn(a, scene, result, folder),
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

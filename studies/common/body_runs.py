@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -20,13 +22,15 @@ from .checkpoint import Checkpoints, add_checkpoint_options, numbered
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
-from .movie import gathered, own_frame
+from .movie import Movie, gathered, own_frame
 from .notes import notes_of
 from .options import Options, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
+from .page import Page
 from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from .progress import Progress
 from .schemes import add_pic
+from .summary import write_summary
 
 MAY_CHANGE = {
     "damping", "pic", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film", "rebalance"
@@ -57,6 +61,7 @@ class BodyRun:
     frames: list[dict] = field(default_factory=list)
     stopped: str | None = None
     exit_code: int = 0
+    particle_steps_per_second: float = 0.0
 
 
 def follow(
@@ -86,6 +91,7 @@ def follow(
     particles, mesh, bodies = (comm.bcast(numbered(folder, name, again)) for name in ("particles", "mesh", "bodies"))
     probes = [ProbeFile(folder / f"body_{k}.csv", contact, keep=again) for k, contact in enumerate(model.contacts)]
     kept: list[dict[str, np.ndarray]] = []
+    start, steps = perf_counter(), model.report().particle_steps
     with (
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", columns, comm, keep_before=model.time if again else None) as history,
@@ -130,6 +136,7 @@ def follow(
                     break
         except mpm.RunError as error:
             result.stopped = str(error)
+        result.particle_steps_per_second = (model.report().particle_steps - steps) / (perf_counter() - start)
         for probe in probes:
             probe.close()
         frames = [gathered(comm, frame) for frame in kept]
@@ -157,6 +164,46 @@ def body_pictures(a: Namespace, scene: Scene | None, result: BodyRun, folder: Pa
     if a.film:
         pictures["film"] = partial(save_animation, folder / "film", scene, film_frames(result.frames), SHEAR_STRAIN)
     return pictures
+
+
+def write_results(
+    a: Options,
+    model: mpm.Model,
+    result: BodyRun,
+    folder: Path,
+    results: Mapping[str, object],
+    said: str,
+    *,
+    begin: float,
+    movies: Sequence[Movie],
+    captions: Mapping[str, str],
+    pictures: Pictures,
+) -> int:
+    """Write the summary, pictures and page of a run, and say what came of it. Collective.
+
+    Args:
+        results: of this study, by name; what all such runs have is added.
+        said: the line at the end.
+        begin: when the study began, by ``perf_counter`` [s].
+        captions: of the study's own pictures.
+
+    Returns:
+        The exit code.
+    """
+    report = model.report()
+    summary = {
+        "finished_run": result.stopped is None, "stopped_because": result.stopped, "particles": report.particles, **results,
+        "time_s": report.time, "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction,
+        "particle_steps_per_second": result.particle_steps_per_second, "wall_seconds": perf_counter() - begin,
+    }  # fmt: skip
+    write_summary(
+        folder, a, summary, model.comm, Page(movies=list(movies), captions={**captions, **CAPTIONS}), pictures
+    )
+    if model.comm.rank == 0:
+        if result.stopped:
+            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
+        print(f"{said}\nresults in {folder}")
+    return result.exit_code
 
 
 def scheme(a: Namespace) -> dict[str, Any]:
