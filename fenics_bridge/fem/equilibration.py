@@ -51,8 +51,8 @@ class Solver:
 
 
 PRACTICE = Solver(tolerance=1e-2, relaxed_tolerance=1e-2)
-"""Accepts an out-of-balance ratio of 1 %, as is customary in practice. Factors of safety become some per cent higher, and more where
-the soil that fails is a small part of the body, because the ratio is over the forces of all of it."""
+"""Accepts an out-of-balance ratio of 1 %, as is customary in practice. Factors of safety become some per cent higher, and more
+where the soil that fails is a small part of the body, because the ratio is over the forces of all of it."""
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,8 @@ class SpaceWatch:
         if volumes.filled < LEAST_FILLED * volumes.particles:
             warnings.warn(
                 f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
-                f"{self._model.time:.6g} s: they crowd in some cells, and space is lost. integration=MIXED keeps more of it than PARTICLES",
+                f"{self._model.time:.6g} s: they crowd in some cells, and space is lost. integration=MIXED keeps more of it "
+                "than PARTICLES",
                 RuntimeWarning,
                 stacklevel=5,
             )
