@@ -39,13 +39,13 @@ from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
+from .motion import Motion, motion_of_acceleration, read_accelerogram
 from .newton import Newton
 from .parameter_fields import RandomField
 from .particles import Particles
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
-from .motion import Motion, motion_of_acceleration, read_accelerogram
 from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space

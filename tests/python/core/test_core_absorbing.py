@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import box, by_id, moduli, rollers, run
+from core_cases import box, by_id, moduli, run
 
 import mpm_core as mpm
 
