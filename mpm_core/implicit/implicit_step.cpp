@@ -41,6 +41,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   field.integration.averaged_by_law.assign(options.average_stress ? model.laws.size() : 0, 1.0);
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
+  field.has_light_nodes = false; // the equations give them velocities, too
   if (options.quasi_static)
     std::ranges::fill(field.start_velocity, Vector<G::dim>{});
   make_halos_once(model.mesh, model.exchange, step);

@@ -1,5 +1,6 @@
 #include "model/integration.h"
 
+#include "model/mapping.h"
 #include "transfer/affine_field.h"
 
 #include <algorithm>
@@ -126,9 +127,9 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
                              Index cell)
 {
   constexpr int D = G::dim;
-  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
   const DualWeights<D> weights = dual_weights<D>(mesh.shapes[cell], position);
-  Matrix<D> gradient = affine_field<D>(mesh, cell, velocity).gradient;
+  const auto velocity = [&](int k) { return velocity_of_vertex(mesh, field, cell, k); };
+  Matrix<D> gradient = affine_field_of_vertices<D>(mesh.shapes[cell], velocity).gradient;
   if (!field.integration.whole[cell])
     return gradient;
   for (int a = 0; a < D; ++a)

@@ -146,10 +146,15 @@ void map_to_nodes(Model<G>& model)
 template <class G>
 void find_start_velocity(VelocityField<G>& field)
 {
+  field.has_light_nodes = false;
   for (Index i : field.part.nodes)
+  {
+    const NodeSums<G::dim>& node = field.nodes[i];
+    const bool is_light = !(node.mass > field.least_mass);
+    field.has_light_nodes |= is_light;
     for (int a = 0; a < G::dim; ++a)
-      field.start_velocity[i][a] =
-          field.nodes[i].mass > field.least_mass ? field.nodes[i].momentum[a] / field.nodes[i].mass : 0;
+      field.start_velocity[i][a] = is_light ? 0 : node.momentum[a] / node.mass;
+  }
   for (const auto& support : field.supports)
     impose<G::dim>(support, field.start_velocity[support.node]);
 }
@@ -174,7 +179,7 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
     double divergence = 0;
     for (int k = 0; k <= D; ++k)
     {
-      const Vector<D>& v = field.velocity[mesh.cells[c][k]];
+      const Vector<D> v = velocity_of_vertex(mesh, field, c, k);
       divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
       if constexpr (G::has_hoop)
         divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);

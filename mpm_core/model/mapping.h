@@ -27,7 +27,32 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
 template <class G>
 void map_to_nodes(Model<G>& model);
 
+/// The velocity by which a vertex strains a cell: that of its node, or, where the node has no mass to have a velocity
+/// of its own, the mean of the other vertices. Particles are then within round-off of the facet opposite to the node;
+/// they would be strained at once if it stood still.
+template <class G, int D = G::dim>
+Vector<D> velocity_of_vertex(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, int k)
+{
+  const auto& nodes = mesh.cells[cell];
+  const auto is_light = [&](Index node) { return !(field.nodes[node].mass > field.least_mass); };
+  if (!field.has_light_nodes || !is_light(nodes[k]))
+    return field.velocity[nodes[k]];
+  Vector<D> mean{};
+  int heavy = 0;
+  for (Index node : nodes)
+    if (!is_light(node))
+    {
+      ++heavy;
+      for (int a = 0; a < D; ++a)
+        mean[a] += field.velocity[node][a];
+    }
+  for (double& component : mean)
+    component /= std::max(heavy, 1);
+  return mean;
+}
+
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.
+/// @post field.has_light_nodes
 template <class G>
 void find_start_velocity(VelocityField<G>& field);
 

@@ -61,6 +61,7 @@ struct VelocityField
   CellIntegration<D> integration;
   std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
   double least_mass = 0;                ///< nodes below this mass are not moved [kg]
+  bool has_light_nodes = false;         ///< whether there are such nodes in this explicit step
 
   // How its nodes move
   std::vector<Support<D>> supports;          ///< its boundary conditions

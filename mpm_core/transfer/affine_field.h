@@ -20,21 +20,20 @@ template <int D>
     return Lanes{v[0], v[1], v[2], 0};
 }
 
-/// The field that nodal values have inside a cell.
-/// @param nodal  value of node i, a callable Index -> const Vector<D>&
-template <int D, class Nodal>
-inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
+/// The field that values at the vertices have inside a cell.
+/// @param at_vertex  value of vertex k, a callable int -> Vector<D>
+template <int D, class AtVertex>
+inline AffineField<D> affine_field_of_vertices(const CellShape<D>& shape, AtVertex&& at_vertex)
 {
-  const auto& nodes = mesh.cells[cell];
-  const auto& gradient = mesh.shapes[cell].gradient;
+  const auto& gradient = shape.gradient;
   // Begun with the first vertex: g++ would set an array of vectors to zero in memory.
-  Components<D> value = components<D>(nodal(nodes[0]));
+  Components<D> value = components<D>(at_vertex(0));
   std::array<Components<D>, D> by; // derivative by each coordinate
   for (int b = 0; b < D; ++b)
     by[b] = value * gradient[0][b];
   for (int k = 1; k <= D; ++k)
   {
-    const Components<D> u = components<D>(nodal(nodes[k]));
+    const Components<D> u = components<D>(at_vertex(k));
     value += u;
     for (int b = 0; b < D; ++b)
       by[b] += u * gradient[k][b];
@@ -47,5 +46,14 @@ inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& noda
       field.gradient[a][b] = by[b][a];
   }
   return field;
+}
+
+/// The field that nodal values have inside a cell.
+/// @param nodal  value of node i, a callable Index -> const Vector<D>&
+template <int D, class Nodal>
+inline AffineField<D> affine_field(const Mesh<D>& mesh, Index cell, Nodal&& nodal)
+{
+  const auto& nodes = mesh.cells[cell];
+  return affine_field_of_vertices<D>(mesh.shapes[cell], [&](int k) -> const Vector<D>& { return nodal(nodes[k]); });
 }
 } // namespace mpm::transfer
