@@ -97,7 +97,7 @@ def test_wrong_fields_of_a_model_are_named_before_files_are_made(comm, shared_pa
     model = small_model(comm)
     particles, mesh = shared_path / "particles", shared_path / "mesh"
     wrong = [
-        ({}, "particles and mesh are None, expected a path for one of them at least"),
+        ({}, "particles, mesh and bodies are None, expected a path for one of them at least"),
         ({"particles": particles, "particle_fields": ["weight"]}, "particle field is 'weight', which does not exist"),
         ({"particles": particles, "particle_fields": ["traction"]}, "'traction', but no particle carries one"),
         ({"mesh": mesh, "nodal_fields": ["weight"]}, "nodal field is 'weight', expected velocity"),
