@@ -38,11 +38,10 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
       prefetch(mesh.shapes[next]);
       prefetch(field.moments[next]);
     }
-    const AffineField<D> fields[]{
-        affine_field<D>(mesh, cell, change),
-        field.has_light_nodes ? affine_field_of_vertices<D>(mesh.shapes[cell], [&](int k)
-                                                            { return velocity_of_vertex(mesh, field, cell, k); })
-                              : affine_field<D>(mesh, cell, velocity)};
+    AffineField<D> fields[]{affine_field<D>(mesh, cell, change), affine_field<D>(mesh, cell, velocity)};
+    if (field.has_light_nodes) [[unlikely]]
+      fields[1] = affine_field_of_vertices<D>(mesh.shapes[cell],
+                                              [&](int k) { return velocity_of_vertex(mesh, field, cell, k); });
     scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, fields[0], scaled<D>(fields[1], options.dt)};
   }
 }

@@ -144,16 +144,34 @@ void map_to_nodes(Model<G>& model)
 }
 
 template <class G>
+Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell)
+{
+  constexpr int D = G::dim;
+  Vector<D> mean{};
+  int heavy = 0;
+  for (Index node : mesh.cells[cell])
+    if (!is_light(field, node))
+    {
+      ++heavy;
+      for (int a = 0; a < D; ++a)
+        mean[a] += field.velocity[node][a];
+    }
+  for (double& component : mean)
+    component /= std::max(heavy, 1);
+  return mean;
+}
+
+template <class G>
 void find_start_velocity(VelocityField<G>& field)
 {
   field.has_light_nodes = false;
   for (Index i : field.part.nodes)
   {
     const NodeSums<G::dim>& node = field.nodes[i];
-    const bool is_light = !(node.mass > field.least_mass);
-    field.has_light_nodes |= is_light;
+    const bool light = is_light(field, i);
+    field.has_light_nodes |= light;
     for (int a = 0; a < G::dim; ++a)
-      field.start_velocity[i][a] = is_light ? 0 : node.momentum[a] / node.mass;
+      field.start_velocity[i][a] = light ? 0 : node.momentum[a] / node.mass;
   }
   for (const auto& support : field.supports)
     impose<G::dim>(support, field.start_velocity[support.node]);
@@ -208,6 +226,7 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
   template void particles_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                       \
                                    const std::vector<Run>&, VelocityField<G>&);                                        \
   template void map_to_nodes(Model<G>&);                                                                               \
+  template Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>&, const VelocityField<G>&, Index);                    \
   template void find_start_velocity(VelocityField<G>&);                                                                \
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
   template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \

@@ -27,28 +27,27 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
 template <class G>
 void map_to_nodes(Model<G>& model);
 
-/// The velocity by which a vertex strains a cell: that of its node, or, where the node has no mass to have a velocity
-/// of its own, the mean of the other vertices. Particles are then within round-off of the facet opposite to the node;
-/// they would be strained at once if it stood still.
-template <class G, int D = G::dim>
-Vector<D> velocity_of_vertex(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, int k)
+/// Whether a node has too little mass to have a velocity of its own.
+template <class G>
+inline bool is_light(const VelocityField<G>& field, Index node)
 {
-  const auto& nodes = mesh.cells[cell];
-  const auto is_light = [&](Index node) { return !(field.nodes[node].mass > field.least_mass); };
-  if (!field.has_light_nodes || !is_light(nodes[k]))
-    return field.velocity[nodes[k]];
-  Vector<D> mean{};
-  int heavy = 0;
-  for (Index node : nodes)
-    if (!is_light(node))
-    {
-      ++heavy;
-      for (int a = 0; a < D; ++a)
-        mean[a] += field.velocity[node][a];
-    }
-  for (double& component : mean)
-    component /= std::max(heavy, 1);
-  return mean;
+  return !(field.nodes[node].mass > field.least_mass);
+}
+
+/// Mean velocity of the nodes of a cell that are not light.
+template <class G>
+Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell);
+
+/// The velocity by which a vertex strains a cell: that of its node, or, where the node is light, the mean of the other
+/// vertices. Particles are then within round-off of the facet opposite to the node; they would be strained at once if
+/// it stood still.
+template <class G>
+inline Vector<G::dim> velocity_of_vertex(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell, int k)
+{
+  const Index node = mesh.cells[cell][k];
+  if (field.has_light_nodes && is_light(field, node)) [[unlikely]]
+    return mean_of_heavy_nodes(mesh, field, cell);
+  return field.velocity[node];
 }
 
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.

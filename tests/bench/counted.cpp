@@ -42,18 +42,12 @@ Model<Cartesian<D>> heap(int n, int per_cell)
 }
 
 template <class G>
-double critical(const Model<G>& model)
-{
-  return critical_time_step(model.mesh, material_points(model), model.exchange.comm);
-}
-
-template <class G>
 void run_explicit(Model<G> model, bool mixed, int steps)
 {
   ExplicitOptions options;
   options.damping = 0.75;
   options.nmd = mixed;
-  const double dt = 0.5 * critical(model);
+  const double dt = 0.5 * critical_time_step(model);
   for (int step = 0; step < steps; ++step)
     explicit_step(model, options, dt);
 }
@@ -64,7 +58,7 @@ void assemble(Model<G> model)
   ImplicitStep<G> step;
   ImplicitSystem<G::dim> system;
   TangentEntries tangent;
-  start_step(model, step, ImplicitOptions{}, 20 * critical(model));
+  start_step(model, step, ImplicitOptions{}, 20 * critical_time_step(model));
   number_nodes(model.exchange, model.fields.front(), step, system);
   find_residual(model, step, true);
   find_tangent(model.mesh, model.fields.front(), step, system, tangent);
