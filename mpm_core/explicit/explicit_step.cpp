@@ -202,7 +202,7 @@ void add_squares(const VelocityField<G>& field, std::span<const unsigned char> o
     while (support != field.supports.end() && support->node < static_cast<Index>(i))
       ++support;
     const NodeSums<D>& node = field.nodes[i];
-    if (!owned[i] || !(node.mass > field.least_mass))
+    if (!owned[i] || is_light(field, static_cast<Index>(i)))
       continue;
     Vector<D> external, unbalanced;
     for (int a = 0; a < D; ++a)

@@ -11,7 +11,7 @@ void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt,
   for (Index i : field.part.nodes)
   {
     const NodeSums<D>& node = field.nodes[i];
-    const double per_mass = node.mass > field.least_mass ? 1 / node.mass : 0;
+    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
     for (int a = 0; a < D; ++a)
     {
       const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
@@ -46,7 +46,7 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field)
   for (Index i : field.part.nodes)
   {
     const auto& node = field.nodes[i];
-    const double per_mass = node.mass > field.least_mass ? 1 / node.mass : 0;
+    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
     for (int a = 0; a < G::dim; ++a)
       field.velocity[i][a] = (flip_fraction * node.momentum[a] + field.velocity[i][a]) * per_mass;
   }
@@ -64,7 +64,7 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
   for (Index i : field.part.nodes)
   {
     const NodeSums<D>& node = field.nodes[i];
-    if (!owned[i] || !(node.mass > field.least_mass))
+    if (!owned[i] || is_light(field, i))
       continue;
     const Vector<D>& start = field.start_velocity[i];
     for (int a = 0; a < D; ++a)

@@ -87,15 +87,6 @@ Vector<D> residual_of(const NodeSums<D>& node, const Vector<D>& gravity)
     residual[a] = node.traction[a] + node.mass * gravity[a] - node.internal[a];
   return residual;
 }
-
-template <int D>
-Vector<D> applied(const Matrix<D>& matrix, const Vector<D>& v)
-{
-  Vector<D> result;
-  for (int i = 0; i < D; ++i)
-    result[i] = dot<D>(matrix[i], v);
-  return result;
-}
 } // namespace
 
 template <class G>
@@ -140,14 +131,14 @@ void add_dashpot_forces(const Vector<G::dim>& gravity, double time, double dt, V
   for (const DashpotNode<D>& dashpot : field.dashpots)
   {
     NodeSums<D>& node = field.nodes[dashpot.node];
-    if (!(node.mass > field.least_mass))
+    if (is_light(field, dashpot.node))
       continue;
     // m a = R + f,  f = held - K u - C (v + dt a / 2 - 2 v_in)
     Vector<D> against;
     for (int a = 0; a < D; ++a)
       against[a] = field.start_velocity[dashpot.node][a] - 2 * incoming[a];
-    const Vector<D> drag = applied<D>(dashpot.damping, against),
-                    spring = applied<D>(dashpot.stiffness, dashpot.displacement),
+    const Vector<D> drag = product<D>(dashpot.damping, against),
+                    spring = product<D>(dashpot.stiffness, dashpot.displacement),
                     residual = residual_of<D>(node, gravity);
     Eigen::Matrix<double, D, D> inertia = 0.5 * dt * as_eigen<D>(dashpot.damping);
     Eigen::Matrix<double, D, 1> force;

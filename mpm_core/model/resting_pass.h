@@ -6,8 +6,8 @@
 
 namespace mpm::model
 {
-/// Moves resting cells with their nodes, whose gains rows are told later, strains them, updates their stresses, and
-/// sums the forces of these at the nodes, for the next step.
+/// Moves resting cells with their nodes, whose gains their rows learn of later, strains them, updates their stresses,
+/// and sums the forces of these at the nodes, for the next step.
 template <class G>
 void resting_pass(Model<G>& model, const PassOptions& options);
 } // namespace mpm::model
