@@ -23,7 +23,7 @@ from common.files import OutputError
 from common.flow_impact import bore
 from common.history import History
 from common.movie import Movie
-from common.options import add_count, add_number, check, study_parser
+from common.options import add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
 from common.results import open_results
@@ -69,7 +69,6 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--cell-size", 0.125, "-", "side of the squares, of two triangles each, over the depth", above=0, at_most=0.5
     )
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     body_runs.add_body_run_options(p, damping=0.0, pic=0.05, nmd=False, frames=48)
     return p
 

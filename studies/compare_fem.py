@@ -24,6 +24,7 @@ from common.page import Page
 from common.plots import Quantity
 from common.ranks import run_study
 from common.results import open_results
+from common.schemes import add_particles_per_cell
 from common.slope_case import (
     GRAVITY,
     SUPPORTS,
@@ -58,7 +59,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_geometry_options(p, cell_size=0.05)
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
-    add_count(p, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_particles_per_cell(p, 10)
     add_soil_options(p, dilation_angle=None)
     add_choice(
         p,

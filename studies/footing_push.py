@@ -22,7 +22,7 @@ from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
 from common.movie import Movie
-from common.options import add_choice, add_count, add_number, check, study_parser
+from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
 from common.results import ROOT, open_results
@@ -69,7 +69,6 @@ def parser() -> ArgumentParser:
     add_number(p, "--cell-size", 0.02, "m", "cells along the way of the footing's edge", above=0)
     add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that; those far away have four times "
                "as much", at_least=1)  # fmt: skip
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
 

@@ -23,7 +23,7 @@ from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
 from common.movie import Movie
-from common.options import add_choice, add_count, add_number, check, study_parser
+from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, GREY, Scene, paper_style
 from common.ranks import run_study
 from common.results import open_results
@@ -63,7 +63,6 @@ def parser() -> ArgumentParser:
     add_number(p, "--support", 0.5, "-", "force on a free wall in the end, over the active force", at_least=0)
     add_number(p, "--wall-mass", 0.2, "-", "mass of a free wall, over that of a square of sand as high", above=0)
     add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height", above=0, at_most=0.25)
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
     body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=40)
     return p
 

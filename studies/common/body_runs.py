@@ -29,7 +29,7 @@ from .output_options import add_output_options, add_picture_options, check_frame
 from .page import Page
 from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from .progress import Progress
-from .schemes import add_pic
+from .schemes import add_particles_per_cell, add_pic
 from .summary import write_summary
 
 MAY_CHANGE = {
@@ -41,7 +41,8 @@ CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displaceme
 
 
 def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
-    """Options of the explicit run, of its files and of its checkpoints."""
+    """Options of the particles, of their explicit run, of its files and of its checkpoints."""
+    add_particles_per_cell(p, 6)
     add_number(p, "--damping", damping, "-", "local damping", at_least=0, below=1)
     add_pic(p, pic)
     add_switch(p, "--nmd", nmd, "average volumetric strains over nodes, against locking")

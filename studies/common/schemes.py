@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import mpm_core as mpm
 
-from .options import add_choice, add_number, add_switch, check
+from .options import add_choice, add_count, add_number, add_switch, check
 
 SCHEMES = ("explicit", "implicit", "quasi-static")
 SOLVERS = ("newton", "relaxation")
@@ -28,6 +28,13 @@ def add_scheme_options(parser: argparse.ArgumentParser) -> None:
     add_discretisation(parser)
     add_number(parser, "--dt", None, "s", "longest time step (default: half of the critical one; 20 times the critical "
                "one where implicit or quasi-static)", above=0)  # fmt: skip
+
+
+def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> None:
+    """Option ``--particles-per-cell``."""
+    add_count(
+        parser, "--particles-per-cell", default, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ..."
+    )
 
 
 def add_pic(parser: argparse.ArgumentParser, default: float) -> None:

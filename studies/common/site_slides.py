@@ -28,7 +28,7 @@ from .plots import DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, save_history, sa
 from .progress import Progress
 from .results import open_results
 from .scenes import scene_of
-from .schemes import add_pic
+from .schemes import add_particles_per_cell, add_pic
 from .site_file import read_site
 from .summary import write_summary
 
@@ -56,7 +56,7 @@ def add_strength_factor(parser: ArgumentParser) -> None:
 def add_slide_options(parser: ArgumentParser, damping: float, pic: float) -> None:
     """Options of a slide of particles, with the defaults of local damping and PIC."""
     p = parser
-    add_count(p, "--particles-per-cell", 6, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_particles_per_cell(p, 6)
     add_number(p, "--damping", damping, "-", "local damping of the slide", at_least=0, below=1)
     add_pic(p, pic)
     add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")

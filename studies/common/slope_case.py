@@ -12,9 +12,10 @@ from mpm_core.probes import nearest_particle
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .options import add_choice, add_count, add_number, check
+from .options import add_choice, add_number, check
 from .plots import Scene
 from .scenes import scene_of
+from .schemes import add_particles_per_cell
 from .soils import add_law_options, add_parameter, law_of
 
 GRAVITY = 9.81
@@ -27,7 +28,7 @@ def add_slope_options(parser: argparse.ArgumentParser) -> None:
     """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6."""
     add_geometry_options(parser, cell_size=0.1)
     add_number(parser, "--runout-length", 2.0, "m", "background mesh beyond the toe", above=0)
-    add_count(parser, "--particles-per-cell", 10, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...")
+    add_particles_per_cell(parser, 10)
     add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
     add_soil_options(parser, dilation_angle=0.0)
     add_law_options(parser)
