@@ -13,6 +13,9 @@
 #include "python/nodal_field.h"
 #include "python/particle_columns.h"
 
+#include <limits>
+#include <optional>
+
 namespace mpm::python
 {
 namespace
@@ -169,11 +172,16 @@ void bind_model(py::module_& m, const std::string& suffix)
              return load_facets<G>(model.mesh, facet_tag, traction, model.particles);
            })
       .def("set_supports",
-           [](M& model, const std::vector<std::tuple<Index, bool, Vector<D>>>& conditions)
+           [](M& model, const std::vector<std::tuple<Index, bool, std::array<std::optional<double>, D>>>& conditions)
            {
              std::vector<SupportRequest<D>> requests;
-             for (const auto& [tag, whole, vector] : conditions)
+             for (const auto& [tag, whole, components] : conditions)
+             {
+               Vector<D> vector;
+               for (int a = 0; a < D; ++a)
+                 vector[a] = components[a].value_or(std::numeric_limits<double>::quiet_NaN());
                requests.push_back({tag, whole, vector});
+             }
              set_supports(model, requests);
            })
       .def("set_absorbing_sides",

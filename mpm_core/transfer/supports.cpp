@@ -73,6 +73,8 @@ std::vector<Support<G::dim>> make_supports(const Mesh<G::dim>& mesh, NodeExchang
         Vector<D> normal = request.vector;
         if (request.whole)
         {
+          if (std::isnan(request.vector[i]))
+            continue;
           normal = {};
           normal[i] = 1;
         }

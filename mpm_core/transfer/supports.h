@@ -18,12 +18,12 @@ struct Support
   std::array<double, D> value; ///< [m/s]
 };
 
-/// One boundary condition for all nodes on facets with a tag: v . normal = value, or the whole velocity.
+/// One boundary condition for all nodes on facets with a tag: v . normal = 0, or components of the velocity.
 template <int D>
 struct SupportRequest
 {
   Index facet_tag;
-  bool whole; ///< true: `vector` is the prescribed velocity; false: v . vector = 0 (roller)
+  bool whole; ///< true: `vector` is the prescribed velocity, NaN where free; false: v . vector = 0 (roller)
   Vector<D> vector;
 };
 

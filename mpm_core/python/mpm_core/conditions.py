@@ -14,8 +14,9 @@ from .checks import positive
 from .collective import collectively
 from .mesh import Mesh, Tag, floats
 
-Condition: TypeAlias = tuple[int, bool, list[float]]
-"""Facet tag; whether the whole velocity is prescribed or only its part along a normal; that velocity or normal"""
+Condition: TypeAlias = tuple[int, bool, list[float | None]]
+"""Facet tag; whether components of the velocity are prescribed or its part along a normal is zero; those components, None where
+free, or the normal"""
 
 
 class Conditions:
@@ -34,10 +35,13 @@ class Conditions:
         self._conditions = conditions
 
     def _support(
-        self, facet_tag: Tag, whole: bool, vector: ArrayLike, name: str, *, replaced: Sequence[Any] = ()
+        self, facet_tag: Tag, whole: bool, vector: Any, name: str, *, replaced: Sequence[Any] = ()
     ) -> list[Condition]:
         def checked() -> list[Condition]:
-            components = [float(x) for x in floats(name, vector, (self.mesh.dim,))]
+            given = np.array(vector, dtype=object)
+            free = np.array([whole and value is None for value in given.ravel()])
+            values = floats(name, np.where(free, 0.0, given).tolist(), (self.mesh.dim,))
+            components = [None if is_free else float(value) for is_free, value in zip(free, values)]
             return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
 
         new = collectively(self.comm, checked)
@@ -53,8 +57,16 @@ class Conditions:
         """Put the nodes on facets with this tag on rollers: they move at right angles to ``normal``, a vector of any length."""
         self._support(facet_tag, False, normal, "normal")
 
-    def prescribe(self, facet_tag: Tag, velocity: ArrayLike) -> None:
-        """Prescribe the velocity [m/s] of the nodes on facets with this tag, shape (D,). A further call changes it."""
+    def prescribe(self, facet_tag: Tag, velocity: Sequence[float | None] | NDArray) -> None:
+        """Prescribe the velocity of the nodes on facets with this tag. A further call changes it.
+
+        Args:
+            facet_tag: number or name.
+            velocity: components [m/s], shape (D,); None leaves one free, so that (None, -0.1) is a smooth plate that moves down.
+
+        Raises:
+            InputError: on all ranks, for an unknown tag, another number of components, or one that is not finite.
+        """
         tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
         before = [self._prescribed[tag] for tag in tags if tag in self._prescribed]
         conditions = self._support(tags, True, velocity, "velocity", replaced=before)

@@ -63,7 +63,7 @@ def _is_support(value: Any) -> bool:
         and len(value) == 3
         and _is_tag(value[0])
         and isinstance(value[1], bool)
-        and (_are(_is_number, value[2]) and len(value[2]) in (0, 2, 3))
+        and (_are(lambda one: value[1] and one is None or _is_number(one), value[2]) and len(value[2]) in (0, 2, 3))
     )
 
 

@@ -68,6 +68,31 @@ def test_prescribed_velocity_carries_a_rigid_block(dim):
 
 
 @pytest.mark.parametrize("dim", DIMS)
+def test_a_smooth_plate_compresses_a_block_uniaxially(dim, tmp_path):
+    """One component is prescribed and the others are free: sigma = E u / h, and the block bulges by nu times that."""
+    model = mpm.Model(box([2] * dim), mpm.LinearElastic(young=YOUNG, poisson=0.25))
+    model.seed(density=DENSITY, per_cell=3 if dim == 2 else 4)
+    for axis in range(dim):
+        model.roller(2 * axis + 1, np.eye(dim)[axis])
+    model.prescribe(2 * dim, [None] * (dim - 1) + [-1e-3])
+    path = tmp_path / "plate.h5"
+    for _ in model.implicit(1.0, dt=1.0, quasi_static=True, small_displacements=True):
+        model.save(path)
+    lateral = 0.25 / 0.75 if dim == 2 else 0.25  # plane strain
+    expected = 1e-3 * np.append(np.full(dim - 1, lateral), -1.0) * model.mesh.points
+    np.testing.assert_allclose(model.nodal("velocity"), expected, rtol=0, atol=1e-12)
+    again = mpm.Model(model.mesh, model.laws)
+    again.restore(path)
+    assert again._conditions == model._conditions
+    again.prescribe(2 * dim, [None] * (dim - 1) + [-2e-3])
+    assert len(again._conditions) == len(model._conditions)
+    with pytest.raises(mpm.InputError, match="velocity is nan"):
+        model.prescribe(2 * dim, [None] * (dim - 1) + [np.nan])
+    with pytest.raises(mpm.InputError, match="velocity has shape"):
+        model.prescribe(2 * dim, 1.0)
+
+
+@pytest.mark.parametrize("dim", DIMS)
 def test_prescribed_velocity_takes_a_block_along_from_rest(dim):
     model, _ = block_on_a_plane(dim)
     model.prescribe(2 * dim - 1, [1.0] + [0.0] * (dim - 1))
