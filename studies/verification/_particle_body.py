@@ -12,7 +12,9 @@ comm = MPI.COMM_WORLD
 
 
 class ParticleBody:
-    """Three particles per cell, in small displacements, drained at parts of the surface; loads are pressures on facets.
+    """Three particles per cell, in small displacements, drained at parts of the surface.
+
+    Loads are pressures on facets, or a function of the time that has a factor on the prescribed displacements of supports.
 
     period: length^2 / c_v [s], of the oedometric modulus
     """
@@ -25,12 +27,14 @@ class ParticleBody:
         self.law, self.period = law, length**2 / (mobility * law.p_wave_modulus)
         self.model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law, geometry=geometry)
         self.model.seed(density=2000.0, per_cell=3)
-        bridge.apply_supports(self.model, supports)
+        bridge.apply_supports(self.model, [support for support in supports if not any(support.displacement or ())])
+        self._plates = {s.facet_tag: s.displacement for s in supports if any(s.displacement or ())}
         self.model.add_water(porosity=0.4, conductivity=mobility * weight, modulus=np.inf, unit_weight=weight)
         self.drain(drained)
-        for tag, pressure in load.pressure.items():
+        self._motion = (lambda time: load(time).displacement) if callable(load) else lambda time: 0.0
+        for tag, pressure in ({} if callable(load) else load.pressure).items():
             self.model.press_surface(tag, pressure)
-        self._moved = np.zeros(self.model.mesh.points.shape)
+        self._moved, self._factor, self.plate_force = np.zeros(self.model.mesh.points.shape), 0.0, 0.0
 
     def drain(self, tags):
         """Let water leave at these parts of the surface."""
@@ -47,8 +51,23 @@ class ParticleBody:
 
     def advance(self, dt):
         """One step of dt [s], or several shorter ones."""
+        more = self._move_plates(dt)
+        before = self.model.report().support_work
         for report in self.model.implicit(self.model.time + dt, dt=dt, quasi_static=True, small_displacements=True):
             self._moved += report.dt * self.model.nodal("velocity")
+        if more:
+            self.plate_force = (report.support_work - before) / more
+
+    def _move_plates(self, dt):
+        """Prescribe what supports move in the next step; returns how far that is in all [m].
+
+        The work of the supports over this is the force on them.
+        """
+        factor = self._motion(self.model.time + dt)
+        change, self._factor = factor - self._factor, factor
+        for tag, whole in self._plates.items():
+            self.model.prescribe(tag, [None if part is None else change * part / dt for part in whole])
+        return change * sum(abs(part) for whole in self._plates.values() for part in whole if part)
 
     def at(self, point):
         """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point; on all ranks."""
