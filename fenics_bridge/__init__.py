@@ -6,7 +6,7 @@ Only NumPy arrays and an MPI communicator are passed to the core.
 from fenics_bridge.errors import InputError
 from fenics_bridge.fem.collapse import Collapse, collapse_load, factor_of_safety
 from fenics_bridge.fem.elastic import ElasticSolution, solve_elastic, solve_nearly_incompressible
-from fenics_bridge.fem.equilibration import PRACTICE, EquilibriumReport, Solver
+from fenics_bridge.fem.equilibration import EquilibriumReport
 from fenics_bridge.fem.evaluate import PointSearch, evaluate_at
 from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.fields import nodal_average
@@ -17,6 +17,7 @@ from fenics_bridge.fem.load_steps import LoadStep, print_step
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.mixed import MixedQuasiStatic
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.solver import PRACTICE, Solver
 from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, reduced_strength
 from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller

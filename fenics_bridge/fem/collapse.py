@@ -37,6 +37,8 @@ class Collapse:
     """Fraction of the load that the stresses carry in the mechanism at `failed_at` [-], below 1; NaN if failure was not shown"""
     residual: float
     """Largest out-of-balance force that was accepted on the way, over the forces at work [-]"""
+    missing: float
+    """Largest fraction of its strength that was accepted as missing in a cell that yields, by `missing_tolerance` [-]"""
     curve: NDArray[np.float64]
     """Value and largest displacement of a node [m] at every equilibrium on the way, shape (k, 2)"""
     mechanism: fem.Function
@@ -163,6 +165,7 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
         reason=last.report.reason,
         carried=last.report.carried,
         residual=max(step.report.residuals[-1] for step in steps if step.converged),
+        missing=max(step.report.missing for step in steps if step.converged),
         curve=np.array(curve),
         mechanism=mechanism,
         steps=steps,

@@ -11,48 +11,13 @@ from mpi4py import MPI
 from mpm_core.newton import EASY_ITERATIONS, newton
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import InputError
 from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
 from fenics_bridge.fem.relaxation import Relaxation, relax
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.types import Law
 
 PATIENCE = 8
 """Iterations in which the least residual of Newton's method must halve; relaxation takes over otherwise"""
-
-
-@dataclass(frozen=True)
-class Solver:
-    """Solver of an equilibrium and its tolerances. Out-of-balance forces are over the forces at work [-].
-
-    `PRACTICE` is the level that is customary in practice, 1 % out of balance.
-
-    Raises:
-        InputError: a value out of its range.
-    """
-
-    tolerance: float = 1e-8
-    """Out-of-balance force at which Newton's method ends [-]"""
-    max_iterations: int = 25
-    """Largest number of iterations of Newton's method in a step"""
-    relaxation: bool = True
-    """Whether `relaxation.relax` takes over where Newton's method does not converge"""
-    relaxed_tolerance: float = 1e-5
-    """Out-of-balance force at which a relaxation ends [-]"""
-    max_steps: int = 80
-    """Largest number of steps of a relaxation"""
-
-    def __post_init__(self):
-        for name in ("tolerance", "relaxed_tolerance"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a number between 0 and 1")
-        for name in ("max_iterations", "max_steps"):
-            if not (isinstance(getattr(self, name), int) and getattr(self, name) > 0):
-                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a whole number above 0")
-
-
-PRACTICE = Solver(tolerance=1e-2, relaxed_tolerance=1e-2)
-"""Accepts an out-of-balance ratio of 1 %, as is customary in practice. Factors of safety become some per cent higher, and more
-where the soil that fails is a small part of the body, because the ratio is over the forces of all of it."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +47,12 @@ class EquilibriumReport:
     def carried(self) -> float:
         """Fraction of the load that the stresses carry in the mechanism of a failure [-]; NaN otherwise."""
         return self.relaxation.carried[-1] if self.outcome == "failure" and self.relaxation else np.nan
+
+    @property
+    def missing(self) -> float:
+        """Largest fraction of its strength that a cell lacks, where `missing_tolerance` ended a relaxation [-]; 0 otherwise."""
+        by_stress = self.converged and self.relaxation is not None and not self.relaxation.balanced
+        return self.relaxation.missing[-1] if self.relaxation is not None and by_stress else 0.0
 
     @property
     def easy(self) -> bool:
@@ -124,8 +95,8 @@ def _relaxed(body, laws, external, before, displacement, solver, newton_report):
     start = body.snapshot()
     comm = body.solution.function_space.mesh.comm
     reference = comm.allreduce(float(np.abs(start[0]).max(initial=0.0)), MPI.MAX)
-    result = relax(body, laws, external, before, displacement, solver.relaxed_tolerance, solver.max_steps, reference)
-    if result.outcome == "equilibrium":
+    result = relax(body, laws, external, before, displacement, solver, reference)
+    if result.outcome == "equilibrium" and result.balanced:
         _refine(body, laws, external, displacement, solver, result)
     motion = body.solution.x.array - start[0] if result.outcome == "equilibrium" else result.motion
     reason = result.reason

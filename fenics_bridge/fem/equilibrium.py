@@ -10,6 +10,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from fenics_bridge.fem.missing_stress import missing_fraction
 from fenics_bridge.types import Law
 
 
@@ -134,6 +135,12 @@ class EquilibriumStep:
         internal = body.kinematics.internal_forces(body.points.trial_stress).array[:n]
         works = self._comm.allreduce(np.array([internal @ increment, self._external[:n] @ increment]))
         return works[0] / works[1] if works[1] > 0 else np.nan
+
+    def missing_fraction(self) -> float:
+        """Largest missing stress of a cell over the strength that it mobilises, see `missing_stress`; for a viscous step [-]."""
+        body = self._body
+        here = missing_fraction(body.points, self._laws, self._viscosity, body.kinematics.strain_increment())
+        return self._comm.allreduce(here, MPI.MAX)
 
     def work(self) -> float:
         """The residual times the correction."""

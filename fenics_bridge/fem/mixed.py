@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.equilibration import EquilibriumReport, Solver, find_equilibrium
+from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import dilation, force_on, part_of
@@ -26,6 +26,7 @@ from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags
 from mpm_core import Geometry

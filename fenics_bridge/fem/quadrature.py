@@ -156,11 +156,15 @@ class QuadraturePoints:
         """
         if factor == 0:
             return 0.0
+        for law, piece in zip(laws, self._pieces):
+            self.tangent[piece] += factor * isotropic_stiffness(law, self.size)
+        return factor * self.elastic_stress(laws, strain_increment)
+
+    def elastic_stress(self, laws: Sequence[Law], strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Stress of a strain by the isotropic stiffness of each law: (n, S) [Pa]."""
         stress = np.zeros((self.n, self.size))
         for law, piece in zip(laws, self._pieces):
-            stiffness = factor * isotropic_stiffness(law, self.size)
-            self.tangent[piece] += stiffness
-            stress[piece] = strain_increment[piece] @ stiffness
+            stress[piece] = strain[piece] @ isotropic_stiffness(law, self.size)
         return stress
 
     def snapshot(self) -> tuple[NDArray[np.float64], ...]:
@@ -182,6 +186,11 @@ class QuadraturePoints:
         """Positions of the points: (n, D) [m]."""
         corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
         return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, -1)
+
+    def sum_over_cells(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weighted sums of values (n,) at the points of each cell, over the volume of the cell but for a factor: (m,)."""
+        values = values.reshape(-1, self.per_cell)
+        return (values if self._radii is None else values * self._radii) @ self._weights
 
     def cell_function(self, values: NDArray, name: str, degree: int) -> fem.Function:
         """Function in the cells that follows from values at the points.

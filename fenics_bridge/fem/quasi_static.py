@@ -16,7 +16,7 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.active_cells import reconfigure
 from fenics_bridge.fem.averaged import AveragedKinematics
-from fenics_bridge.fem.equilibration import EquilibriumReport, Solver, find_equilibrium
+from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.failure import explained
@@ -30,6 +30,7 @@ from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.quadrature import QuadraturePoints
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition

@@ -30,6 +30,7 @@ from mpm_core.newton import line_search
 from numpy.typing import NDArray
 
 from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.types import Law
 
 FIRST, LARGEST = 0.3, 100.0
@@ -74,6 +75,10 @@ class Relaxation:
     carried: list[float] = field(default_factory=list)
     """Power of the stresses over that of the load on the step's motion [-]; in a mechanism, the factor by which the load would
     have to be multiplied to be carried"""
+    balanced: bool = False
+    """Whether the out-of-balance force is below its tolerance at the end"""
+    missing: list[float] = field(default_factory=list)
+    """Largest fraction of the strength that is missing in a cell that yields, see `missing_stress` [-]"""
     iterations: int = 0
     """Linear systems solved"""
     motion: NDArray[np.float64] | None = None
@@ -86,8 +91,7 @@ def relax(
     external: Any,
     before: Any,
     displacement: float,
-    tolerance: float,
-    max_steps: int,
+    solver: Solver,
     reference: float,
 ) -> Relaxation:
     """Relax a body under a load, from its present state.
@@ -100,8 +104,7 @@ def relax(
         external: nodal forces of the load.
         before: nodal forces of the load before it.
         displacement: fraction of the prescribed displacements [-].
-        tolerance: out-of-balance force over the forces at work at which the body counts as at rest [-].
-        max_steps: largest number of steps of pseudo-time.
+        solver: tolerances at which the body counts as at rest, and the largest number of steps of pseudo-time.
         reference: displacement at the start [m]; the growth must exceed it, and some times the elastic displacement of the
             change of load besides, before it counts as failure.
 
@@ -109,9 +112,10 @@ def relax(
         Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
+    tolerance = solver.relaxed_tolerance
     rate: np.ndarray | None = None
     start = body.solution.x.array.copy()
-    for _ in range(max_steps):
+    for _ in range(solver.max_steps):
         step = EquilibriumStep(body, laws, external, before, displacement, theta, scale)
         residuals = _solve_step(step, tolerance, None if rate is None else rate / theta)
         result.iterations += len(residuals) - 1
@@ -128,7 +132,8 @@ def relax(
         rate = None if step.moves_supports else theta * motion  # the next step leaves them where they are
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
             reference += ELASTIC * (1 + theta) * result.growth[0]
-        if result.residual[-1] <= tolerance:
+        result.balanced = result.residual[-1] <= tolerance
+        if result.balanced or result.missing[-1] <= solver.missing_tolerance:
             result.outcome = "equilibrium"
             return result
         if _flows(result, reference):
@@ -139,9 +144,8 @@ def relax(
             )
             return result
         theta *= NEXT_THETA[len(residuals) - 2]
-    result.reason = (
-        f"residual {result.residual[-1] if result.residual else np.inf:.1e} after {max_steps} steps of relaxation"
-    )
+    last = result.residual[-1] if result.residual else np.inf
+    result.reason = f"residual {last:.1e} after {solver.max_steps} steps of relaxation"
     return result
 
 
@@ -169,6 +173,7 @@ def _record(result, body, step, theta, start):
     """Accept a step and add it to the result; returns its motion."""
     result.residual.append(step.out_of_balance())
     result.carried.append(step.carried_fraction())
+    result.missing.append(step.missing_fraction())
     result.motion = body.increment.x.array.copy()
     body.accept()
     moved = np.abs(body.solution.x.array - start).max(initial=0.0)

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.equilibration import Solver
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import force_on, nodal_average, part_of
@@ -25,6 +24,7 @@ from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary

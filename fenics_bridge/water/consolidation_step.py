@@ -10,8 +10,8 @@ import numpy as np
 from mpm_core.newton import EASY_ITERATIONS, newton
 from numpy.typing import NDArray
 
-from fenics_bridge.fem.equilibration import Solver
 from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
+from fenics_bridge.fem.solver import Solver
 from fenics_bridge.types import Law
 
 MOST_SETS = 30

@@ -98,6 +98,7 @@ class CollapseRuns:
             {"cell_size_m": size, "dilation_angle_degrees": angle, target.name: self._value(run),
              target.failed_name: run.failed_at / target.unit, "failure_shown": run.failed,
              "carried_fraction_of_mechanism": run.carried if run.failed else None, "largest_out_of_balance_ratio": run.residual,
+             "largest_missing_stress_fraction": run.missing,
              "relative_difference_to_limit_analysis": self._value(run) / target.reference - 1,
              "largest_displacement_m": run.curve[-1, 1], "steps": len(run.steps)}
             for angle, runs in self.runs.items() for size, run in zip(self.sizes, runs)

@@ -54,7 +54,7 @@ def site_study(
         model = site.finite_elements(**finite_elements(a))
         runs.append(find(site, model, progress))
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
-             "reason": run.reason, "largest_displacement_m": run.curve[-1, 1]}
+             "reason": run.reason, "largest_missing_stress_fraction": run.missing, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],

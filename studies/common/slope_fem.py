@@ -37,8 +37,8 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
                "linear triangles, the same with averaged volumetric strains (not for soil with little cohesion and no dilation), "
                "quadratic ones, or those of degree 4, which are the most accurate for their number of nodes")  # fmt: skip
     add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
-               "out-of-balance force that is accepted, over the forces at work: 1e-8 by Newton's method and 1e-5 by "
-               "relaxation, or 1e-2 as in practice, where small slopes on large bodies seem too safe")  # fmt: skip
+               "what is accepted: an out-of-balance force of 1e-8 of the forces at work by Newton's method and 1e-5 by "
+               "relaxation, or, as in practice, that 1 % of the stress is missing in cells that yield")  # fmt: skip
 
 
 def finite_elements(options: argparse.Namespace) -> dict[str, object]:

@@ -43,13 +43,14 @@ def test_what_is_wrong_with_particles_is_said_on_all_ranks():
         assert len(set(COMM.allgather(str(error.value)))) == 1
 
 
-@pytest.mark.parametrize("nmd", [False, True])
-def test_relaxed_elements_have_the_same_factor_on_all_numbers_of_ranks(nmd):
+@pytest.mark.parametrize(("nmd", "solver"), [(False, None), (True, None), (False, bridge.PRACTICE)])
+def test_relaxed_elements_have_the_same_factor_on_all_numbers_of_ranks(nmd, solver):
     def found(comm):
         body, _, facet_tags = bridge.soil_mesh(*slope(comm))
-        fem = bridge.QuasiStatic(body, LOAM, facet_tags, SUPPORTS, degree=1, nmd=nmd)
+        fem = bridge.QuasiStatic(body, LOAM, facet_tags, SUPPORTS, degree=1, nmd=nmd, solver=solver)
         return bridge.factor_of_safety(fem, bridge.Load(unit_weight=20e3), first_step=0.2)
 
     together, alone = found(COMM), found(MPI.COMM_SELF)
     assert any(step.report.relaxation for step in together.steps)
     assert together.failed and together.value == pytest.approx(alone.value, rel=2e-3)
+    assert together.missing == pytest.approx(alone.missing, rel=1e-3)

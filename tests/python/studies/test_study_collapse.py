@@ -99,7 +99,7 @@ def test_a_lower_bound_is_never_called_collapse():
 
     def run(failed):
         return bridge.Collapse(
-            1.3, 1.35, failed, "the solver's reason", 0.99, 1e-6, np.array([[1.0, 0.1], [1.3, 0.2]]), None, []
+            1.3, 1.35, failed, "the solver's reason", 0.99, 1e-6, 0.0, np.array([[1.0, 0.1], [1.3, 0.2]]), None, []
         )
 
     target = Target("factor", "failed_at_factor", "limit", 1.38, title="{:.3f}", line="{:.3f}", label="Factor [-]")

@@ -1,0 +1,47 @@
+"""Tolerances of an equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fenics_bridge.errors import InputError
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Solver of an equilibrium and its tolerances. Out-of-balance forces are over the forces at work [-].
+
+    `PRACTICE` is a coarser level as in practice: at most 1 % of the stress is missing where the soil yields.
+
+    Raises:
+        InputError: a value out of its range.
+    """
+
+    tolerance: float = 1e-8
+    """Out-of-balance force at which Newton's method ends [-]"""
+    max_iterations: int = 25
+    """Largest number of iterations of Newton's method in a step"""
+    relaxation: bool = True
+    """Whether `relaxation.relax` takes over where Newton's method does not converge"""
+    relaxed_tolerance: float = 1e-5
+    """Out-of-balance force at which a relaxation ends [-]"""
+    missing_tolerance: float = 0.0
+    """Missing stress, over the strength that is mobilised, in every cell that yields, at which a relaxation ends, too [-]; at 0
+    only the out-of-balance force counts"""
+    max_steps: int = 80
+    """Largest number of steps of a relaxation"""
+
+    def __post_init__(self):
+        for name in ("tolerance", "relaxed_tolerance"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a number between 0 and 1")
+        if not 0 <= self.missing_tolerance < 1:
+            raise InputError(f"missing_tolerance: got {self.missing_tolerance!r}, expected a number from 0 to below 1")
+        for name in ("max_iterations", "max_steps"):
+            if not (isinstance(getattr(self, name), int) and getattr(self, name) > 0):
+                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a whole number above 0")
+
+
+PRACTICE = Solver(tolerance=1e-5, missing_tolerance=1e-2)
+"""Also accepts a relaxation in which no cell that yields lacks more than 1 % of the stress, a tolerance as in practice. Factors
+of safety become up to 1 % higher, whatever part of the body fails: see `missing_stress`."""
