@@ -46,6 +46,16 @@ void update_particles(Model<G>& model, const ExplicitOptions& options, double dt
   migrate_particles(model);
 }
 
+/// Adds forces at the nodes beside those of gravity and stresses: of rigid surfaces, of damping, of absorbing sides.
+/// @note Collective
+template <class G>
+void add_nodal_forces(Model<G>& model, const ExplicitOptions& options, double dt, VelocityField<G>& field)
+{
+  add_contact_forces(model, dt, field);
+  add_rayleigh_forces(model, options.rayleigh, field);
+  add_dashpot_forces(model.mesh, gravity_at(model, model.time), model.time, dt, field);
+}
+
 /// The step of the paper: stresses last, with the velocities of the moved particles (MUSL).
 template <class G>
 void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options, double dt)
@@ -61,8 +71,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     particles_to_nodes(mesh, exchange, model.particles, model.order.runs, field);
     sum_shared(exchange, field.nodes);
     find_start_velocity(field);
-    add_contact_forces(model, dt, field);
-    add_dashpot_forces(gravity, model.time, dt, field);
+    add_nodal_forces(model, options, dt, field);
     // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
@@ -76,6 +85,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     find_mapped_velocity(1 - options.pic_fraction, field);
     clock.begin(Phase::momentum);
     add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
+    note_rayleigh_work(exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
     find_means(mesh, exchange, options, dt, field);
   }
@@ -94,13 +104,13 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     sum_shared(model.exchange, field.nodes);
     find_start_velocity(field);
-    add_contact_forces(model, dt, field);
-    add_dashpot_forces(gravity, model.time, dt, field);
+    add_nodal_forces(model, options, dt, field);
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
+    note_rayleigh_work(model.exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
     find_means(model.mesh, model.exchange, options, dt, field);
   }
@@ -129,12 +139,12 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   double work_at_end = 0;
   for (VelocityField<G>& field : model.fields)
   {
-    add_contact_forces(model, dt, field);
-    add_dashpot_forces(gravity, model.time, dt, field);
+    add_nodal_forces(model, options, dt, field);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     work_at_end += add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
+    note_rayleigh_work(model.exchange.owned, dt, field, model.totals);
   }
   model.energy.ahead = -0.5 * work_at_end; // the stresses are half a step behind the velocities, not ahead
   update_particles(model, options, dt, false, clock);
@@ -182,7 +192,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
     return;
   end_contacts(model, {model.time, dt});
   for (VelocityField<G>& field : model.fields)
-    move_springs(dt, field);
+    move_springs(model.mesh, model.time + 0.5 * dt, dt, field);
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();

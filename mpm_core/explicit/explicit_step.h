@@ -3,6 +3,7 @@
 /// The explicit scheme, section 3 of the paper.
 
 #include "model/material_points.h"
+#include "model/rayleigh.h"
 
 namespace mpm::explicit_scheme
 {
@@ -18,6 +19,7 @@ struct ExplicitOptions
 {
   StressUpdate stress_update = StressUpdate::modified_last;
   double damping = 0;      ///< local damping alpha of FLAC, in [0, 1)
+  Rayleigh rayleigh;       ///< damping at small strains
   double pic_fraction = 0; ///< of a step, in [0, 1]
   bool nmd = false;        ///< nodal mixed discretisation
   Integration integration = Integration::particles;

@@ -101,7 +101,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       if (run.conversion)
         convert_failing(model, *run.conversion);
       const double critical = critical_time_step(model);
-      dt = next_step(model, run, critical);
+      dt = next_step(model, run, damped_time_step(options.rayleigh, critical));
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }
     explicit_step(model, of_step, dt);

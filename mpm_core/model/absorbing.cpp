@@ -4,7 +4,9 @@
 #include "model/mapping.h"
 #include "parallel/agreement.h"
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace mpm::model
 {
@@ -16,7 +18,8 @@ struct NodeOfSide
 {
   Matrix<D> damping;
   Matrix<D> stiffness;
-  double is_on_side;
+  double area;     ///< above zero for nodes on the side
+  double is_rigid; ///< above zero where it is
 };
 
 /// Number of the law of the soil in each owned cell; `none` in empty ones.
@@ -39,15 +42,17 @@ void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k
   const double size = norm<D>(shape.gradient[k]), area = size * shape.volume; // D V |grad N_k| over D vertices
   const double moduli[]{p_wave_modulus(law), shear_modulus(law)};
   const double given[]{side.normal_impedance, side.shear_impedance};
-  std::array<double, 2> damping, stiffness;
-  for (int s = 0; s < 2; ++s)
+  const bool is_rigid = std::isinf(side.normal_impedance);
+  std::array<double, 2> damping{}, stiffness{};
+  for (int s = 0; s < 2 && !is_rigid; ++s)
   {
     damping[s] = area * (given[s] > 0 ? given[s] : std::sqrt(density * moduli[s]));
     stiffness[s] = area * moduli[s] / side.thickness;
   }
   for (Index node : facet_nodes<D>(mesh.cells[cell], k))
   {
-    nodes[node].is_on_side = 1;
+    nodes[node].area += area;
+    nodes[node].is_rigid += is_rigid ? 1 : 0;
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
       {
@@ -87,6 +92,111 @@ Vector<D> residual_of(const NodeSums<D>& node, const Vector<D>& gravity)
     residual[a] = node.traction[a] + node.mass * gravity[a] - node.internal[a];
   return residual;
 }
+
+/// Adds entries for the nodes of the sides beside one free field, or of those of the incoming wave.
+/// @throws InputError on all ranks: a side without soil
+/// @note Collective
+template <class G, int D = G::dim>
+void add_entries(Model<G>& model, std::span<const AbsorbingSide> sides, Index free_field, std::span<const Index> laws)
+{
+  std::vector<NodeOfSide<D>> nodes(model.mesh.points.size(), NodeOfSide<D>{});
+  for (const AbsorbingSide& side : sides)
+  {
+    if (side.free_field != free_field)
+      continue;
+    int facets = add_side<G>(model, side, laws, nodes);
+    MPI_Allreduce(MPI_IN_PLACE, &facets, 1, MPI_INT, MPI_SUM, model.exchange.comm);
+    if (facets == 0)
+      throw InputError("facet_tag " + std::to_string(side.facet_tag) +
+                       " has no soil at its facets, expected particles in the cells at a side that absorbs");
+  }
+  sum_shared(model.exchange, nodes);
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (nodes[i].area > 0)
+      model.fields.front().dashpots.push_back({static_cast<Index>(i),
+                                               nodes[i].damping,
+                                               nodes[i].stiffness,
+                                               {},
+                                               {},
+                                               free_field,
+                                               nodes[i].area,
+                                               nodes[i].is_rigid > 0});
+}
+
+/// The entries of each node in turn, which follow one another.
+template <int D, class Visit>
+void for_each_node(std::span<DashpotNode<D>> entries, Visit&& visit)
+{
+  for (std::size_t first = 0, last = 0; first < entries.size(); first = last)
+  {
+    while (last < entries.size() && entries[last].node == entries[first].node)
+      ++last;
+    visit(entries.subspan(first, last - first));
+  }
+}
+
+/// The ground on the other ends of dashpots.
+template <class G, int D = G::dim>
+class Beside
+{
+public:
+  Beside(const Mesh<D>& mesh, const VelocityField<G>& field, double time)
+      : _mesh(mesh), _field(field), _incoming(field.incoming.at(time))
+  {
+    for (const FreeField<D>& ground : field.free_fields)
+      _states.push_back(ground.at(time));
+  }
+  typename FreeField<D>::State at(const DashpotNode<D>& entry) const
+  {
+    typename FreeField<D>::State state{};
+    if (entry.free_field == none)
+      for (int a = 0; a < D; ++a)
+        state.velocity[a] = 2 * _incoming[a];
+    else if (const auto number = static_cast<std::size_t>(entry.free_field); number < _states.size())
+    {
+      const auto [k, part] = bracket(_field.free_fields[number].heights, _mesh.points[entry.node][D - 1]);
+      state = FreeField<D>::between(_states[number][k], _states[number][k + 1], part);
+    }
+    return state;
+  }
+
+private:
+  const Mesh<D>& _mesh;
+  const VelocityField<G>& _field;
+  Vector<D> _incoming;
+  std::vector<std::vector<typename FreeField<D>::State>> _states; ///< at the heights of each free field
+};
+
+/// m a = R + f,  f = sum over entries of held - K u + A t - C (v + dt a / 2 - v_beside); or the a of a rigid side.
+/// @param residual  R [N]
+template <class G, int D = G::dim>
+Vector<D> acceleration(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double mass, double dt,
+                       const Vector<D>& residual, const Vector<D>& start)
+{
+  Eigen::Matrix<double, D, D> inertia = mass * Eigen::Matrix<double, D, D>::Identity();
+  Eigen::Matrix<double, D, 1> force = Eigen::Map<const Eigen::Matrix<double, D, 1>>(residual.data());
+  Vector<D> found;
+  for (const DashpotNode<D>& entry : entries)
+  {
+    const auto ground = beside.at(entry);
+    if (entry.is_rigid)
+    {
+      for (int a = 0; a < D; ++a)
+        found[a] = (ground.velocity[a] - start[a]) / dt;
+      return found;
+    }
+    Vector<D> against;
+    for (int a = 0; a < D; ++a)
+      against[a] = start[a] - ground.velocity[a];
+    const Vector<D> drag = product<D>(entry.damping, against), spring = product<D>(entry.stiffness, entry.displacement);
+    inertia += 0.5 * dt * as_eigen<D>(entry.damping);
+    for (int a = 0; a < D; ++a)
+      force[a] += entry.held[a] + entry.area * ground.traction[a] - spring[a] - drag[a];
+  }
+  const Eigen::Matrix<double, D, 1> solution = inertia.inverse() * force;
+  std::copy_n(solution.data(), D, found.begin());
+  return found;
+}
 } // namespace
 
 template <class G>
@@ -100,71 +210,62 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
         "or three dimensions and one field");
   prepare(model);
   map_to_nodes(model);
-  std::vector<NodeOfSide<D>> nodes(model.mesh.points.size(), NodeOfSide<D>{});
   const std::vector<Index> laws = law_of_cell(model);
+  std::set<Index> free_fields;
   for (const AbsorbingSide& side : sides)
-  {
-    int facets = add_side<G>(model, side, laws, nodes);
-    MPI_Allreduce(MPI_IN_PLACE, &facets, 1, MPI_INT, MPI_SUM, model.exchange.comm);
-    if (facets == 0)
-      throw InputError("facet_tag " + std::to_string(side.facet_tag) +
-                       " has no soil at its facets, expected particles in the cells at a side that absorbs");
-  }
-  sum_shared(model.exchange, nodes);
+    free_fields.insert(side.free_field);
   field.dashpots.clear();
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-  {
-    if (nodes[i].is_on_side == 0)
-      continue;
-    Vector<D> held = residual_of<D>(field.nodes[i], gravity);
-    for (double& component : held)
-      component = -component;
-    field.dashpots.push_back({static_cast<Index>(i), nodes[i].damping, nodes[i].stiffness, held, {}});
-  }
+  for (Index free_field : free_fields)
+    add_entries<G>(model, sides, free_field, laws);
+  std::ranges::stable_sort(field.dashpots, {}, &DashpotNode<D>::node);
+  for_each_node<D>(field.dashpots,
+                   [&](std::span<DashpotNode<D>> entries)
+                   {
+                     const Vector<D> residual = residual_of<D>(field.nodes[entries[0].node], gravity);
+                     for (int a = 0; a < D; ++a)
+                       entries[0].held[a] = -residual[a];
+                   });
 }
 
 template <class G>
-void add_dashpot_forces(const Vector<G::dim>& gravity, double time, double dt, VelocityField<G>& field)
+void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
+                        VelocityField<G>& field)
 {
   constexpr int D = G::dim;
-  const Vector<D> incoming = field.incoming.at(time + 0.5 * dt);
-  for (const DashpotNode<D>& dashpot : field.dashpots)
-  {
-    NodeSums<D>& node = field.nodes[dashpot.node];
-    if (is_light(field, dashpot.node))
-      continue;
-    // m a = R + f,  f = held - K u - C (v + dt a / 2 - 2 v_in)
-    Vector<D> against;
-    for (int a = 0; a < D; ++a)
-      against[a] = field.start_velocity[dashpot.node][a] - 2 * incoming[a];
-    const Vector<D> drag = product<D>(dashpot.damping, against),
-                    spring = product<D>(dashpot.stiffness, dashpot.displacement),
-                    residual = residual_of<D>(node, gravity);
-    Eigen::Matrix<double, D, D> inertia = 0.5 * dt * as_eigen<D>(dashpot.damping);
-    Eigen::Matrix<double, D, 1> force;
-    for (int a = 0; a < D; ++a)
-    {
-      inertia(a, a) += node.mass;
-      force[a] = residual[a] + dashpot.held[a] - spring[a] - drag[a];
-    }
-    const Eigen::Matrix<double, D, 1> acceleration = inertia.inverse() * force;
-    for (int a = 0; a < D; ++a)
-      node.traction[a] += node.mass * acceleration[a] - residual[a];
-  }
+  const Beside<G> beside(mesh, field, time + 0.5 * dt);
+  for_each_node<D>(field.dashpots,
+                   [&](std::span<const DashpotNode<D>> entries)
+                   {
+                     const Index i = entries[0].node;
+                     NodeSums<D>& node = field.nodes[i];
+                     if (is_light(field, i))
+                       return;
+                     const Vector<D> residual = residual_of<D>(node, gravity);
+                     const Vector<D> found =
+                         acceleration<G, D>(entries, beside, node.mass, dt, residual, field.start_velocity[i]);
+                     for (int a = 0; a < D; ++a)
+                       node.traction[a] += node.mass * found[a] - residual[a];
+                   });
 }
 
 template <class G>
-void move_springs(double dt, VelocityField<G>& field)
+void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field)
 {
-  for (auto& dashpot : field.dashpots)
-    for (int a = 0; a < G::dim; ++a)
-      dashpot.displacement[a] += dt * field.velocity[dashpot.node][a];
+  constexpr int D = G::dim;
+  const Beside<G> beside(mesh, field, time);
+  for (auto& entry : field.dashpots)
+  {
+    // a wave that goes by moves the springs; a free field takes them along
+    const auto ground = entry.free_field == none ? typename FreeField<D>::State{} : beside.at(entry);
+    for (int a = 0; a < D; ++a)
+      entry.displacement[a] += dt * (field.velocity[entry.node][a] - ground.velocity[a]);
+  }
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template void set_absorbing_sides(Model<G>&, std::span<const AbsorbingSide>, const Vector<G::dim>&);                 \
-  template void add_dashpot_forces(const Vector<G::dim>&, double, double, VelocityField<G>&);                          \
-  template void move_springs(double, VelocityField<G>&);
+  template void add_dashpot_forces(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&);     \
+  template void move_springs(const Mesh<G::dim>&, double, double, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

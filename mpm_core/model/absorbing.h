@@ -1,6 +1,7 @@
 #pragma once
 /// @file
-/// Sides of the mesh that let waves out: dashpots of Lysmer & Kuhlemeyer (1969) with weak springs.
+/// Sides of the mesh that let waves out: dashpots of Lysmer & Kuhlemeyer (1969) with weak springs, to ground that moves
+/// by an incoming wave, or as a free field.
 
 #include "model/model.h"
 
@@ -10,10 +11,11 @@ namespace mpm::model
 struct AbsorbingSide
 {
   Index facet_tag;
-  double normal_impedance; ///< rho c_p [kg/(m2 s)]; 0 for that of the soil at the side
+  double normal_impedance; ///< rho c_p [kg/(m2 s)]; 0 for that of the soil at the side, infinite for a rigid side
   double shear_impedance;  ///< rho c_s; likewise
   double thickness; ///< of ground behind that acts as springs (lambda + 2 mu) / thickness and mu / thickness [m];
                     ///< infinite for none
+  Index free_field; ///< number of the free field beside it; `none` for the incoming wave
 };
 
 /// Puts dashpots and springs at the nodes on the facets of soil with the tags of these sides. Forces that hold these
@@ -23,13 +25,14 @@ struct AbsorbingSide
 template <class G>
 void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, const Vector<G::dim>& gravity);
 
-/// Adds the forces of dashpots and springs over a step to the tractions at the nodes of a field: the mean over the step
-/// of the velocity that they lead to, so that no dashpot limits the step.
+/// Adds the forces of dashpots, springs and free fields over a step to the tractions at the nodes of a field. Dashpots
+/// take the mean over the step of the velocity that they lead to, so that they do not limit it.
 /// @pre nodes have the sums of all ranks
 template <class G>
-void add_dashpot_forces(const Vector<G::dim>& gravity, double time, double dt, VelocityField<G>& field);
+void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
+                        VelocityField<G>& field);
 
-/// Moves the springs with their nodes.
+/// Moves the springs with their nodes, relative to the free fields at a time.
 template <class G>
-void move_springs(double dt, VelocityField<G>& field);
+void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field);
 } // namespace mpm::model

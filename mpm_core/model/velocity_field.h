@@ -60,6 +60,7 @@ struct VelocityField
   RestingCells<D> resting; ///< the cells without particles of their own
   CellIntegration<D> integration;
   std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
+  std::vector<Vector<D>> damping_force; ///< of Rayleigh damping, likewise; else empty
   double least_mass = 0;                ///< nodes below this mass are not moved [kg]
   bool has_light_nodes = false;         ///< whether there are such nodes in this explicit step
 
@@ -67,6 +68,7 @@ struct VelocityField
   std::vector<Support<D>> supports;          ///< its boundary conditions
   std::vector<DashpotNode<D>> dashpots;      ///< of its absorbing sides, by rising node
   IncomingWave<D> incoming;                  ///< through them
+  std::vector<FreeField<D>> free_fields;     ///< beside them
   std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it

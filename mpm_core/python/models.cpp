@@ -72,9 +72,10 @@ py::array_t<Index> cells_of(const Mesh<D>& mesh, const py::array& points)
   return cells;
 }
 
-/// Damping, stiffness, force that holds it and displacement of a node on absorbing sides
+/// An entry of a node on absorbing sides: damping, stiffness, force that holds it, displacement, number of the free
+/// field, area, whether it is rigid
 template <int D>
-using DashpotEntry = std::tuple<Matrix<D>, Matrix<D>, Vector<D>, Vector<D>>;
+using DashpotEntry = std::tuple<Matrix<D>, Matrix<D>, Vector<D>, Vector<D>, Index, double, bool>;
 
 /// A row for each cell, a number for each of its vertices.
 template <std::size_t N>
@@ -116,6 +117,7 @@ void bind_mesh(py::module_& m, const std::string& suffix)
   py::class_<Mesh<D>, std::shared_ptr<Mesh<D>>>(m, ("Mesh" + suffix).c_str())
       .def(py::init(&mesh_from_arrays<D>))
       .def_property_readonly("owned_cells", [](const Mesh<D>& mesh) { return mesh.owned_cells; })
+      .def_static("even_points", &even_points<D>)
       .def_property_readonly("cell_tags", [](const Mesh<D>& mesh) { return copied(mesh.cell_tags); })
       .def("cells_of", &cells_of<D>)
       .def_property_readonly("neighbours", [](const Mesh<D>& mesh) { return cell_rows(mesh.neighbours); })
@@ -140,6 +142,27 @@ void bind_mesh(py::module_& m, const std::string& suffix)
                volumes.push_back(shape.volume);
              return copied(volumes);
            });
+}
+
+/// Motion of the ground beside sides over time: heights (n), times (m), velocities and tractions (m, n, D).
+template <class G, int D = G::dim>
+void set_free_field(Model<G>& model, std::size_t number, const std::vector<double>& heights,
+                    const std::vector<double>& times, const py::array& velocity, const py::array& traction)
+{
+  const auto m = static_cast<py::ssize_t>(times.size()), n = static_cast<py::ssize_t>(heights.size());
+  check_array<double>("velocity", velocity, {m, n, D});
+  check_array<double>("traction", traction, {m, n, D});
+  const auto v = values<double>(velocity), t = values<double>(traction);
+  std::vector<typename FreeField<D>::State> states(times.size() * heights.size());
+  for (std::size_t i = 0; i < states.size(); ++i)
+    for (int a = 0; a < D; ++a)
+    {
+      states[i].velocity[a] = v[i * D + a];
+      states[i].traction[a] = t[i * D + a];
+    }
+  auto& grounds = model.fields.front().free_fields;
+  grounds.resize(std::max(grounds.size(), number + 1));
+  grounds[number] = {heights, times, std::move(states)};
 }
 
 template <class G, int D = G::dim>
@@ -185,37 +208,36 @@ void bind_model(py::module_& m, const std::string& suffix)
              set_supports(model, requests);
            })
       .def("set_absorbing_sides",
-           [](M& model, const std::vector<std::tuple<Index, double, double, double>>& given)
+           [](M& model, const std::vector<std::tuple<Index, double, double, double, Index>>& given)
            {
              std::vector<AbsorbingSide> sides;
-             for (const auto& [tag, normal, shear, thickness] : given)
-               sides.push_back({tag, normal, shear, thickness});
+             for (const auto& [tag, normal, shear, thickness, free_field] : given)
+               sides.push_back({tag, normal, shear, thickness, free_field});
              set_absorbing_sides(model, sides, gravity_at(model, model.time));
            })
       .def("set_incoming_wave",
            [](M& model, const std::vector<double>& times, const std::vector<double>& velocities,
               const Vector<D>& direction) { model.fields.front().incoming = {times, velocities, direction}; })
+      .def("set_free_field", &set_free_field<G>)
       .def("dashpots",
-           [](const M& model) // by node over all ranks: damping, stiffness, force that holds it, displacement
+           [](const M& model) // by node over all ranks
            {
-             std::map<GlobalIndex, DashpotEntry<D>> entries;
+             std::map<GlobalIndex, std::vector<DashpotEntry<D>>> entries;
              for (const auto& d : model.fields.front().dashpots)
-               entries[model.mesh.global_nodes[static_cast<std::size_t>(d.node)]] = {d.damping, d.stiffness, d.held,
-                                                                                      d.displacement};
+               entries[model.mesh.global_nodes[static_cast<std::size_t>(d.node)]].push_back(
+                   {d.damping, d.stiffness, d.held, d.displacement, d.free_field, d.area, d.is_rigid});
              return entries;
            })
       .def("set_dashpots",
-           [](M& model, const std::map<GlobalIndex, DashpotEntry<D>>& entries)
+           [](M& model, const std::map<GlobalIndex, std::vector<DashpotEntry<D>>>& entries)
            {
              auto& dashpots = model.fields.front().dashpots;
              dashpots.clear();
              for (Index i = 0; i < model.mesh.n_nodes(); ++i)
                if (const auto found = entries.find(model.mesh.global_nodes[static_cast<std::size_t>(i)]);
                    found != entries.end())
-               {
-                 const auto& [damping, stiffness, held, displacement] = found->second;
-                 dashpots.push_back({i, damping, stiffness, held, displacement});
-               }
+                 for (const auto& [damping, stiffness, held, displacement, free_field, area, is_rigid] : found->second)
+                   dashpots.push_back({i, damping, stiffness, held, displacement, free_field, area, is_rigid});
            })
       .def("set_partition", &set_partition<G>)
       .def_readwrite("water", &M::water)
@@ -376,6 +398,13 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
       .def_readwrite("damping", &ExplicitOptions::damping)
+      .def_property(
+          "rayleigh", // mass, stiffness, plastic strain
+          [](const ExplicitOptions& options)
+          { return std::tuple(options.rayleigh.mass, options.rayleigh.stiffness, options.rayleigh.plastic_strain); },
+          [](ExplicitOptions& options, const std::tuple<double, double, double>& given) {
+            options.rayleigh = {std::get<0>(given), std::get<1>(given), std::get<2>(given)};
+          })
       .def_readwrite("nmd", &ExplicitOptions::nmd)
       .def_readwrite("integration", &ExplicitOptions::integration);
   py::class_<RunOptions>(m, "RunOptions")

@@ -43,6 +43,7 @@ from .motion import Motion, motion_of_acceleration, read_accelerogram
 from .newton import Newton
 from .parameter_fields import RandomField
 from .particles import Particles
+from .rayleigh import Rayleigh
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
@@ -85,6 +86,7 @@ __all__ = [
     "Polyline",
     "PythonLaw",
     "RandomField",
+    "Rayleigh",
     "Relaxation",
     "RelaxationKind",
     "Report",

@@ -11,8 +11,16 @@ from numpy.typing import ArrayLike
 from ._core import InputError
 from .checks import positive
 from .collective import collectively
+from .free_field import layers_at
+from .ground_column import Base, GroundColumn, Layers
 from .mesh import Mesh, Tag, floats
 from .motion import Motion
+from .rayleigh import Rayleigh
+
+WAVE = -1
+"""In the place of the number of a free field: the incoming wave comes through the side"""
+Side = tuple[int, float, float, float, int]
+"""Facet tag, impedances for compression and shear waves [kg/(m2 s)], thickness of the springs [m], number of the free field"""
 
 
 class AbsorbingSides:
@@ -21,7 +29,11 @@ class AbsorbingSides:
     mesh: Mesh
     comm: MPI.Comm
     _core: Any
-    _absorbing: list[tuple[int, float, float, float]]  # tag, impedances, thickness
+    laws: list[Any]
+    _absorbing: list[Side]
+    _free_fields: list[Layers]  # by number, as they began
+    _columns: list[GroundColumn]  # likewise; empty until a run needs them
+    _tables: list[Any]  # what the core knows of their motion
     _incoming: tuple[list[float], list[float], list[float]] | None  # times, velocities, direction
 
     def absorb(
@@ -30,6 +42,7 @@ class AbsorbingSides:
         *,
         thickness: float = np.inf,
         impedances: tuple[float, float] | None = None,
+        free_field: bool = False,
     ) -> None:
         """Let waves out through a side: dashpots and weak springs take the place of the ground behind it.
 
@@ -38,16 +51,22 @@ class AbsorbingSides:
         side at the time of the call stay: call it in equilibrium, and do not support what is to absorb (`release`). Springs
         of a layer of ground keep the side from drifting away. A call for a further side begins all of them anew.
 
+        With ``free_field`` the ground behind a vertical side is level, has the layers of the soil at the side, and moves as a
+        column of them does by the wave that `shake` or `drive` lets in through the base: dashpots and springs work against this
+        motion, and the stresses that it makes act on the side. So a level site moves as if it had no sides.
+
         Args:
             facet_tag: facets with this tag, or these tags, by number or name, at cells with soil.
             thickness: of the ground behind the side that acts as springs, ``(lambda + 2 mu) / thickness`` along the normal and
                 ``mu / thickness`` across it [m]; far more than a wavelength. Infinite: none.
             impedances: ``rho c_p`` and ``rho c_s`` of the ground behind the side [kg/(m2 s)], where it is another one than the
                 soil at the side, such as the rock below a layer.
+            free_field: whether level ground that moves lies behind the side, a vertical plane; the last axis points up. At most
+                one other side may absorb then, the base.
 
         Raises:
-            InputError: on all ranks: a side without soil, several velocity fields, axial symmetry, numbers that are not
-                positive.
+            InputError: on all ranks: a side without soil, or beside a free field one that is not vertical; several velocity
+                fields, axial symmetry, numbers that are not positive.
 
         Note:
             Collective. For explicit steps. Dashpots do not limit the time step.
@@ -65,10 +84,23 @@ class AbsorbingSides:
             return [(tag, *pair, far) for tag in self.mesh.tags_of("facet", facet_tag)]
 
         new = collectively(self.comm, checked)
+        self._take_sides([(*side, 0 if free_field else WAVE) for side in new])
+
+    def _take_sides(self, new: list[Side]) -> None:
+        """Begin all sides anew, with these in the place of those of the same tags. Collective."""
         tags = {side[0] for side in new}
-        sides = [*(side for side in self._absorbing if side[0] not in tags), *new]
+        kept = [*(side for side in self._absorbing if side[0] not in tags), *new]
+        free = [side[0] for side in kept if side[4] != WAVE]
+        if free and len(kept) - len(free) > 1:
+            through = [side[0] for side in kept if side[4] == WAVE]
+            raise InputError(
+                f"sides {through} absorb without a free field beside them, expected only the base to do so"
+            )
+        sides = [(*side[:4], free.index(side[0]) if side[4] != WAVE else WAVE) for side in kept]
+        free_fields = [layers_at(self, tag) for tag in free]
         self._core.set_absorbing_sides(sides)
-        self._absorbing = sides
+        self._absorbing, self._free_fields = sides, free_fields
+        self._columns, self._tables = [], []
 
     def shake(self, motion: Motion, direction: ArrayLike) -> None:
         """Let a plane wave come in through the sides that absorb, all at once: a base below level ground.
@@ -83,18 +115,71 @@ class AbsorbingSides:
         Raises:
             InputError: on all ranks: no side absorbs; a direction without length; something else than a motion.
         """
+        self._let_in(motion, direction, 1.0)
 
+    def drive(self, facet_tag: Tag, motion: Motion, direction: ArrayLike) -> None:
+        """Move a side as prescribed, whatever the soil does: a base on rigid ground, through which no wave leaves.
+
+        Args:
+            facet_tag: facets with this tag, or these tags, at cells with soil; without other boundary conditions (`release`).
+            motion: velocity of the side over time.
+            direction: in which it moves, shape (D,), of any length; it does not move across that.
+
+        Raises:
+            InputError: on all ranks: as `shake` and `absorb`; another side than this lets a wave in.
+
+        Note:
+            Collective. For explicit steps.
+        """
+        tags = collectively(self.comm, lambda: self.mesh.tags_of("facet", facet_tag))
+        others = [side[0] for side in self._absorbing if side[4] == WAVE and side[0] not in tags]
+        if others:
+            raise InputError(
+                f"sides {others} absorb and let waves in, expected only the driven one, or free fields beside others"
+            )
+        self._checked_wave(motion, direction)
+        self._take_sides([(tag, np.inf, np.inf, np.inf, WAVE) for tag in tags])
+        self._let_in(motion, direction, 0.5)  # a rigid side moves with twice the wave
+
+    def _checked_wave(self, motion: Motion, direction: ArrayLike) -> list[float]:
         def checked() -> list[float]:
             if not isinstance(motion, Motion):
                 raise InputError(f"motion is {motion!r}, expected a Motion; see read_accelerogram")
-            if not self._absorbing:
-                raise InputError("no side absorbs, expected a call of absorb before shake")
             along = floats("direction", direction, (self.mesh.dim,))
             length = float(np.linalg.norm(along))
             return (along / positive("length of direction", length, "m")).tolist()
 
-        unit = collectively(self.comm, checked)
-        self._take_incoming((motion.time.tolist(), motion.velocity.tolist(), unit))
+        return collectively(self.comm, checked)
+
+    def _let_in(self, motion: Motion, direction: ArrayLike, factor: float) -> None:
+        unit = self._checked_wave(motion, direction)
+        if not self._absorbing:
+            raise InputError("no side absorbs, expected a call of absorb before shake")
+        if self._columns:
+            raise InputError(
+                "free fields have begun to move, expected shake before the run, or absorb for the sides anew"
+            )
+        self._take_incoming((motion.time.tolist(), (factor * motion.velocity).tolist(), unit))
+
+    def _advance_free_fields(self, until: float, rayleigh: Rayleigh) -> None:
+        """Give the core the motion of the free fields up to a time, on each rank alike."""
+        if not self._columns:
+            self._columns = [GroundColumn(layers, self.laws, self._base(), rayleigh) for layers in self._free_fields]
+        self._set_tables([(column.heights, *column.advance(until)) for column in self._columns])
+
+    def _set_tables(self, tables: list[Any]) -> None:
+        self._tables = tables
+        for number, (heights, *table) in enumerate(tables):
+            self._core.set_free_field(number, heights, *table)
+
+    def _base(self) -> Base | None:
+        """What free fields stand on."""
+        below = [side for side in self._absorbing if side[4] == WAVE]
+        if not below:
+            return None
+        times, velocities, unit = self._incoming or ([], [], [0.0] * self.mesh.dim)
+        _, normal, shear, thickness, _ = below[0]
+        return Base((normal, shear), thickness, np.array(times), np.array(velocities), np.array(unit))
 
     def _take_incoming(self, incoming: Any) -> None:
         self._incoming = incoming
@@ -105,15 +190,41 @@ class AbsorbingSides:
         if not self._absorbing:
             return None
         nodes = {node: entry for part in self.comm.allgather(self._core.dashpots()) for node, entry in part.items()}
-        sides = [[tag, normal, shear, None if far == np.inf else far] for tag, normal, shear, far in self._absorbing]
-        return {"sides": sides, "nodes": [[node, nodes[node]] for node in sorted(nodes)], "incoming": self._incoming}
+        sides = [[tag, *map(_finite, numbers), free] for tag, *numbers, free in self._absorbing]
+        return {
+            "sides": sides,
+            "nodes": [[node, nodes[node]] for node in sorted(nodes)],
+            "incoming": self._incoming,
+            "free_fields": [layers.as_entry() for layers in self._free_fields],
+        }
 
     def _take_absorbing(self, state: dict[str, Any] | None) -> None:
         """The state of a checkpoint. Collective."""
-        state = state or {"sides": [], "nodes": [], "incoming": None}
-        self._absorbing = [(tag, n, s, np.inf if far is None else far) for tag, n, s, far in state["sides"]]
-        self._core.set_dashpots({node: tuple(entry) for node, entry in state["nodes"]})
+        state = state or {"sides": [], "nodes": [], "incoming": None, "free_fields": []}
+        self._absorbing = [
+            (tag, _given(normal), _given(shear), _given(far), free) for tag, normal, shear, far, free in state["sides"]
+        ]
+        self._core.set_dashpots({node: [tuple(entry) for entry in entries] for node, entries in state["nodes"]})
         self._take_incoming(state["incoming"])
+        self._free_fields = [Layers(**entry) for entry in state["free_fields"]]
+        self._columns, self._tables = [], []  # a run begins them anew, and brings them to the present
+
+    def _retake_absorbing(self, state: dict[str, Any] | None) -> None:
+        """The same after a repartition, in the midst of a run."""
+        columns, tables = self._columns, self._tables
+        self._take_absorbing(state)
+        self._columns = columns
+        self._set_tables(tables)
+
+
+def _finite(number: float) -> float | None:
+    """A number for JSON, which has no infinite ones."""
+    return None if number == np.inf else number
+
+
+def _given(number: float | None) -> float:
+    """The number of `_finite`."""
+    return np.inf if number is None else number
 
 
 def refuse_absorbing(model: Any, what: str) -> None:

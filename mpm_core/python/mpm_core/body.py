@@ -79,6 +79,7 @@ class Body(PoreWater, RestingCells, AbsorbingSides):
         self._space_watch: SpaceWatch | None = None
         self._water_conditions = []
         self._absorbing, self._incoming = [], None
+        self._free_fields, self._columns, self._tables = [], [], []
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0

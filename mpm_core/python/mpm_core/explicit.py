@@ -14,6 +14,7 @@ from ._core import InputError
 from .checks import positive, within
 from .energy import EnergyWatch
 from .partition import keep_balance
+from .rayleigh import Rayleigh
 from .report import Report
 from .space import SpaceWatch
 
@@ -21,13 +22,14 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def explicit_options(damping: float, nmd: bool, integration: Any, stress_update: Any) -> Any:
+def explicit_options(damping: float, nmd: bool, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.nmd = bool(nmd)
     options.integration = integration
     options.stress_update = stress_update
+    options.rayleigh = rayleigh._as_core()
     return options
 
 
@@ -90,6 +92,7 @@ def run_explicit(
     rebalance: float,
     every_steps: int | None,
     energy_limit: float | None,
+    rayleigh: Rayleigh,
 ) -> Iterator[Report]:
     """Step to each of the times; yields a report there, and after every ``every_steps`` steps."""
     # Python must run from time to time, for Ctrl-C. The pauses do not change the steps, which are chosen again
@@ -107,6 +110,7 @@ def run_explicit(
 
     for until in times:
         run.until = until
+        model._advance_free_fields(until, rayleigh)
         while model.time < until:
             keep_balance(model, rebalance)
             run.max_steps = min(pauses * _core.control_interval, steps_to_report(model, every_steps))

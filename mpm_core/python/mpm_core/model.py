@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import Integration, StressUpdate
+from ._core import InputError, Integration, StressUpdate
 from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import positive
@@ -28,6 +28,7 @@ from .mesh import floats
 from .newton import Newton
 from .partition import rebalance_threshold
 from .pore_water import refuse_water
+from .rayleigh import Rayleigh, checked_rayleigh
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
@@ -210,6 +211,7 @@ class Model(Body):
         dt: float | None = None,
         courant: float = 0.5,
         damping: float = 0.0,
+        rayleigh: Rayleigh | None = None,
         pic: float = 0.0,
         nmd: bool = False,
         integration: Integration = Integration.PARTICLES,
@@ -231,7 +233,8 @@ class Model(Body):
                 saved then. When it returns true (on all ranks), the run ends with a report.
             dt: time step [s]; by default ``courant`` times the critical one, which is updated as the soil changes.
             courant: alpha_c of (17), in (0, 1].
-            damping: local damping alpha, in [0, 1).
+            damping: local damping alpha, in [0, 1); none where a side lies beside a free field.
+            rayleigh: damping of soil at small strains; see `Rayleigh`.
             pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
                 the step.
@@ -251,10 +254,15 @@ class Model(Body):
             RunError: a particle left the mesh, a value is not finite, a law failed; with the place. Energy does not add up.
         """
         refuse_water(self, "the explicit scheme")
+        damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
+        if damping and self._free_fields:
+            raise InputError(
+                f"damping is {damping} with free fields beside the sides, which know rayleigh only; expected 0"
+            )
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
-                explicit_options(damping, nmd, integration, stress_update),
+                explicit_options(damping, nmd, integration, stress_update, damped),
                 run_options(dt, courant, pic, allow_unstable),
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),
@@ -265,7 +273,8 @@ class Model(Body):
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
-        return Reports(run_explicit(self, options, run, times, watch, threshold, steps, limit), "explicit", self, until)
+        reports = run_explicit(self, options, run, times, watch, threshold, steps, limit, damped)
+        return Reports(reports, "explicit", self, until)
 
     def implicit(
         self,

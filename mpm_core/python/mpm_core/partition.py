@@ -80,7 +80,7 @@ def take_mesh(body: Body, mesh: Mesh) -> None:
     body._core.set_supports(body._conditions)
     body.mesh = mesh
     if absorbing:
-        body._take_absorbing(absorbing)
+        body._retake_absorbing(absorbing)
     body.repartitions += 1
 
 

@@ -1,0 +1,224 @@
+"""A column of level ground that a wave comes up through: the free field beside a side of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._core import RunError
+from .rayleigh import Rayleigh
+
+Floats = NDArray[np.float64]
+COURANT = 0.5
+SHEAR_OF_PLANE = {2: (3, 1), 3: (5, 4, 2)}
+"""Components of stress that act on a level plane, along each axis"""
+STRESS_OF_AXES = {2: ((0, 3), (3, 1)), 3: ((0, 3, 5), (3, 1, 4), (5, 4, 2))}
+"""Component of stress by two axes"""
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Soil between levels, as it is when a column begins to move; lists, for checkpoints.
+
+    Args:
+        heights: of the levels [m], rising, n + 1 of them.
+        law: number of the law of each layer (n).
+        density: [kg/m3], (n).
+        stress: [Pa], (n, S).
+        state: state variables, (n, n_state) of the law with the most.
+        cell_size: [m], (n).
+        coupled_mass: fraction of a layer's mass by which one of its levels takes the velocity of the other, (n).
+        normal: outer one of the side beside the column, (D).
+        time: when it begins to move [s].
+    """
+
+    heights: list[float]
+    law: list[int]
+    density: list[float]
+    stress: list[list[float]]
+    state: list[list[float]]
+    cell_size: list[float]
+    coupled_mass: list[float]
+    normal: list[float]
+    time: float
+
+    def as_entry(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Base:
+    """What a column stands on.
+
+    Args:
+        impedances: ``rho c_p`` and ``rho c_s`` of the ground below [kg/(m2 s)]; zeros for those of the lowest layer, infinite
+            where the base moves with twice the incoming wave.
+        thickness: of the ground below that acts as springs [m].
+        times: of the incoming wave [s], rising; none where there is none.
+        velocities: of it [m/s].
+        direction: of it, unit vector (D).
+    """
+
+    impedances: tuple[float, float]
+    thickness: float
+    times: Floats
+    velocities: Floats
+    direction: Floats
+
+    def wave(self, time: float) -> Floats:
+        """Velocity of the incoming wave [m/s], (D)."""
+        if len(self.times) == 0:
+            return 0.0 * self.direction
+        return float(np.interp(time, self.times, self.velocities, left=0.0, right=0.0)) * self.direction
+
+
+class GroundColumn:
+    """Level ground by linear finite elements over its height, in explicit steps of one length like those of a model.
+
+    All points of a level move alike. The mass matrix of velocities is that of the particles, so that waves are as fast as in
+    the model. Strains are small: the column keeps its geometry, and stresses are not
+    rotated. Only what changes from the start counts, so that it begins in equilibrium.
+
+    Args:
+        layers: the soil.
+        laws: those of the model.
+        base: what it stands on; None for a base at rest.
+        rayleigh: damping at small strains.
+    """
+
+    def __init__(self, layers: Layers, laws: list[Any], base: Base | None, rayleigh: Rayleigh) -> None:
+        self.heights = np.array(layers.heights)
+        self._laws, self._base, self._rayleigh = laws, base, rayleigh
+        self._law, self._cell_size = np.array(layers.law), np.array(layers.cell_size)
+        self._normal, self._start = np.array(layers.normal), layers.time
+        dim, n = len(self._normal), len(self._law)
+        self._on_plane = list(SHEAR_OF_PLANE[dim])
+        self._on_side = np.array(STRESS_OF_AXES[dim])
+        self._thickness, self._density = np.diff(self.heights), np.array(layers.density)
+        self.stress, self._state = np.array(layers.stress), np.array(layers.state).reshape(n, -1)
+        self._stress_start = self.stress.copy()
+        p_wave, shear = (
+            np.array([getattr(laws[k], name) for k in self._law]) for name in ("p_wave_modulus", "shear_modulus")
+        )
+        self._moduli = np.column_stack([shear] * (dim - 1) + [p_wave])  # (n, D), across and along the column
+        self._lame = p_wave - 2 * shear
+        self._mass = self._density * self._thickness
+        self._coupled = (self._mass * layers.coupled_mass)[:, None]
+        self._own = 0.5 * self._mass[:, None] - self._coupled
+        self._nodal_mass = self._to_levels(0.5 * self._mass, 0.5 * self._mass)
+        self._pieces = [(law, np.flatnonzero(self._law == k)) for k, law in enumerate(laws)]
+        critical = float((self._thickness * np.sqrt(self._density / p_wave)).min())
+        self.dt = COURANT * rayleigh.time_step(critical)
+        """Length of a step [s]"""
+        self.velocity, self._displacement = np.zeros((n + 1, dim)), np.zeros(dim)
+        self._steps = 0
+        self._rows = [(self.time, self.velocity.copy(), self._tractions(np.zeros_like(self.stress)))]
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._start + self._steps * self.dt
+
+    def advance(self, until: float) -> tuple[Floats, Floats, Floats]:
+        """Step to a time or just beyond it.
+
+        Returns:
+            Times (m) [s], velocities (m, n + 1, D) [m/s] and tractions on the side since the start (m, n + 1, D) [Pa], from
+            the last time before the present on.
+
+        Raises:
+            RunError: a law failed.
+        """
+        rows = self._rows[-2:]
+        while self.time < until:
+            viscous = self._step()
+            rows.append((self.time, self.velocity.copy(), self._tractions(viscous)))
+        self._rows = rows[-2:]
+        times, velocities, tractions = zip(*rows)
+        return np.array(times), np.array(velocities), np.array(tractions)
+
+    def _to_levels(self, lower: Floats, upper: Floats) -> Floats:
+        """What layers add to the levels below and above them."""
+        total = np.zeros((len(lower) + 1, *lower.shape[1:]))
+        total[:-1] += lower
+        total[1:] += upper
+        return total
+
+    def _rates(self) -> Floats:
+        """Derivative of the velocity by height, (n, D)."""
+        return np.diff(self.velocity, axis=0) / self._thickness[:, None]
+
+    def _is_damped(self) -> NDArray[np.bool_]:
+        if self._state.shape[1] == 0:
+            return np.ones(len(self._law), dtype=bool)
+        return self._state[:, 0] <= self._rayleigh.plastic_strain
+
+    def _viscous_stress(self, damped: NDArray[np.bool_]) -> Floats:
+        """Stress of the damping in proportion to stiffness, (n, S)."""
+        stress = np.zeros_like(self.stress)
+        if self._rayleigh.stiffness > 0:
+            rates = self._rates()
+            stress[:, :3] = (self._rayleigh.stiffness * self._lame * rates[:, -1])[:, None]
+            stress[:, self._on_plane] = self._rayleigh.stiffness * self._moduli * rates
+            stress[~damped] = 0.0
+        return stress
+
+    def _step(self) -> Floats:
+        """One step; returns the viscous stress at its start."""
+        damped = self._is_damped()
+        viscous = self._viscous_stress(damped)
+        on_plane = (self.stress - self._stress_start + viscous)[:, self._on_plane]
+        force = self._to_levels(on_plane, -on_plane)
+        if self._rayleigh.mass > 0:
+            half = 0.5 * self._rayleigh.mass * self._mass * damped
+            force -= self._to_levels(half, half)[:, None] * self.velocity
+        change = self.dt * force / self._nodal_mass[:, None]
+        change[0] = self.dt * self._base_acceleration(force[0])
+        lower, upper = change[:-1], change[1:]
+        gained = self._to_levels(self._own * lower + self._coupled * upper, self._coupled * lower + self._own * upper)
+        self.velocity += gained / self._nodal_mass[:, None]
+        if self._base is None:
+            self.velocity[0] = 0.0
+        self._displacement += self.dt * self.velocity[0]
+        self._strain()
+        self._steps += 1
+        return viscous
+
+    def _base_acceleration(self, force: Floats) -> Floats:
+        """Of the lowest level, whose dashpots take the mean velocity of the step, (D)."""
+        if self._base is None:
+            return 0.0 * force
+        incoming = 2 * self._base.wave(self.time + 0.5 * self.dt)
+        normal, shear = self._base.impedances
+        if np.isinf(normal):
+            return (incoming - self.velocity[0]) / self.dt
+        damping = np.array([shear] * (len(force) - 1) + [normal])
+        damping = np.where(damping > 0, damping, np.sqrt(self._density[0] * self._moduli[0]))
+        force = force - damping * (self.velocity[0] - incoming)
+        force -= self._moduli[0] / self._base.thickness * self._displacement
+        return force / (self._nodal_mass[0] + 0.5 * self.dt * damping)
+
+    def _strain(self) -> None:
+        increment = np.zeros_like(self.stress)
+        increment[:, self._on_plane] = self.dt * self._rates()
+        for law, rows in self._pieces:
+            if len(rows) == 0:
+                continue
+            stress, state = self.stress[rows], np.ascontiguousarray(self._state[rows, : law.n_state])
+            report = law.update(
+                increment[rows], stress, state, time=self.time, dt=self.dt, cell_size=self._cell_size[rows]
+            )
+            if report.failed:
+                height = self.heights[rows[report.first_failed]]
+                raise RunError(f"the law {law.name} failed in the free field above the height {height:.6g} m")
+            self.stress[rows], self._state[rows, : law.n_state] = stress, state
+
+    def _tractions(self, viscous: Floats) -> Floats:
+        """On the side, means of the layers around each level, (n + 1, D) [Pa]."""
+        change = self.stress - self._stress_start + viscous
+        traction = np.einsum("nij,j->ni", change[:, self._on_side], self._normal) * self._thickness[:, None]
+        length = self._to_levels(self._thickness, self._thickness)
+        return self._to_levels(traction, traction) / length[:, None]

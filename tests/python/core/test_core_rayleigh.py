@@ -1,0 +1,119 @@
+"""Rayleigh damping in the explicit scheme, against the decay of one degree of freedom in closed form."""
+
+import numpy as np
+import pytest
+from core_cases import box, moduli, run
+
+import mpm_core as mpm
+
+YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
+_, SHEAR, MODULUS = moduli(YOUNG, POISSON)
+SPEED = np.sqrt(SHEAR / DENSITY)
+RATIO = 0.02
+RAYLEIGH = mpm.Rayleigh.of_ratio(RATIO, frequencies=(0.5 * SPEED, 1.5 * SPEED))  # the modes 1 and 3 of a bar of 1 m
+
+
+def shear_bar(count=60):
+    """A bar of one cell's width that moves across only, with both ends fixed."""
+    model = mpm.Model(box((count, 1), (1.0, 1.0 / count)), mpm.LinearElastic(young=YOUNG, poisson=POISSON))
+    model.seed(density=DENSITY, per_cell=10)
+    model.fix((1, 2))
+    for tag in (3, 4):
+        model.roller(tag, (1, 0))
+    return model
+
+
+def with_mode(model, mode, resting, amplitude=1e-6):
+    x = model.particles.position
+    model.particles.set("velocity", np.column_stack([0 * x[:, 0], amplitude * np.sin(mode * np.pi * x[:, 0])]))
+    if resting:
+        model.rest()
+    return model
+
+
+@pytest.mark.parametrize("resting", [False, True])
+@pytest.mark.parametrize("mode", [1, 2, 3])
+def test_a_mode_decays_by_its_damping_ratio(mode, resting):
+    # The mesh lowers the square of mode 3's frequency, and its damping, by (kh)^2 / 4 = 0.6 %.
+    # Energy after n periods: exp(-4 pi n xi); xi is 2 % for modes 1 and 3, and 7/8 of it for mode 2.
+    model = with_mode(shear_bar(), mode, resting)
+    frequency, periods = 0.5 * mode * SPEED, 4
+    expected = {1: RATIO, 2: RATIO * (0.75 / 2 + 0.25 * 2), 3: RATIO}[mode]  # alpha/(2 w) + beta w/2 at w1, 2 w1, 3 w1
+    assert RAYLEIGH.ratio(frequency) == pytest.approx(expected, rel=1e-12)
+    start = model.report().kinetic_energy
+    report = run(model, periods / frequency, rayleigh=RAYLEIGH, conversion=None)
+    decay = -np.log((report.kinetic_energy + report.stored_energy) / start)
+    assert decay == pytest.approx(4 * np.pi * periods * expected, rel=0.01)
+    # what is lost is the work of damping, and nothing else
+    lost = start - report.kinetic_energy - report.stored_energy
+    assert report.damping_work == pytest.approx(lost, rel=0.01)
+    assert abs(report.unexplained_energy) < 0.01 * start
+
+
+@pytest.mark.parametrize("mass", [0.0, 2.0])
+def test_a_rigid_motion_is_slowed_down_by_the_mass_term_only(mass):
+    model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=YOUNG, poisson=POISSON))
+    model.seed(density=DENSITY, per_cell=10)
+    model.particles.set("velocity", np.tile([1e-6, 2e-6], (len(model.particles), 1)))
+    run(model, 0.5, rayleigh=mpm.Rayleigh(mass=mass, stiffness=1e-3), energy_limit=None)
+    slowed = np.exp(-mass * 0.5)
+    np.testing.assert_allclose(
+        model.particles.velocity, np.tile([1e-6 * slowed, 2e-6 * slowed], (len(model.particles), 1)), rtol=2e-3
+    )
+
+
+@pytest.mark.parametrize("resting", [False, True])
+def test_the_shortened_time_step_is_stable_and_the_one_without_damping_is_not(resting):
+    def growth_of(options):
+        model = shear_bar()
+        noise = 1e-6 * np.random.default_rng(3).standard_normal((len(model.particles), 2))
+        model.particles.set("velocity", noise)
+        if resting:
+            model.rest()
+        critical = model.critical_time_step()
+        damping = mpm.Rayleigh(stiffness=2.5 * critical)
+        step = damping.time_step(critical)
+        assert step == pytest.approx(critical * (np.sqrt(1 + 2.5**2) - 2.5), rel=1e-12)
+        start = model.report().kinetic_energy
+        model.explicit(400 * step, rayleigh=damping, conversion=None, energy_limit=None, **options(critical)).last()
+        return model.report().kinetic_energy / start
+
+    assert growth_of(lambda critical: {"courant": 1.0}) < 1.0
+    with pytest.raises(mpm.InputError, match="above the critical time step"):
+        growth_of(lambda critical: {"dt": 0.5 * critical})
+    try:
+        growth = growth_of(lambda critical: {"dt": critical, "allow_unstable": True})
+    except mpm.RunError:
+        growth = np.inf
+    assert not growth < 1.0
+
+
+def test_soil_that_has_yielded_is_not_damped():
+    soil = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e6, friction_angle=0.0)
+    momenta = []
+    for strain in (0.0, 0.01):
+        model = mpm.Model(box((4, 4)), soil)
+        model.seed(density=DENSITY, per_cell=10)
+        state = model.particles.state.copy()
+        state[:, 0] = strain
+        model.particles.set("state", state)
+        model.particles.set("velocity", np.tile([1e-6, 0.0], (len(model.particles), 1)))
+        run(model, 0.1, rayleigh=mpm.Rayleigh(mass=5.0, stiffness=1e-3), energy_limit=None)
+        momenta.append(model.report().momentum[0])
+    assert momenta[1] == pytest.approx(DENSITY * 1e-6, rel=1e-9)
+    assert momenta[0] == pytest.approx(DENSITY * 1e-6 * np.exp(-0.5), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: mpm.Rayleigh(mass=-1.0), "mass is -1.0 1/s, expected a number not below zero"),
+        (lambda: mpm.Rayleigh(stiffness=np.nan), "stiffness is nan s"),
+        (lambda: mpm.Rayleigh.of_ratio(1.5, (1.0, 2.0)), "ratio is 1.5, expected 0 <= ratio < 1"),
+        (lambda: mpm.Rayleigh.of_ratio(0.1, (0.0, 2.0)), "frequencies is 0.0 Hz, expected a positive number"),
+        (lambda: shear_bar().explicit(1.0, rayleigh=0.05), "rayleigh is 0.05, expected a Rayleigh or None"),
+    ],
+)
+def test_bad_input_is_refused(make, message):
+    with pytest.raises(mpm.InputError, match=message):
+        make()
