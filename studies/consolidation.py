@@ -2,28 +2,35 @@
 
 The site is a TOML file (`meshes/fill.toml` unless another is given): a mesh of gmsh, soils with laws of effective stress and
 conductivities, supports, what the water does at the boundaries, and pressures in time. The ground begins at rest under its
-weight and the steady flow; from there displacement and pore pressure are found together.
+weight and the steady flow; from there displacement and pore pressure are found together. With `--particles`, implicit particles
+whose pores hold water take over the ground at rest and follow it beside the finite elements, with the same steps and in small
+displacements.
 """
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.consolidation_plots import ExcessPicture, save_excess, save_over_time
+from common.consolidation_particles import ParticleGround, near_line
+from common.consolidation_plots import EXCESS, ExcessPicture, save_excess, save_isochrones, save_over_time
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
 from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
 from common.files import OutputError
-from common.options import add_count, add_number, study_parser
+from common.movie import PORE, Movie
+from common.options import add_count, add_flag, add_number, study_parser
 from common.page import Page
+from common.plots import DISPLACEMENT, save_particles
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
+from common.schemes import add_particles_per_cell
 from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY
@@ -50,6 +57,10 @@ def parser() -> ArgumentParser:
     add_number(p, "--first-step", 0.5, "days", "first step", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
     add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
+    add_flag(
+        p, "--particles", "follow the ground by implicit particles, too, which the reservoirs have to keep under water"
+    )
+    add_particles_per_cell(p, 3)
     return p
 
 
@@ -59,13 +70,18 @@ def parser() -> ArgumentParser:
 class Files(FieldFiles):
     """What is written as time goes on: frames for ParaView, and the history of the settlements."""
 
-    def __init__(self, model: water.Consolidation, site: ConsolidationSite, folder: Path) -> None:
-        self._model, self._names = model, list(site.points)
+    def __init__(
+        self, model: water.Consolidation, site: ConsolidationSite, folder: Path, particles: ParticleGround | None
+    ) -> None:
+        self._model, self._names, self.particles = model, list(site.points), particles
         self._places = np.array(list(site.points.values())) if comm.rank == 0 else np.empty((0, 2))
         self._start = model.pressure.x.array.copy()
         self._excess = fem.Function(model.pressure.function_space, name="excess_pore_pressure")
         settlements = (f"settlement_{name}_m" for name in self._names)
         columns = ["time_days", *settlements, "largest_excess_pressure_Pa", "water_error_m2"]
+        if particles is not None:
+            columns += [f"settlement_{name}_particles_m" for name in self._names]
+            columns += ["largest_excess_pressure_particles_Pa"]
         super().__init__(model.domain, folder / "consolidation", folder / "history.csv", columns)
         self.pictures: list[ExcessPicture | None] = []
 
@@ -76,6 +92,12 @@ class Files(FieldFiles):
         largest = comm.allreduce(float(self._excess.x.array.max(initial=-np.inf)), MPI.MAX)
         settled = comm.bcast(-model.evaluate_at(self._places)["displacement"][:, 1])
         values = {f"settlement_{name}_m": value for name, value in zip(self._names, settled)}
+        if self.particles is not None:
+            if report is not None:
+                self.particles.follow(model.time, report.dt)
+            theirs = zip(self._names, self.particles.settlements())
+            values |= {f"settlement_{name}_particles_m": value for name, value in theirs}
+            values["largest_excess_pressure_particles_Pa"] = self.particles.largest_excess()
         error = report.water_error if report else 0.0
         self.history.add(time_days=model.time / DAY, largest_excess_pressure_Pa=largest, water_error_m2=error, **values)
 
@@ -91,6 +113,8 @@ class Files(FieldFiles):
         self.output.write(model.time, fields, {})
         excess, moved = gathered(self._excess), gathered(model.displacement)
         days = model.time / DAY
+        if self.particles is not None:
+            self.particles.frame(days)
         name = f"After {days:.0f} days" if days >= 100 else f"After {days:.3g} days"
         self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
 
@@ -107,7 +131,10 @@ def follow(a: Namespace, model: water.Consolidation, files: Files) -> str | None
                 progress.show(model.time / DAY, len(files.history))
 
         for frame in frames:
-            reports = model.run(DAY * frame, dt, a.growth, progress=made)
+            try:
+                reports = model.run(DAY * frame, dt, a.growth, progress=made)
+            except mpm.RunError as error:
+                return f"particles from {model.time / DAY:.4g} days on: {error}"
             if not reports[-1].converged:
                 return f"no step from {model.time / DAY:.4g} days on: {reports[-1].reason}"
             dt = max(dt, max(report.dt for report in reports))
@@ -124,21 +151,37 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
     days = history["time_days"][1:]
     settled = {name: 1e3 * history[f"settlement_{name}_m"][1:] for name in site.points}
     largest = {"largest": 1e-3 * history["largest_excess_pressure_Pa"][1:]}
-    return {
+    x, theirs, settled_theirs, largest_theirs = next(iter(site.points.values()))[0], [], {}, {}
+    if files.particles is not None:
+        theirs = [frame for frame in files.particles.frames if frame is not None]
+        settled_theirs = {name: 1e3 * history[f"settlement_{name}_particles_m"][1:] for name in site.points}
+        largest_theirs = {"largest": 1e-3 * history["largest_excess_pressure_particles_Pa"][1:]}
+    pictures: Pictures = {
         "excess_pressure.png": lambda: save_excess(folder / "excess_pressure.png", shown),
+        "isochrones.png": lambda: save_isochrones(
+            folder / "isochrones.png", x, shown, [near_line(frame, x) for frame in theirs]
+        ),
         "settlement.png": lambda: save_over_time(
-            folder / "settlement.png", days, settled, "Settlement [mm]", downward=True
+            folder / "settlement.png", days, settled, "Settlement [mm]", True, settled_theirs
         ),
         "largest_excess.png": lambda: save_over_time(
-            folder / "largest_excess.png", days, largest, "Largest excess pore pressure [kPa]"
+            folder / "largest_excess.png", days, largest, "Largest excess pore pressure [kPa]", False, largest_theirs
         ),
     }
+    if theirs:
+        frame = max(theirs, key=lambda frame: frame[PORE].max())
+        pictures["particles_excess.png"] = lambda: save_particles(
+            folder / "particles_excess.png", files.particles.scene, frame["position"], frame["volume"], frame[PORE],
+            EXCESS, title=f"$t$ = {frame['time']:.3g} days")  # fmt: skip
+    return pictures
 
 
 CAPTIONS = {
     "excess_pressure": "Pore pressure above that at the beginning, on the deformed ground",
+    "isochrones": "Excess pore pressure below the first point of the site",
     "settlement": "Settlement of the points of the site over the logarithm of time",
     "largest_excess": "Largest excess pore pressure over the logarithm of time",
+    "particles_excess": "Excess pore pressure of the particles when it is largest",
 }
 
 
@@ -151,7 +194,11 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     site = read_consolidation_site(a.site, comm, a.cell_size)
     model = site.at_rest(ELEMENTS[a.elements])
-    with Files(model, site, folder) as files:
+    with ExitStack() as stack:
+        particles = None
+        if a.particles:
+            particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, folder))
+        files = stack.enter_context(Files(model, site, folder, particles))
         files.row()
         stopped = follow(a, model, files)
     history = files.history
@@ -162,10 +209,20 @@ def main(arguments: list[str] | None = None) -> int:
         "largest_water_error_m2": np.abs(history["water_error_m2"]).max(),
         "last_time_days": model.time / DAY, "steps": len(history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(site, files, folder))
+    movies = []
+    if particles is not None:
+        summary |= {
+            f"settlement_{name}_particles_m": history[f"settlement_{name}_particles_m"][-1] for name in site.points
+        }
+        summary |= {"particles": particles.count, "largest_newton_iterations_particles": particles.iterations}
+        if particles.scene is not None:
+            movies = [Movie("particles", particles.scene, particles.frames, {"displacement": DISPLACEMENT})]
+    page = Page(movies=movies, slider=("t", "days"), captions=CAPTIONS)
+    write_summary(folder, a, summary, comm, page, drawn(site, files, folder))
     if comm.rank == 0:
         for name in site.points:
-            print(f"settlement, {name}: {1e3 * summary[f'settlement_{name}_m']:.4g} mm")
+            theirs = f", particles {1e3 * summary[f'settlement_{name}_particles_m']:.4g} mm" if a.particles else ""
+            print(f"settlement, {name}: {1e3 * summary[f'settlement_{name}_m']:.4g} mm{theirs}")
         if stopped:
             print(f"ended early: {stopped}", file=sys.stderr)
         print(f"results in {folder}")

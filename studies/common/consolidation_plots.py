@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
-from matplotlib.tri import Triangulation
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from .field_plots import Field
 from .figures import save_figure
@@ -31,7 +31,8 @@ class ExcessPicture:
 
 
 def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
-    """Panels above one another with one scale; displacements are enlarged to a twentieth of the picture's height."""
+    """Panels with one scale, side by side where the ground is higher than wide; displacements are enlarged to a twentieth of
+    the picture's height."""
     points = pictures[0].excess.points
     low, high = points.min(axis=0), points.max(axis=0)
     largest = max(np.abs(picture.moved).max() for picture in pictures)
@@ -42,11 +43,15 @@ def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
     )  # what falls below zero by a little takes its colour
     ticks = ROUND_TICKS.tick_values(least, max(every.max(), least + 1e-6))
     limits, levels = (ticks[0], ticks[-1]), np.linspace(ticks[0], ticks[-1], 21)
-    aspect = (high[1] - low[1]) / (high[0] - low[0])
+    aspect, count = (high[1] - low[1]) / (high[0] - low[0]), len(pictures)
+    rows, columns, size = (count, 1, (6.9, count * (5.6 * aspect + 0.4) + 0.4))
+    if aspect > 1:
+        rows, columns, size = 1, count, (count * (4.0 / aspect + 0.5) + 1.0, 4.8)
     with paper_style():
-        figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.6 * aspect + 0.4) + 0.4), sharex=True,
-                                      squeeze=False, layout="constrained")  # fmt: skip
-        for axes, picture in zip(panels[:, 0], pictures):
+        figure, panels = plt.subplots(
+            rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
+        )
+        for axes, picture in zip(panels.ravel(), pictures):
             field = picture.excess
             moved = field.points + enlarged * picture.moved
             triangles = Triangulation(*moved.T, field.cells)
@@ -56,30 +61,80 @@ def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
                 axes.tricontour(triangles, values, levels[1:-1], colors="black", linewidths=0.3, alpha=0.6)
             segments = Field(moved, field.cells, field.values).outline
             axes.add_collection(LineCollection(segments, colors="black", linewidths=0.8))
-            axes.set_title(f"{picture.name}, displacements {enlarged:g} times", loc="left", pad=3)
-            axes.set(aspect="equal", xlim=(low[0], high[0]), ylabel="$y$ [m]")
+            axes.set_title(picture.name, loc="left", pad=3, fontsize=9)
+            axes.set(aspect="equal", xlim=(low[0], high[0]))
             axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
-        panels[-1, 0].set_xlabel("$x$ [m]")
+        figure.suptitle(f"Displacements {enlarged:g} times", fontsize=9)
+        for axes in panels[-1]:
+            axes.set_xlabel("$x$ [m]")
+        for axes in panels[:, 0]:
+            axes.set_ylabel("$y$ [m]")
         bar = figure.colorbar(
-            ScalarMappable(Normalize(*limits), EXCESS.colours), ax=panels[:, 0].tolist(), shrink=0.8, pad=0.01
+            ScalarMappable(Normalize(*limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01
         )
         bar.set_label(EXCESS.label)
         save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
-def save_over_time(
-    path: Path, days: np.ndarray, curves: Mapping[str, np.ndarray], label: str, downward: bool = False
+def save_isochrones(
+    path: Path, x: float, pictures: Sequence[ExcessPicture], particles: Sequence[tuple[np.ndarray, np.ndarray]] = ()
 ) -> None:
-    """Curves over the logarithm of the time, by name; downward: with the vertical axis turned over, as for settlements."""
+    """Excess pore pressure over the height along a vertical line through the ground, a curve for each picture.
+
+    Args:
+        x: of the line [m].
+        particles: for each picture heights [m] and excess pressures [Pa] of particles next to the line, drawn as marks.
+    """
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
+        for colour, picture in zip(cycle(CURVES), pictures):
+            field = picture.excess
+            low, high = field.points.min(axis=0), field.points.max(axis=0)
+            inside = min(max(x, low[0] + 1e-6), high[0] - 1e-6)
+            heights = np.linspace(low[1], high[1], 201)
+            values = LinearTriInterpolator(Triangulation(*field.points.T, field.cells), field.values[:, 0])(
+                np.full(201, inside), heights
+            )
+            axes.plot(EXCESS.scale * values, heights, color=colour, linewidth=1.1, label=picture.name.lower())
+        for colour, (heights, values) in zip(cycle(CURVES), particles):
+            axes.plot(EXCESS.scale * values, heights, ".", color=colour, markersize=2.5)
+        axes.set(xlabel=EXCESS.label, ylabel="$y$ [m]")
+        axes.set_title(
+            f"$x$ = {x:g} m" + (": elements (lines), particles (dots)" if particles else ""), loc="left", pad=4
+        )
+        axes.tick_params(top=True, right=True)
+        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.legend(fontsize=8)
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+
+
+def save_over_time(
+    path: Path,
+    days: np.ndarray,
+    curves: Mapping[str, np.ndarray],
+    label: str,
+    downward: bool = False,
+    particles: Mapping[str, np.ndarray] | None = None,
+) -> None:
+    """Curves over the logarithm of the time, by name; particles: values beside those of the same name, as open marks.
+
+    downward: with the vertical axis turned over, as for settlements
+    """
     with paper_style():
         figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
         for colour, (name, values) in zip(cycle(CURVES), curves.items()):
-            axes.semilogx(days, values, "o-", color=colour, markersize=2.5, linewidth=1.1, label=name)
+            axes.semilogx(
+                days, values, "-" if particles else "o-", color=colour, markersize=2.5, linewidth=1.1, label=name
+            )
+        for colour, (name, values) in zip(cycle(CURVES), (particles or {}).items()):
+            axes.semilogx(
+                days, values, "o", color=colour, markersize=3.5, markerfacecolor="none", label=f"{name}, particles"
+            )
         axes.set(xlabel="Time [days]", ylabel=label)
         axes.tick_params(top=True, right=True, which="both")
         axes.grid(linewidth=0.3, color="#d0d0d0")
         if downward:
             axes.invert_yaxis()
-        if len(curves) > 1:
+        if len(curves) > 1 or particles:
             axes.legend(fontsize=8)
         save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

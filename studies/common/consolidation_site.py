@@ -26,6 +26,7 @@ from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
 from .site_file import law_at, read_toml, supports_of
+from .slope_case import GRAVITY
 from .water_site import DAY, condition, porous_soil
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points")
@@ -72,6 +73,34 @@ class ConsolidationSite:
                                     element=element, cell_tags=cell_tags)  # fmt: skip
         model.initialise(fem, flow)
         return model
+
+    def particles(self, fem: water.Consolidation, per_cell: int) -> mpm.Model:
+        """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
+
+        Raises:
+            InputError: the water has a boundary condition other than reservoirs, or a conductivity that depends on the direction.
+        """
+        model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
+        for k, (soil, weight) in enumerate(self.unit_weight.items()):
+            if np.ndim(self.soils[soil].conductivity):
+                raise mpm.InputError(f"soils.{soil}: conductivity: has several values, expected one for particles")
+            for tag in model.mesh.tags_of("cell", soil):
+                model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=k)
+        bridge.apply_supports(model, self.supports)
+        model.set_gravity((0.0, -GRAVITY))
+        model.add_water(
+            porosity={name: soil.porosity for name, soil in self.soils.items()},
+            conductivity={name: float(soil.conductivity) for name, soil in self.soils.items()},
+        )
+        self.load_particles(model, fem.time)
+        bridge.initialise(model, fem)
+        return model
+
+    def load_particles(self, model: mpm.Model, time: float) -> None:
+        """Give particles the reservoirs and the pressures of a time [s]. Collective."""
+        water.apply_reservoirs(model, self.boundary, time)
+        for tag, given in self.pressures.items():
+            model.press_surface(tag, value_at(given, time))
 
 
 def read_consolidation_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> ConsolidationSite:

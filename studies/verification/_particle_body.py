@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from common.wet_particles import SmallMotion
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -34,7 +35,7 @@ class ParticleBody:
         self._motion = (lambda time: load(time).displacement) if callable(load) else lambda time: 0.0
         for tag, pressure in ({} if callable(load) else load.pressure).items():
             self.model.press_surface(tag, pressure)
-        self._moved, self._factor, self.plate_force = np.zeros(self.model.mesh.points.shape), 0.0, 0.0
+        self._steps, self._factor, self.plate_force = SmallMotion(self.model), 0.0, 0.0
 
     def drain(self, tags):
         """Let water leave at these parts of the surface."""
@@ -53,8 +54,7 @@ class ParticleBody:
         """One step of dt [s], or several shorter ones."""
         more = self._move_plates(dt)
         before = self.model.report().support_work
-        for report in self.model.implicit(self.model.time + dt, dt=dt, quasi_static=True, small_displacements=True):
-            self._moved += report.dt * self.model.nodal("velocity")
+        *_, report = self._steps.advance(self.model.time + dt, dt)
         if more:
             self.plate_force = (report.support_work - before) / more
 
@@ -70,17 +70,5 @@ class ParticleBody:
         return change * sum(abs(part) for whole in self._plates.values() for part in whole if part)
 
     def at(self, point):
-        """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point; on all ranks."""
-        mesh, p, point = self.model.mesh, self.model.particles, np.asarray(point, dtype=float)
-        (cell,) = mesh.cells_of(point[None])
-        found = None
-        if 0 <= cell < mesh.owned_cells:
-            corners = mesh.cells[cell]
-            edges = mesh.points[corners[1:]] - mesh.points[corners[0]]
-            inner = np.linalg.solve(edges.T, point - mesh.points[corners[0]])
-            rows = p.cell == cell
-            pressure = p.pore_pressure[rows] + np.einsum(
-                "pa,pa->p", p.pressure_gradient[rows], point - p.position[rows]
-            )
-            found = np.append(1 - inner.sum(), inner)[None] @ self._moved[corners], pressure.mean()[None]
-        return next(each for each in comm.allgather(found) if each is not None)
+        """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point."""
+        return self._steps.at([point])

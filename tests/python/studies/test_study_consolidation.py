@@ -43,6 +43,19 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
         read_consolidation_site(path, MPI.COMM_SELF).at_rest(water.Element.STABILISED)
 
 
+def test_particles_take_no_other_water_than_reservoirs(tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    path = tmp_path / "site.toml"
+    site = SITE.replace("[boundaries.footing]\nreservoir", "[boundaries.footing]\nhead")
+    path.write_text(site.replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
+    ground = read_consolidation_site(path, MPI.COMM_SELF)
+    with pytest.raises(InputError, match="boundary: has Head.*expected reservoirs only for particles"):
+        ground.particles(ground.at_rest(water.Element.STABILISED), 3)
+
+
 @pytest.mark.parametrize("elements", ["P2-P1", "P1-P1"])
 def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     import consolidation
@@ -63,14 +76,16 @@ def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     period = height**2 * 9810.0 / (k * oedometer) / 86400  # days
     folder = tmp_path / "results"
     arguments = ["--site", tmp_path / "layer.toml", "--elements", elements, "--days", period, "--first-step", 1e-3 * period,
-                 "--growth", 1.1, "--frames", 2, "--output", folder]  # fmt: skip
+                 "--growth", 1.1, "--frames", 2, "--particles", "--output", folder]  # fmt: skip
     assert consolidation.main([str(word) for word in arguments]) == 0
     with open(folder / "history.csv", newline="") as file:
-        rows = [[float(row[name]) for name in ("time_days", "settlement_middle_m")] for row in csv.DictReader(file)]
-    days, settled = np.transpose(rows[1:])
+        columns = ("time_days", "settlement_middle_m", "settlement_middle_particles_m")
+        rows = [[float(row[name]) for name in columns] for row in csv.DictReader(file)]
+    days, settled, by_particles = np.transpose(rows[1:])
     exact = [layer_settled(factor) for factor in days / period]
     late = days > 0.02 * period
-    assert settled[late] * oedometer / (load * height) == pytest.approx(np.array(exact)[late], abs=0.02)
+    for found in (settled, by_particles):
+        assert found[late] * oedometer / (load * height) == pytest.approx(np.array(exact)[late], abs=0.02)
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["largest_water_error_m2"] < 1e-10 * load * height / oedometer
     assert summary["largest_excess_pressure_Pa"] == pytest.approx(load, rel=0.01 if elements == "P1-P1" else 0.1)
