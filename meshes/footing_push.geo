@@ -1,4 +1,4 @@
-// Half of a footing on the ground, and the air over it, for a footing that is pushed in: the axis of symmetry is x = 0, the
+// Half of a footing or of a cone on the ground, and the air over it, for a body that is pushed in: the axis of symmetry is x = 0, the
 // ground's surface y = 0. The cells are small along the way of the footing's edge, where the stress jumps.
 // Constants are set with -setnumber, or as `parameters` of fenics_bridge.read_mesh. Lengths in m.
 DefineConstant[
@@ -30,12 +30,12 @@ Plane Surface(2) = {2};
 
 Field[1] = Box;
 Field[1].VIn = edge_size;
-Field[1].VOut = near_size;
+Field[1].VOut = far_size;
 Field[1].XMin = half_width - 6 * edge_size;
 Field[1].XMax = half_width + 6 * edge_size;
 Field[1].YMin = -penetration - 6 * edge_size;
 Field[1].YMax = headroom;
-Field[1].Thickness = 0.4 * half_width;
+Field[1].Thickness = 0.4 * half_width * (far_size - edge_size) / (near_size - edge_size + 0.5 * edge_size);
 Field[2] = Box;
 Field[2].VIn = near_size;
 Field[2].VOut = far_size;
@@ -44,11 +44,9 @@ Field[2].XMax = 2.5 * half_width;
 Field[2].YMin = -penetration - 1.5 * half_width;
 Field[2].YMax = headroom;
 Field[2].Thickness = width;
-Field[3] = Max;
+Field[3] = Min;
 Field[3].FieldsList = {1, 2};
-Field[4] = Min;
-Field[4].FieldsList = {1, 3};
-Background Field = 4;
+Background Field = 3;
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;
 

@@ -1,0 +1,62 @@
+"""Cone resistance and the limit pressure of spherical cavities, as factors of the strength."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def teh_houlsby(rigidity: float, roughness: float) -> float:
+    """Cone factor of a 60 degree cone in Tresca soil under an isotropic stress, with a smooth shaft.
+
+    C. I. Teh, G. T. Houlsby, Géotechnique 41 (1991) 17: strain paths, with a correction by finite elements.
+
+    Args:
+        rigidity: shear modulus over the shear strength, 50 to 500.
+        roughness: shear strength of the face of the cone over that of the soil, 0 to 1.
+    """
+    return (1.25 + rigidity / 2000) * 4 / 3 * (1 + np.log(rigidity)) + 2.4 * roughness
+
+
+def lu(rigidity: float, roughness: float) -> float:
+    """The same by large-strain finite elements: Q. Lu, M. F. Randolph, Y. Hu, I. C. Bugarski, Proc. ICOF (2004), as fitted there.
+
+    Args:
+        rigidity, roughness: as for `teh_houlsby`.
+    """
+    return 3.4 + 1.6 * np.log(rigidity) + 1.3 * roughness
+
+
+def spherical_limit_pressure(
+    *, young: float, poisson: float, cohesion: float, friction_angle: float, dilation_angle: float
+) -> float:
+    """Limit pressure of a spherical cavity in Mohr-Coulomb soil without initial stress, in the unit of the cohesion.
+
+    H. S. Yu, G. T. Houlsby, Géotechnique 41 (1991) 173, with k = 2 and p0 = 0, small elastic and large plastic strains.
+
+    Args:
+        friction_angle, dilation_angle: [degrees]; the former positive.
+    """
+    phi, psi = np.sin(np.radians([friction_angle, dilation_angle]))
+    alpha, beta = (1 + phi) / (1 - phi), (1 + psi) / (1 - psi)
+    yield_stress = 2 * cohesion * np.sqrt(1 - phi**2) / (1 - phi)
+    shear = young / (2 * (1 + poisson))
+    gamma = alpha * (beta + 2) / (2 * (alpha - 1) * beta)
+    delta = yield_stress / (2 * (2 + alpha) * shear)
+    bracket = alpha * beta + 2 * (1 - 2 * poisson) + 2 * poisson - 2 * poisson * (alpha + beta)
+    xi = 3 * delta / ((1 + poisson) * (alpha - 1) * beta) * bracket
+    eta = np.exp((beta + 2) * (1 - 2 * poisson) * yield_stress / (young * (alpha - 1) * beta))
+    goal = eta / gamma * (1 - delta) ** ((beta + 2) / beta)
+
+    def series(ratio: float) -> float:
+        """Lambda_1 of the paper: the integral from 1 to the ratio of exp(xi x) x^(-gamma - 1)."""
+        x, weights = np.polynomial.legendre.leggauss(200)
+        t = 0.5 * np.log(ratio) * (x + 1)  # x = e^t
+        return float(0.5 * np.log(ratio) * weights @ np.exp(xi * np.exp(t) - gamma * t))
+
+    low, high = 1.0, 2.0
+    while series(high) < goal:
+        low, high = high, 2 * high
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if series(middle) < goal else (low, middle)
+    return float((3 * alpha * low / (2 + alpha) - 1) * yield_stress / (alpha - 1))
