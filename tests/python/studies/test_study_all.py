@@ -22,12 +22,9 @@ SMALL = {
     "collapse": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation",
     "collapse_schemes": "--cell-size 0.5 --meshes 1 --elements P1",
     "compare_fem": "--cell-size 0.5 --meshes 1 --particles-per-cell 1 --scheme implicit",
-<<<<<<< HEAD
     "consolidation": "--days 20 --first-step 5 --growth 2 --frames 2 --particles",
-=======
     "cone": "--cell-size 0.006 --particles-per-cell 1 --penetration 0.01 --speed 0.02 --width 5 --frames 8",
     "consolidation": "--days 20 --first-step 5 --growth 2 --frames 2",
->>>>>>> 32865a6 (Push cones into soil, and let the cells of such meshes grow)
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3",
     "drawdown": "--cell-size 3 --elements P1 --days 4 --factor-times 1",
@@ -55,11 +52,8 @@ WITH_PARTICLES = (
     "balance",
     "barrier",
     "compare_fem",
-<<<<<<< HEAD
     "consolidation",
-=======
     "cone",
->>>>>>> 32865a6 (Push cones into soil, and let the cells of such meshes grow)
     "embankment",
     "footing_push",
     "handover",
