@@ -44,6 +44,7 @@ class Check:
         scale: what errors are divided by, in ``unit``; by default the expected number's size.
         limit: the reason, where the method is known not to reach the expected number. Such a check is shown with its
             error and counts as no failure.
+        method: where several methods find the same quantity, the one of this check; they stand in one row of the table.
     """
 
     quantity: str
@@ -55,6 +56,7 @@ class Check:
     kind: Kind = Kind.EQUAL
     scale: float | None = None
     limit: str = ""
+    method: str = ""
 
     @property
     def error(self) -> float:
@@ -82,7 +84,7 @@ def line(check: Check) -> str:
     verdict = "pass" if check.passed else "known limit" if check.limit else "FAIL"
     unit = "" if check.unit == "-" else f" {check.unit}"
     return (
-        f"  {verdict:5} {check.quantity}: {check.computed:.5g}{unit}, "
+        f"  {verdict:5} {check.quantity}{', ' * bool(check.method)}{check.method}: {check.computed:.5g}{unit}, "
         f"expected {check.kind.value} {check.expected:.5g}{unit}, error {check.error:.2%}, tolerance {check.tolerance:.2%}"
     )
 

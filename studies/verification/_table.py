@@ -34,19 +34,21 @@ class CheckRow:
     kind: str
     limit: str
     passed: bool
+    method: str = ""
 
     @property
     def verdict(self) -> str:
         return "pass" if self.passed else "known limit" if self.limit else "FAIL"
 
-    def texts(self) -> list[str]:
-        """The row under `COLUMNS`."""
+    def texts(self) -> dict[str, str]:
+        """The row by `COLUMNS`."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         sign = "" if self.kind == "=" else f"{self.kind} "
         error = "none" if self.error is None else percent(self.error)
         computed = "none" if self.computed is None else f"{self.computed:.5g}{unit}"
         expected = f"{sign}{self.expected:.5g}{unit}"
-        return [self.quantity, expected, computed, error, percent(self.tolerance), self.verdict, self.source]
+        values = self.quantity, expected, computed, error, percent(self.tolerance), self.verdict, self.source
+        return dict(zip(COLUMNS, values, strict=True))
 
 
 @dataclass
@@ -65,6 +67,30 @@ class CaseRow:
     @property
     def passed(self) -> bool:
         return not self.error and all(check.passed or check.limit for check in self.checks)
+
+    def rows(self) -> tuple[tuple[str, ...], list[list[str]], list[int]]:
+        """Columns and rows of the table of the checks, and the numbers of the rows that fail.
+
+        Where methods stand side by side, each has a column with its number and error, and the verdict is the worst one.
+        """
+        methods = tuple(dict.fromkeys(check.method for check in self.checks if check.method))
+        if not methods:
+            wrong = [k for k, check in enumerate(self.checks) if check.verdict == "FAIL"]
+            return COLUMNS, [list(check.texts().values()) for check in self.checks], wrong
+        first, last = COLUMNS[:2], COLUMNS[4:]
+        others = ("Computed",) * any(not check.method for check in self.checks)
+        groups: dict[tuple[str, ...], dict[str, CheckRow]] = {}
+        for check in self.checks:
+            key = tuple(check.texts()[name] for name in (*first, "Tolerance", COLUMNS[-1]))
+            groups.setdefault(key, {})[check.method or "Computed"] = check
+        rows, wrong = [], []
+        for k, (key, by_method) in enumerate(groups.items()):
+            cells = {name: check.texts() for name, check in by_method.items()}
+            shown = [f"{cells[m]['Computed']} ({cells[m]['Error']})" if m in cells else "" for m in (*methods, *others)]
+            verdict = max((check.verdict for check in by_method.values()), key=("pass", "known limit", "FAIL").index)
+            rows.append([*key[:2], *shown, key[2], verdict, key[3]])
+            wrong += [k] * (verdict == "FAIL")
+        return (*first, *methods, *others, *last), rows, wrong
 
     def notes(self) -> list[str]:
         """What is to be said about known limits, each once."""
@@ -111,7 +137,7 @@ def case_row(name: str, group: str, docstring: str, result: Result, error: str, 
     paragraphs = [" ".join(part.split()) for part in text.strip().split("\n\n")]
     checks = [
         CheckRow(c.quantity, float(c.expected), c.source, _finite(c.computed), _finite(c.error), float(c.tolerance),
-                 c.unit, c.kind.value, c.limit, bool(c.passed))
+                 c.unit, c.kind.value, c.limit, bool(c.passed), c.method)
         for c in result.checks
     ]  # fmt: skip
     return CaseRow(
@@ -149,11 +175,9 @@ def save_page(folder: Path, table: Table, parameters: Sequence[Parameter] = ()) 
         text = "\n\n".join(
             [case.text, *([f"The case ended with an error: {case.error}"] if case.error else []), *case.notes()]
         )
-        wrong = [k for k, check in enumerate(case.checks) if check.verdict == "FAIL"]
+        columns, rows, wrong = case.rows()
         figures = {folder / case.name / name: f"{caption}" for name, caption in case.figures.items()}
-        sections.append(
-            Section(f"{case.group}: {case.title}", text, COLUMNS, [c.texts() for c in case.checks], wrong, figures)
-        )
+        sections.append(Section(f"{case.group}: {case.title}", text, columns, rows, wrong, figures))
     rows = [
         [case.group, case.title, f"{len(case.checks)}", f"{sum(c.passed for c in case.checks)}",
          f"{sum(c.verdict == 'known limit' for c in case.checks)}",
@@ -224,7 +248,8 @@ def docs_page(table: Table) -> str:
 
 
 def _docs_case(case: CaseRow) -> str:
-    rows = [COLUMNS, ["---"] * len(COLUMNS), *(check.texts() for check in case.checks)]
+    columns, found, _ = case.rows()
+    rows = [columns, ["---"] * len(columns), *found]
     table = "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in row) + " |" for row in rows)
     figures = [
         f"![{caption}](images/verification/{case.name}_{name})\n\n*{caption}*" for name, caption in case.figures.items()

@@ -139,11 +139,11 @@ def layer_checks(element, n, tolerance):
         body.follow(factor)
         moved, _ = body.at((0.1, 1.0))
         settled = -moved[0, 1] * body.law.p_wave_modulus / LOAD
-        checks.append(Check(f"layer, settlement at T = {factor:g}, {name}", layer_settlement(factor), "Terzaghi (1923)",
-                            settled, tolerance, scale=1.0))  # fmt: skip
+        checks.append(Check(f"layer, settlement at T = {factor:g}", layer_settlement(factor), "Terzaghi (1923)",
+                            settled, tolerance, scale=1.0, method=name))  # fmt: skip
     _, p = body.at((0.1, 0.0))
-    checks.append(Check(f"layer, pressure at the base at T = 1, {name}", layer_pressure([0.0], 1.0)[0], "Terzaghi (1923)",
-                        p[0] / LOAD, tolerance, scale=1.0))  # fmt: skip
+    checks.append(Check("layer, pressure at the base at T = 1", layer_pressure([0.0], 1.0)[0], "Terzaghi (1923)",
+                        p[0] / LOAD, tolerance, scale=1.0, method=name))  # fmt: skip
     return checks
 
 
@@ -156,11 +156,11 @@ def slab_checks(element, n, poisson, tolerance):
         curve.append((factor, 2 * p[0] / LOAD))
         if factor in (0.05, 0.1, 0.5):
             expected = mandel_pressure([0.0], factor, poisson)[0]
-            checks.append(Check(f"slab, pressure in the middle over F / 2a at T = {factor:g}, ν = {poisson:g}, {name}", expected,
-                                "Mandel (1953)", curve[-1][1], tolerance, scale=1.0))  # fmt: skip
+            checks.append(Check(f"slab, pressure in the middle over F / 2a at T = {factor:g}, ν = {poisson:g}", expected,
+                                "Mandel (1953)", curve[-1][1], tolerance, scale=1.0, method=name))  # fmt: skip
     force = body.plate_force
-    checks.append(Check(f"slab, force on the plate at T = 1, ν = {poisson:g}, {name}", LOAD / 1e3, "the one of Mandel's problem",
-                        force / 1e3, tolerance, "kN/m"))  # fmt: skip
+    checks.append(Check(f"slab, force on the plate at T = 1, ν = {poisson:g}", LOAD / 1e3, "the one of Mandel's problem",
+                        force / 1e3, tolerance, "kN/m", method=name))  # fmt: skip
     return checks, np.array(curve).T
 
 
@@ -171,8 +171,9 @@ def ball_checks(element, n, tolerance):
         _, p = body.at((0.0, 0.0))
         curve.append((factor, p[0] / LOAD))
         if factor in (0.05, 0.2):
-            checks.append(Check(f"ball, pressure at the centre over the load at T = {factor:g}, ν = 0.2, {name}",
-                                ball_pressure(factor, 0.2), "Cryer (1963)", curve[-1][1], tolerance, scale=1.0))  # fmt: skip
+            checks.append(Check(f"ball, pressure at the centre over the load at T = {factor:g}, ν = 0.2",
+                                ball_pressure(factor, 0.2), "Cryer (1963)", curve[-1][1], tolerance, scale=1,
+                                method=name))  # fmt: skip
     return checks, np.array(curve).T
 
 
@@ -181,14 +182,14 @@ def strip_checks(element, size, tolerance):
     body.advance(1e-7 * body.period)
     for depth in (0.5, 1.0, 2.0):
         _, p = body.at((0.0, -depth))
-        checks.append(Check(f"strip, pressure at once {depth:g} m below its middle over the load, {name}",
+        checks.append(Check(f"strip, pressure at once {depth:g} m below its middle over the load",
                             strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance,
-                            scale=1.0))  # fmt: skip
+                            scale=1.0, method=name))  # fmt: skip
     at_once = dip(body)
     body.drain(("surface", "footing"))
     body.advance(1e8 * body.period)
-    checks.append(Check(f"strip, settlement at once over the final one, ν = 0.2, {name}", 1 / (2 * (1 - poisson)),
-                        "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0))  # fmt: skip
+    checks.append(Check("strip, settlement at once over the final one, ν = 0.2", 1 / (2 * (1 - poisson)),
+                        "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0, method=name))  # fmt: skip
     return checks
 
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(FOLDER))
 
 from _case import Check, Kind, Result  # noqa: E402
 from _slip_surfaces import sliding_blocks  # noqa: E402
-from _table import docs_page, percent, read_table  # noqa: E402
+from _table import case_row, docs_page, percent, read_table  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +109,26 @@ def test_a_failure_does_not_stop_the_others_and_shows_in_the_exit_code(tmp_path,
     assert "1 pass, 1 fail, 1 known limits; errors in broken" in capsys.readouterr().out
     assert "Known limit: nobody reaches it" in docs_page(read_table(tmp_path / "verification.json"))
     assert [exit_code(name) for name in outcomes] == [1, 1, 0, 0]
+
+
+def test_methods_stand_side_by_side():
+    def found(computed, method, quantity="load"):
+        return Check(quantity, 10.0, "theory", computed, 0.01, "kN", method=method)
+
+    checks = [
+        found(10.05, "elements"),
+        found(11.0, "particles"),
+        found(10.0, "elements", "moment"),
+        found(10.0, "", "sum"),
+    ]
+    columns, rows, wrong = case_row("case", "group", "Title.", Result(checks), "", 0.0).rows()
+    assert columns[2:5] == ("elements", "particles", "Computed")
+    assert [row[:5] for row in rows] == [
+        ["load", "10 kN", "10.05 kN (0.5 %)", "11 kN (10 %)", ""],
+        ["moment", "10 kN", "10 kN (0 %)", "", ""],
+        ["sum", "10 kN", "", "", "10 kN (0 %)"],
+    ]
+    assert [row[6] for row in rows] == ["FAIL", "pass", "pass"] and wrong == [0]
 
 
 def test_wrong_case_is_named(tmp_path):
