@@ -32,6 +32,7 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
 def _nothing_acts(model: Model) -> str:
     p = model.particles
     acts = bool(np.any(model.gravity)) or bool(model._prescribed) or bool(model._water_conditions)
+    acts = acts or model._incoming is not None
     acts = acts or any(bool(np.any(values)) for values in (p.traction, p.velocity, p.stress))
     bodies = [entry["body"] for entry in model._contacts]
     acts = acts or any(np.any(body[name][1]) for body in bodies for name in ("velocity", "spin", "force"))
@@ -44,7 +45,7 @@ def _nothing_acts(model: Model) -> str:
 
 
 def _nothing_holds(model: Model) -> str:
-    if model._conditions or model._contacts or not np.any(model.gravity):
+    if model._conditions or model._contacts or model._absorbing or not np.any(model.gravity):
         return ""
     return "nothing holds the particles, which fall freely: there is gravity and no boundary condition (model.fix, model.roller)"
 
