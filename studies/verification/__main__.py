@@ -25,6 +25,7 @@ comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
                      "coupled_consolidation", "wet_ground"),  # fmt: skip
+    "Earthquakes": ("newmark_block",),
     "Axial symmetry": (
         "axisymmetric_cylinder",
         "axisymmetric_motion",

@@ -1,0 +1,59 @@
+"""Synthetic motions of the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import mpm_core as mpm
+
+
+def ricker(frequency: float, peak: float, duration: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ricker's wavelet as acceleration, with its peak after 1.5 periods.
+
+    Args:
+        frequency: of the largest spectral amplitude [Hz].
+        peak: acceleration [m/s2].
+        duration: [s]; step: [s].
+
+    Returns:
+        Times (n) [s] and accelerations (n) [m/s2].
+    """
+    time = np.linspace(0.0, duration, round(duration / step) + 1)
+    phase = (np.pi * frequency * (time - 1.5 / frequency)) ** 2
+    return time, peak * (1 - 2 * phase) * np.exp(-phase)
+
+
+def band_limited_noise(
+    band: tuple[float, float], peak: float, duration: float, step: float, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Noise of random phase and flat spectrum in a band, whose envelope rises and falls as a strong motion does.
+
+    The envelope is that of Saragoni & Hart (1974, Simulation of artificial earthquakes, Earthq. Eng. Struct. Dyn. 2) with its
+    maximum at a fifth of the duration; phases come from NumPy's PCG64 generator, so that a seed gives one motion anywhere.
+
+    Args:
+        band: lowest and highest frequency [Hz].
+        peak: largest acceleration [m/s2].
+        duration: [s]; step: [s].
+        seed: of the phases.
+
+    Returns:
+        Times (n) [s] and accelerations (n) [m/s2]; the velocity ends at zero but for the trend that a baseline correction takes.
+    """
+    n = round(duration / step) + 1
+    time = step * np.arange(n)
+    frequency = np.fft.rfftfreq(2 * n, step)  # twice the length, since the ends of a Fourier series meet
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(frequency))
+    noise = np.fft.irfft(inside * np.exp(1j * phase), 2 * n)[:n]
+    part = time / (0.2 * duration)
+    acceleration = noise * (part * np.exp(1 - part)) ** 2
+    return time, acceleration * peak / np.abs(acceleration).max()
+
+
+def as_motion(time: np.ndarray, acceleration: np.ndarray) -> mpm.Motion:
+    """The motion of an acceleration after a linear baseline correction, brought to rest over its last tenth."""
+    motion = mpm.motion_of_acceleration(time, acceleration, baseline=1)
+    span = time[-1] - time[0]
+    fade = np.clip((time[-1] - time) / (0.1 * span), 0.0, 1.0)
+    return mpm.Motion(time, motion.velocity * 0.5 * (1 - np.cos(np.pi * fade)))
