@@ -27,6 +27,8 @@ SMALL = {
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3",
     "drawdown": "--cell-size 3 --elements P1 --days 4 --factor-times 1",
+    "earthquake": "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --motion ricker "
+    "--peak 1 --duration 1 --rest 0 --frames 2",
     "element_test": "--steps 5",
     "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",
     "excavation": "--cell-size 3 --elements P1",
@@ -53,6 +55,7 @@ WITH_PARTICLES = (
     "compare_fem",
     "cone",
     "consolidation",
+    "earthquake",
     "embankment",
     "footing_push",
     "handover",

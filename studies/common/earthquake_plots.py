@@ -1,0 +1,118 @@
+"""Pictures of an earthquake: the record, motions over time, and amplification over frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import EllipseCollection, PolyCollection
+from matplotlib.colors import Normalize
+
+from .figures import save_figure
+from .plots import AXES, CURVES, WIDTH, Quantity, colour_limits, disc_diameter, draw_bar, paper_style
+
+Curve = tuple[np.ndarray, np.ndarray]
+
+
+def _panel(axes: plt.Axes, label: str) -> None:
+    axes.set_ylabel(label)
+    axes.tick_params(top=True, right=True)
+    axes.grid(linewidth=0.3, color="#d0d0d0")
+    axes.margins(x=0)
+
+
+def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of values that are linear between times, from zero."""
+    return np.append(0.0, np.cumsum(0.5 * np.diff(time) * (values[1:] + values[:-1])))
+
+
+def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity: np.ndarray) -> None:
+    """Acceleration, velocity and displacement of a record as it is, and after its baseline correction.
+
+    Args:
+        time: (n) [s].
+        acceleration: as recorded (n) [m/s2].
+        velocity: after the correction (n) [m/s].
+    """
+    raw = _integral(time, acceleration)
+    rows = (
+        ("Acceleration [m/s²]", acceleration, np.gradient(velocity, time)),
+        ("Velocity [m/s]", raw, velocity),
+        ("Displacement [m]", _integral(time, raw), _integral(time, velocity)),
+    )
+    with paper_style():
+        figure, axes = plt.subplots(3, 1, figsize=(WIDTH, 4.6), sharex=True, layout="constrained")
+        for panel, (label, before, after) in zip(axes, rows):
+            panel.plot(time, before, color="#b0b0b0", linewidth=1.0, label="as recorded")
+            panel.plot(time, after, color=CURVES[0], linewidth=0.9, label="with baseline correction")
+            _panel(panel, label)
+        axes[0].legend(ncols=2, loc="upper right", fontsize=8)
+        axes[-1].set_xlabel("Time [s]")
+        figure.align_ylabels(axes)
+        save_figure(figure, path)
+
+
+def save_motions(path: Path, accelerations: Mapping[str, Curve], displacements: Mapping[str, Curve]) -> None:
+    """Accelerations [m/s2] above and displacements [m] below, over time [s], by name."""
+    with paper_style():
+        figure, axes = plt.subplots(2, 1, figsize=(WIDTH, 4.6), sharex=True, layout="constrained")
+        for panel, curves, label in zip(
+            axes, (accelerations, displacements), ("Acceleration [m/s²]", "Displacement [m]")
+        ):
+            for k, (name, (time, values)) in enumerate(curves.items()):
+                panel.plot(time, values, color=CURVES[k], linewidth=0.9, label=name)
+            _panel(panel, label)
+            panel.legend(fontsize=8)
+        axes[-1].set_xlabel("Time [s]")
+        figure.align_ylabels(axes)
+        save_figure(figure, path)
+
+
+def save_amplification(path: Path, exact: Curve, found: Mapping[str, Curve]) -> None:
+    """Ratios of spectra over frequency [Hz]: the closed form in black, and what was found by name."""
+    with paper_style():
+        figure, axes = plt.subplots(figsize=(5.2, 3.4), layout="constrained")
+        for k, (name, (frequency, ratio)) in enumerate(found.items()):
+            axes.plot(frequency, ratio, color=CURVES[k], linewidth=2.2 if k == 0 else 1.0, label=name)
+        axes.plot(*exact, "--", color="black", linewidth=0.9, label="linear layers, closed form")
+        axes.set(xlabel="Frequency [Hz]", ylim=(0, None))
+        _panel(axes, "Surface over outcrop [-]")
+        axes.legend(fontsize=8)
+        save_figure(figure, path)
+
+
+def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity: Quantity) -> None:
+    """Resting cells as triangles and particles as discs, in the colours of a quantity.
+
+    Args:
+        frame: of all rows, with ``time`` [s], ``position`` (n, 2) [m], ``volume`` (n,) [m2], ``resting`` (n,), the
+            ``corners`` (n, 6) [m] of each row's cell, and the quantity.
+        name: of the quantity in the frame.
+        quantity: how it is shown.
+    """
+    values, rest = quantity.scale * frame[name], frame["resting"].astype(bool)
+    limits = colour_limits(quantity, [frame[name]])
+    look = {"cmap": quantity.colours, "norm": Normalize(*limits), "linewidths": 0.2}
+    corners = frame["corners"].reshape(-1, 3, 2)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    with paper_style():
+        height = WIDTH * (high - low)[1] / (high - low)[0] + 1.3
+        figure, (axes, bar) = plt.subplots(
+            2, 1, figsize=(WIDTH, height), height_ratios=(height - 0.9, 0.12), layout="constrained"
+        )
+        cells = PolyCollection(corners[rest], edgecolors="face", array=values[rest], **look)
+        diameter = disc_diameter(frame["volume"][~rest])
+        discs = EllipseCollection(
+            diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=frame["position"][~rest],
+            transOffset=axes.transData, array=values[~rest], **{**look, "linewidths": 0},
+        )  # fmt: skip
+        for collection in (cells, discs):
+            axes.add_collection(collection)
+        margin = 0.02 * (high - low)[0]
+        axes.set(aspect="equal", xlabel=AXES[0], ylabel=AXES[1], xlim=(low[0] - margin, high[0] + margin),
+                 ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
+        axes.set_title(f"$t$ = {frame['time']:.1f} s; cells that rest as triangles", loc="left", pad=4)
+        draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
+        save_figure(figure, path)

@@ -1,0 +1,114 @@
+"""The ground of the study earthquake: its laws, its equilibrium, its sides, and the motion that comes in."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+import numpy as np
+from dolfinx.mesh import meshtags
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import compat
+
+from .followed import FollowedNodes
+from .motions import as_motion, band_limited_noise, ricker
+from .slope_case import GRAVITY
+
+comm = MPI.COMM_WORLD
+STIFF = 3
+"""Cell tag of the lower layer"""
+STEP = 0.01
+"""Of synthetic motions [s]"""
+
+
+def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
+    """Times [s], accelerations [m/s2] as given, and the motion of the rock's outcrop after the baseline correction."""
+    if a.accelerogram is not None:
+        raw = mpm.read_accelerogram(a.accelerogram, unit=a.unit, baseline=None)
+        return raw.time, np.gradient(raw.velocity, raw.time), as_motion(raw.time, np.gradient(raw.velocity, raw.time))
+    if a.motion == "ricker":
+        time, acceleration = ricker(a.frequency, a.peak, a.duration, STEP)
+    else:
+        time, acceleration = band_limited_noise(
+            (0.5 * a.frequency, a.highest_frequency), a.peak, a.duration, STEP, a.seed
+        )
+    return time, acceleration, as_motion(time, acceleration)
+
+
+def damping_of(a: Namespace) -> mpm.Rayleigh:
+    """The damping at small strains: as asked for at the first frequency of the soil below the crest, and at five times that."""
+    shear = a.young / (2 * (1 + a.poisson))
+    first = np.sqrt(shear / (a.unit_weight / GRAVITY)) / (4 * (a.height + a.soil_depth))
+    return mpm.Rayleigh.of_ratio(a.damping_ratio, (first, 5 * first))
+
+
+def ground(a: Namespace) -> tuple:
+    """Mesh, cell tags and facet tags: the slope, with the stiffer layer below."""
+    domain, cells, facets = bridge.slope_mesh(
+        comm, a.height, a.angle, a.level, a.cell_size, "fitted", runout=a.level, depth=a.soil_depth + a.stiff_depth
+    )
+    middle = domain.geometry.x[compat.cell_nodes(domain)].mean(axis=1)[cells.indices, 1]
+    values = np.where((cells.values == bridge.SOIL) & (middle < -a.soil_depth), STIFF, cells.values).astype(np.int32)
+    names = {"soil": bridge.SOIL, "empty": bridge.EMPTY, "stiff": STIFF}
+    return domain, bridge.name_tags(meshtags(domain, domain.topology.dim, cells.indices, values), names), facets
+
+
+def laws_of(a: Namespace) -> dict[int, object]:
+    """Laws of soil and stiffer layer, by cell tag."""
+    soil = mpm.MohrCoulomb(young=a.young, poisson=a.poisson, cohesion=a.cohesion, friction_angle=a.friction_angle,
+                           dilation_angle=a.dilation_angle)  # fmt: skip
+    return {bridge.SOIL: soil, STIFF: mpm.LinearElastic(young=a.stiff_young, poisson=a.poisson)}
+
+
+def rock_impedances(a: Namespace) -> tuple[float, float]:
+    """For compression and shear waves, at a Poisson's ratio of a quarter [kg/(m2 s)]."""
+    shear = a.rock_density * a.rock_speed
+    return np.sqrt(3.0) * shear, shear
+
+
+def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
+    """The ground at rest in cells that rest, on a base that lets the motion in, between free fields."""
+    mesh = ground(a)
+    body, body_cells, body_facets = bridge.soil_mesh(*mesh, tag=("soil", "stiff"))
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.roller(bridge.RIGHT, (1, 0)), bridge.fixed(bridge.BASE)]
+    laws = laws_of(a)
+    fem = bridge.QuasiStatic(body, laws, body_facets, supports, degree=1, cell_tags=body_cells,
+                             solver=bridge.Solver(tolerance=1e-10))  # fmt: skip
+    fem.solve(bridge.Load(unit_weight=a.unit_weight))
+    if not fem.converged:
+        raise mpm.InputError(f"--unit-weight is {a.unit_weight:g} N/m3, which the slope does not carry")
+    model = mpm.Model(bridge.background_mesh(*mesh), fem.laws)
+    for tag, law in laws.items():
+        model.seed(
+            density=a.unit_weight / GRAVITY, per_cell=a.particles_per_cell, cell_tag=tag, material=fem.laws.index(law)
+        )
+    model.set_gravity((0.0, -GRAVITY))
+    bridge.initialise(model, fem, count_displacement=False, resting=True)
+    far = 50 * a.height  # springs that hardly resist the motion, but what a slide changes in the forces at the sides
+    model.absorb(bridge.BASE, impedances=rock_impedances(a), thickness=far)
+    model.absorb((bridge.LEFT, bridge.RIGHT), free_field=True, thickness=far)
+    model.shake(mpm.Motion(motion.time, 0.5 * motion.velocity), direction=(1, 0))
+    return model
+
+
+def linear_column(a: Namespace, motion: mpm.Motion, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times and velocities at the surface of a linear column of the ground behind the crest, one cell wide."""
+    counts = round((a.height + a.soil_depth + a.stiff_depth) / a.cell_size)
+    size, height = (a.cell_size, counts * a.cell_size), round(a.stiff_depth / a.cell_size) * a.cell_size
+    mesh = bridge.box_mesh(MPI.COMM_SELF, size, (1, counts), body=((-1, height), (2 * a.cell_size, size[1] + 1)))
+    model = mpm.Model(bridge.background_mesh(*mesh), [mpm.LinearElastic(young=young, poisson=a.poisson)
+                                                      for young in (a.young, a.stiff_young)])  # fmt: skip
+    for material, tag in enumerate((bridge.BODY, 0)):
+        model.seed(density=a.unit_weight / GRAVITY, per_cell=a.particles_per_cell, cell_tag=tag, material=material)
+    for side in range(1, 5):
+        model.roller(side, normal=(0, 1))
+    model.rest()
+    model.absorb(3, impedances=rock_impedances(a))
+    model.shake(mpm.Motion(motion.time, 0.5 * motion.velocity), direction=(1, 0))
+    top, rows = FollowedNodes(model, np.array([(0.0, size[1])])), [(0.0, 0.0)]
+    for report in model.explicit(until, every=2 * STEP, rayleigh=damping_of(a), conversion=None):
+        rows.append((report.time, top.velocity()[0, 0]))
+    time, velocity = np.array(rows).T
+    return time, velocity

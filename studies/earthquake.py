@@ -1,0 +1,266 @@
+"""A slope in an earthquake: from equilibrium by finite elements to the displacement that stays, beside Newmark's block.
+
+The slope lies on a stiffer layer over rock. Finite elements find its elasto-plastic equilibrium; then the base lets the motion of
+a rock outcrop in and waves out, free fields lie beside the sides, and cells rest until the soil in them fails. The displacement
+of the slope is compared with those of Newmark's sliding block under the motion of the free field at the levels of toe and
+crest, and the amplification of a linear column of the ground with the closed form of layers over a half-space.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from common.animation import film_frames, save_animation
+from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
+from common.earthquake_site import (
+    STEP,
+    STIFF,
+    damping_of,
+    laws_of,
+    linear_column,
+    model_in_equilibrium,
+    outcrop_motion,
+    rock_impedances,
+)
+from common.figures import Pictures
+from common.files import OutputError
+from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
+from common.history import History
+from common.motions import ricker
+from common.movie import Movie, gathered, own_frame
+from common.newmark import sliding_block, yield_acceleration
+from common.options import add_choice, add_count, add_number, change_defaults, check, study_parser
+from common.output_options import add_picture_options
+from common.page import Page
+from common.plots import DISPLACEMENT, SHEAR_STRAIN
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import open_results
+from common.scenes import scene_of
+from common.site_response import amplification, spectral_ratio
+from common.slope_case import GRAVITY, add_soil_options
+from common.summary import write_summary
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+COLUMNS = [
+    "time_s", "crest_velocity_m_per_s", "crest_level_velocity_m_per_s", "toe_level_velocity_m_per_s",
+    "foot_velocity_m_per_s", "slope_displacement_m", "free_field_displacement_m",
+]  # fmt: skip
+"""Horizontal; crest, free fields at the levels of crest and toe, and the free field behind the crest at the toe's level"""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_number(p, "--height", 10.0, "m", "height of the slope", above=0)
+    add_number(p, "--angle", 35.0, "degrees", "inclination of the slope", above=11, at_most=78)
+    add_number(p, "--level", 40.0, "m", "level ground on each side of the slope", above=0)
+    add_number(p, "--soil-depth", 5.0, "m", "depth below the toe at which the stiffer layer begins", above=0)
+    add_number(p, "--stiff-depth", 10.0, "m", "thickness of the stiffer layer", above=0)
+    add_number(p, "--cell-size", 1.0, "m", "side of the squares", above=0)
+    add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
+    add_number(p, "--unit-weight", 19e3, "N/m3", "unit weight of the soil and of the stiffer layer", above=0)
+    add_soil_options(p, dilation_angle=0.0)
+    change_defaults(p, young=200e6, poisson=0.3, cohesion=25e3, friction_angle=20.0)
+    add_number(p, "--stiff-young", 800e6, "Pa", "Young's modulus of the stiffer layer, which stays elastic", above=0)
+    add_number(p, "--rock-density", 2400.0, "kg/m3", "density of the rock below", above=0)
+    add_number(p, "--rock-speed", 1000.0, "m/s", "speed of shear waves in the rock", above=0)
+    add_choice(p, "--motion", "noise", ("noise", "ricker"), "synthetic motion of the outcrop")
+    p.add_argument("--accelerogram", type=Path, default=None, metavar="FILE",
+                   help="file of the outcrop's motion, time [s] and acceleration, in place of a synthetic one")  # fmt: skip
+    add_choice(p, "--unit", "m/s2", ("m/s2", "cm/s2", "g"), "unit of the accelerations in that file")
+    add_number(p, "--peak", 4.0, "m/s2", "largest acceleration of a synthetic motion", above=0)
+    add_number(p, "--frequency", 2.0, "Hz", "of the Ricker wavelet, or twice the lowest of the noise", above=0)
+    add_number(p, "--highest-frequency", 6.0, "Hz", "highest of the noise", above=0)
+    add_number(p, "--duration", 8.0, "s", "of a synthetic motion", above=0)
+    add_count(p, "--seed", 1, "of the noise")
+    add_number(p, "--rest", 3.0, "s", "time after the motion", at_least=0)
+    add_number(p, "--damping-ratio", 0.02, "-", "damping ratio of the soil at small strains", at_least=0, below=0.5)
+    add_count(p, "--frames", 40, "times at which particles are drawn")
+    add_picture_options(p)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    check(
+        p,
+        0 < a.friction_angle,
+        lambda: "--friction-angle is 0, expected an angle above 0 for the slip line of Newmark's block",
+    )
+    check(p, a.dilation_angle <= a.friction_angle,
+          lambda: f"--dilation-angle is {a.dilation_angle:g}, expected at most --friction-angle, "
+                  f"{a.friction_angle:g} degrees")  # fmt: skip
+    for name in ("height", "soil_depth", "stiff_depth"):
+        check(p, a.cell_size <= 0.5 * getattr(a, name),
+              lambda name=name: f"--cell-size is {a.cell_size:g} m, "
+                                f"expected at most half of --{name.replace('_', '-')}")  # fmt: skip
+    return a
+
+
+# --- 2. The earthquake -----------------------------------------------------------------------------------------------
+
+
+def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[History, list, mpm.Report]:
+    """Run to the end; history, frames and the last report."""
+    right = a.level + a.height / np.tan(np.radians(a.angle))
+    width = model.comm.allreduce(float(model.mesh.points[:, 0].max()), MPI.MAX)
+    nodes = FollowedNodes(model, np.array([(a.level, a.height), (0, a.height), (width, 0), (0, 0)]))
+    middle = 0.5 * (a.level + right), 0.5 * a.height
+    slope = numbers_in(model, cells_near(model, np.array(middle), 0.4 * a.height, [bridge.SOIL]))
+    level = numbers_in(model, cells_near(model, np.array((0.0, 0.0)), 1.5 * a.cell_size, [bridge.SOIL]))
+    frames, samples = [frame_at(model, 0.0)], max(a.frames, round(until / (2 * STEP)))
+    with History(folder / "history.csv", COLUMNS, comm) as history, Progress("earthquake", until, comm) as progress:
+        history.add(**dict.fromkeys(COLUMNS, 0.0))
+        for k, report in enumerate(model.explicit(until, every=until / samples, rayleigh=damping_of(a)), 1):
+            velocity = nodes.velocity()[:, 0]
+            moved = [mean_displacement(model, numbers)[0] for numbers in (slope, level)]
+            history.add(**dict(zip(COLUMNS, (report.time, *velocity, *moved))))
+            if k * a.frames // samples > (k - 1) * a.frames // samples:
+                frames.append(frame_at(model, report.time))
+            progress.show(report.time, report.steps, displacement=f"{moved[0] - moved[1]:.3f} m")
+    return history, frames, report
+
+
+def frame_at(model: mpm.Model, time: float) -> dict | None:
+    """All rows on the first rank, None on the others; resting cells are where they have moved to. Collective."""
+    p = model.particles
+    frame = own_frame(model, time)
+    frame["position"] = np.where(p.is_resting[:, None], p.position + p.displacement, p.position).astype(np.float32)
+    corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6).astype(np.float32)
+    return gathered(model.comm, {**frame, "resting": p.is_resting.astype(np.float32), "corners": corners})
+
+
+def newmark(a: Namespace, history: History) -> tuple[float, dict[str, np.ndarray]]:
+    """Yield acceleration [m/s2] of the slope, and slips over time [m] of blocks that move with the free field behind the crest.
+
+    At the toe's level that is the ground below the slip, for a mass that moves as one; at the crest's level it has the
+    amplification of soil as high as the slope.
+    """
+    soil = laws_of(a)[bridge.SOIL]
+    strength = bridge.davis_strength(soil)
+    begins = yield_acceleration(a.height, a.angle, strength.cohesion, strength.friction_angle, a.unit_weight, GRAVITY)
+    if begins <= 0:
+        raise mpm.InputError(f"--height is {a.height:g} m, expected a slope that stands without an earthquake")
+    motions = {"toe": "foot_velocity_m_per_s", "crest": "crest_level_velocity_m_per_s"}
+    return begins, {
+        level: sliding_block(history["time_s"], history[column], begins)[1] for level, column in motions.items()
+    }
+
+
+# --- 3. What comes out -----------------------------------------------------------------------------------------------
+
+
+def amplified(a: Namespace, motion: mpm.Motion, history: History) -> tuple[tuple, dict[str, tuple]]:
+    """Ratios of spectra to the outcrop: closed form, linear column, and free field and crest as they yielded."""
+    band = (a.frequency / 2, a.highest_frequency) if a.motion == "noise" else (a.frequency / 2, 2 * a.frequency)
+    shear = [young / (2 * (1 + a.poisson)) for young in (a.young, a.stiff_young)]
+    density = a.unit_weight / GRAVITY
+    layers = [(a.height + a.soil_depth, shear[0], density), (a.stiff_depth, shear[1], density)]
+
+    def ratio(time, velocity, outcrop, smoothing):
+        outcrop = np.interp(time, outcrop.time, outcrop.velocity, left=0, right=0)
+        return spectral_ratio(time, velocity, outcrop, band, smoothing)
+
+    wavelet = mpm.motion_of_acceleration(*ricker(band[1], 0.1, 3.0 / band[0], STEP / 5))  # energy at all frequencies
+    time, velocity = linear_column(a, wavelet, 5.0 / band[0])
+    frequency, linear = ratio(time, velocity, wavelet, 0.0)
+    exact = abs(amplification(frequency, layers, rock_impedances(a)[1], damping_of(a)))
+    time = history["time_s"]
+    return (frequency, exact), {
+        "linear column of resting cells": (frequency, linear),
+        "free field at the crest's level": ratio(time, history["crest_level_velocity_m_per_s"], motion, 0.5),
+        "crest": ratio(time, history["crest_velocity_m_per_s"], motion, 0.5),
+    }
+
+
+def drawn(a: Namespace, folder: Path, record: tuple, history: History, slips: dict, ratios: tuple, frames: list,
+          scene: object) -> Pictures:  # fmt: skip
+    """All pictures, and the film; on the first rank."""
+    if scene is None:
+        return {}
+    time, last = history["time_s"], frames[-1]
+    accelerations = {
+        name: (time, np.gradient(history[column], time))
+        for name, column in (
+            ("crest", "crest_velocity_m_per_s"),
+            ("free field at its level", "crest_level_velocity_m_per_s"),
+        )
+    }
+    displacements = {
+        "slope, relative to the free field": (time, slope_slip(history)),
+        **{f"Newmark's block, motion at the {level}'s level": (time, slip) for level, slip in slips.items()},
+    }
+    pictures = {
+        "record": partial(save_record, folder / "record.png", record[0], record[1], record[2].velocity),
+        "motions": partial(save_motions, folder / "motions.png", accelerations, displacements),
+        "amplification": partial(save_amplification, folder / "amplification.png", *ratios),
+        "displacement": partial(save_ground, folder / "displacement.png", last, "displacement", DISPLACEMENT),
+        "shear_strain": partial(save_ground, folder / "shear_strain.png", last, "shear_strain", SHEAR_STRAIN),
+    }  # fmt: skip
+    if a.film:
+        pictures["earthquake"] = partial(
+            save_animation, folder / "earthquake", scene, film_frames(frames), SHEAR_STRAIN
+        )
+    return pictures
+
+
+def slope_slip(history: History) -> np.ndarray:
+    """Displacement of the slope relative to the free field at the toe's level [m]."""
+    return history["slope_displacement_m"] - history["free_field_displacement_m"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    record = outcrop_motion(a)
+    folder = open_results(a, comm)
+    model = model_in_equilibrium(a, record[2])
+    until = float(record[2].time[-1]) + a.rest
+    history, frames, report = shaken(a, model, until, folder)
+    begins, slips = newmark(a, history)
+    exact, found = ratios = amplified(a, record[2], history)
+    linear = found["linear column of resting cells"][1]
+    soil = bridge.davis_strength(laws_of(a)[bridge.SOIL])
+    summary = {
+        "yield_acceleration_m_per_s2": begins,
+        "factor_of_safety": bridge.log_spiral_safety(a.height, a.angle, soil.cohesion, soil.friction_angle, a.unit_weight),
+        "slope_displacement_m": slope_slip(history)[-1],
+        **{f"newmark_displacement_m_{level}": slip[-1] for level, slip in slips.items()},
+        "largest_acceleration_of_outcrop_m_per_s2": np.abs(np.gradient(record[2].velocity, record[2].time)).max(),
+        "largest_acceleration_of_crest_m_per_s2": np.abs(np.gradient(history["crest_velocity_m_per_s"], history["time_s"])).max(),
+        "largest_amplification_in_closed_form": exact[1].max(),
+        "largest_error_of_linear_amplification": np.abs(linear / exact[1] - 1).max(),
+        "converted_fraction": report.converted_cells / (report.converted_cells + report.resting_cells),
+        "unexplained_energy_fraction": report.unexplained_fraction,
+        "steps": report.steps,
+    }  # fmt: skip
+    captions = {
+        "record": "Motion of the outcrop, as recorded and after the baseline correction",
+        "motions": "Accelerations at crest and free field, and displacement of the slope beside Newmark's block",
+        "amplification": "Spectra at the surface over that of the outcrop",
+        "displacement": "Displacement that stays", "shear_strain": "Plastic shear strain at the end",
+    }  # fmt: skip
+    scene = scene_of(model, [bridge.SOIL, STIFF])
+    page = Page(movies=[Movie("slope", scene, frames) if scene else None], captions=captions)
+    pictures = drawn(a, folder, record, history, slips, ratios, frames, scene) if a.pictures else {}
+    write_summary(folder, a, summary, comm, page, pictures)
+    if comm.rank == 0:
+        print(f"slope displaced by {summary['slope_displacement_m']:.3f} m, Newmark's blocks by {slips['toe'][-1]:.3f} and "
+              f"{slips['crest'][-1]:.3f} m; linear amplification within "
+              f"{summary['largest_error_of_linear_amplification']:.1%} of the closed form; results in {folder}")  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

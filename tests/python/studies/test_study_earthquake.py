@@ -1,0 +1,82 @@
+"""What the study earthquake compares with: sliding blocks, yield accelerations, layers over a half-space, and its motions."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
+
+from common.motions import as_motion, band_limited_noise, ricker  # noqa: E402
+from common.newmark import pulse_slip, sliding_block, yield_acceleration  # noqa: E402
+from common.site_response import amplification, spectral_ratio  # noqa: E402
+
+import fenics_bridge as bridge  # noqa: E402
+import mpm_core as mpm  # noqa: E402
+
+
+@pytest.mark.parametrize("samples", [6, 7, 101])
+def test_a_rectangular_pulse_moves_the_block_by_newmarks_formula(samples):
+    # The ground accelerates uphill with A for 0.5 s, then keeps its speed; however the times are sampled, if 0.5 s is among them.
+    acceleration, begins = 4.0, 1.5
+    time = np.unique(np.append(np.linspace(0.0, 3.0, samples), 0.5))
+    ground = -acceleration * np.minimum(time, 0.5)
+    velocity, moved = sliding_block(time, ground, begins)
+    assert moved[-1] == pytest.approx(pulse_slip(2.0, acceleration, begins), rel=1e-12)
+    assert velocity[-1] == 0.0
+    assert sliding_block(time, -ground, begins)[1][-1] == 0.0  # downhill it does not leave the ground behind
+    assert sliding_block(time, -ground, np.inf, begins)[1][-1] == pytest.approx(-moved[-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("angle, friction, cohesion", [(30, 20, 30e3), (45, 25, 20e3), (70, 30, 40e3)])
+def test_a_slope_with_its_strength_over_its_factor_of_safety_yields_at_once(angle, friction, cohesion):
+    # Both come from logarithmic spirals through the toe: by limit analysis under weight alone, and under inertia.
+    factor = bridge.log_spiral_safety(10.0, angle, cohesion, friction, 19e3)
+    assert factor > 1.1
+    reduced = np.degrees(np.arctan(np.tan(np.radians(friction)) / factor))
+    assert yield_acceleration(10.0, angle, cohesion / factor, reduced, 19e3) == pytest.approx(0.0, abs=2e-3)
+    assert yield_acceleration(10.0, angle, cohesion, friction, 19e3) > 0.5
+    assert yield_acceleration(10.0, angle, 0.8 * cohesion / factor, reduced, 19e3) < 0
+
+
+def test_layers_amplify_as_one_layer_where_they_are_of_one_soil():
+    # 1 / sqrt(cos^2 kH + (a sin kH)^2) without damping; with it the peak at kH = pi/2 of a rigid half-space is 2 / (pi xi).
+    height, modulus, density, rock = 20.0, 80e6, 2000.0, 3e6
+    frequency = np.linspace(0.2, 10, 50)
+    phase = 2 * np.pi * frequency * height * np.sqrt(density / modulus)
+    exact = 1 / np.sqrt(np.cos(phase) ** 2 + (np.sqrt(modulus * density) / rock * np.sin(phase)) ** 2)
+    for parts in (1, 3):
+        layers = parts * [(height / parts, modulus, density)]
+        np.testing.assert_allclose(abs(amplification(frequency, layers, rock)), exact, rtol=1e-12)
+    own, ratio = np.sqrt(modulus / density) / (4 * height), 0.01
+    damped = abs(
+        amplification(np.array([own]), [(height, modulus, density)], 1e15, mpm.Rayleigh.of_ratio(ratio, (own, own)))
+    )
+    assert damped[0] == pytest.approx(2 / (np.pi * ratio), rel=1e-3)
+
+
+def test_a_spectral_ratio_is_that_of_the_filter():
+    # A motion and itself, later by one half: the ratio is |1 + exp(-i w d) / 2|.
+    time = np.linspace(0, 20, 2001)
+    pulse = ricker(2.0, 1.0, 20.0, 0.01)[1]
+    later = np.interp(time - 0.1, time, pulse, left=0)
+    frequency, ratio = spectral_ratio(time, pulse + 0.5 * later, pulse, (1.0, 4.0))
+    np.testing.assert_allclose(ratio, abs(1 + 0.5 * np.exp(-2j * np.pi * frequency * 0.1)), rtol=1e-6)
+
+
+def test_noise_has_its_peak_its_band_and_its_seed():
+    time, acceleration = band_limited_noise((1.0, 5.0), 3.0, 10.0, 0.01, seed=4)
+    assert np.abs(acceleration).max() == pytest.approx(3.0, rel=1e-12)
+    spectrum, frequency = np.abs(np.fft.rfft(acceleration)) ** 2, np.fft.rfftfreq(len(time), 0.01)
+    outside = (frequency < 0.5) | (frequency > 5.5)  # the envelope widens the band by some tenths of a hertz
+    assert spectrum[outside].sum() < 0.01 * spectrum.sum()
+    np.testing.assert_array_equal(acceleration, band_limited_noise((1.0, 5.0), 3.0, 10.0, 0.01, seed=4)[1])
+    assert np.abs(acceleration - band_limited_noise((1.0, 5.0), 3.0, 10.0, 0.01, seed=5)[1]).max() > 0.5
+
+
+def test_a_motion_ends_at_rest():
+    time, acceleration = band_limited_noise((1.0, 5.0), 3.0, 10.0, 0.01, seed=4)
+    motion = as_motion(time, acceleration + 0.05)  # an error of the record's zero
+    assert motion.velocity[-1] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(motion.velocity, as_motion(time, acceleration).velocity, atol=1e-12)
