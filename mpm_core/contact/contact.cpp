@@ -35,12 +35,18 @@ void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact)
 }
 
 template <int D>
-void end_step(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact)
+void accelerate(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact)
 {
   for (int i = 0; i < D; ++i)
     contact.impulse[i] += step.dt * contact.reaction.force[i];
-  move_body<D>(step, gravity, contact.of_ranks, contact.body);
-  contact.travel += step_travel(contact, step.dt);
+  accelerate_body<D>(step, gravity, contact.of_ranks, contact.body);
+}
+
+template <int D>
+void end_step(double dt, Contact<D>& contact)
+{
+  move_body(dt, contact.body);
+  contact.travel += step_travel(contact, dt);
 }
 
 template <class G, int D>
@@ -54,7 +60,8 @@ double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
 
 #define INSTANTIATE_STEP(D)                                                                                            \
   template void begin_step<D>(const Mesh<D>&, const TimeStep&, Contact<D>&);                                           \
-  template void end_step<D>(const TimeStep&, const Vector<D>&, Contact<D>&);
+  template void accelerate<D>(const TimeStep&, const Vector<D>&, Contact<D>&);                                         \
+  template void end_step<D>(double, Contact<D>&);
 INSTANTIATE_STEP(2)
 INSTANTIATE_STEP(3)
 #define INSTANTIATE(G)                                                                                                 \

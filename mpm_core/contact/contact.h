@@ -44,6 +44,14 @@ struct Contact
   double cell_size = 0;           ///< travel after which they are found again [m]
 };
 
+/// A ball and another body that collide where they touch.
+struct Collision
+{
+  std::size_t ball, other; ///< numbers of contacts; the first is that of a ball
+  double friction;         ///< coefficient mu of Coulomb
+  double restitution;      ///< velocity after an impact over that before it, in [0, 1]
+};
+
 /// Half the side of a square or cube as large as a particle [m].
 template <class G>
 double particle_radius(const Particles<G::dim>& particles, Index p);
@@ -52,10 +60,14 @@ double particle_radius(const Particles<G::dim>& particles, Index p);
 template <int D>
 void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact);
 
-/// Ends a step: the body moves.
+/// The forces of a step change the motion of the body.
 /// @pre `of_ranks` is there where the motion depends on it
 template <int D>
-void end_step(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact);
+void accelerate(const TimeStep& step, const Vector<D>& gravity, Contact<D>& contact);
+
+/// Ends a step: the body moves.
+template <int D>
+void end_step(double dt, Contact<D>& contact);
 
 /// Path of the surface's fastest point in a step [m].
 template <int D>

@@ -95,21 +95,29 @@ void prescribe_motion(const TimeStep& step, const Reaction<D>& last, RigidBody<D
 }
 
 template <int D>
-void move_body(const TimeStep& step, const Vector<D>& gravity, const Reaction<D>& reaction, RigidBody<D>& body)
+void accelerate_body(const TimeStep& step, const Vector<D>& gravity, const Reaction<D>& reaction, RigidBody<D>& body)
 {
+  body.before = {body.velocity, body.spin};
   const double dt = step.dt;
   const Vector<D> applied = mean(body.force, step.start, step.start + dt);
   for (std::size_t i = 0; i < D; ++i)
-  {
     if (body.drive[i] == Drive::free)
       body.velocity[i] += dt * ((reaction.force[i] + applied[i]) / body.mass + gravity[i]);
+  if (!body.rotates)
+    return;
+  const Vector<3> moment = rotated_back<3>(body.rotation, reaction.moment);
+  for (std::size_t k = D == 2 ? 2 : 0; k < 3; ++k)
+    body.angular_momentum[k] += dt * moment[k];
+  body.spin = spin_of(body);
+}
+
+template <int D>
+void move_body(double dt, RigidBody<D>& body)
+{
+  for (std::size_t i = 0; i < D; ++i)
     body.displacement[i] += dt * body.velocity[i];
-  }
   if (body.rotates)
   {
-    const Vector<3> moment = rotated_back<3>(body.rotation, reaction.moment);
-    for (std::size_t k = D == 2 ? 2 : 0; k < 3; ++k)
-      body.angular_momentum[k] += dt * moment[k];
     rotate_freely(dt, body);
     body.spin = spin_of(body);
   }
@@ -140,7 +148,8 @@ double kinetic_energy(const RigidBody<D>& body)
   template bool needs_reaction(const RigidBody<D>&);                                                                   \
   template void set_spin(const Vector<3>&, RigidBody<D>&);                                                             \
   template void prescribe_motion(const TimeStep&, const Reaction<D>&, RigidBody<D>&);                                  \
-  template void move_body<D>(const TimeStep&, const Vector<D>&, const Reaction<D>&, RigidBody<D>&);                    \
+  template void accelerate_body<D>(const TimeStep&, const Vector<D>&, const Reaction<D>&, RigidBody<D>&);              \
+  template void move_body(double, RigidBody<D>&);                                                                      \
   template double kinetic_energy(const RigidBody<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

@@ -33,6 +33,14 @@ struct Reaction
   double energy = 0;   ///< of the springs at the step's start [J]
 };
 
+/// Velocity of a body's centre, and its angular velocity.
+template <int D>
+struct Motion
+{
+  Vector<D> velocity; ///< [m/s]
+  Vector<3> spin;     ///< [rad/s]
+};
+
 template <int D>
 struct RigidBody
 {
@@ -53,7 +61,9 @@ struct RigidBody
   Vector<3> angle{}; ///< integral of the spin [rad]
   Vector<D> velocity{};
   Vector<3> spin{};
-  Vector<3> angular_momentum{}; ///< about its own axes; used where it rotates freely [N m s]
+  Vector<3> angular_momentum{};  ///< about its own axes; used where it rotates freely [N m s]
+  Motion<D> before{};            ///< the forces of this step
+  Vector<D> collision_impulse{}; ///< of other bodies since it was made [N s]
 };
 
 /// A step of a run.
@@ -75,10 +85,14 @@ bool needs_reaction(const RigidBody<D>& body);
 template <int D>
 void prescribe_motion(const TimeStep& step, const Reaction<D>& last, RigidBody<D>& body);
 
-/// Ends a step: new velocities along the free axes, then the new place.
+/// New velocities along the free axes, and the new angular momentum.
 /// @param reaction  over all ranks; used where `needs_reaction`
 template <int D>
-void move_body(const TimeStep& step, const Vector<D>& gravity, const Reaction<D>& reaction, RigidBody<D>& body);
+void accelerate_body(const TimeStep& step, const Vector<D>& gravity, const Reaction<D>& reaction, RigidBody<D>& body);
+
+/// Ends a step: the new place.
+template <int D>
+void move_body(double dt, RigidBody<D>& body);
 
 /// Gives a body that rotates freely this spin [rad/s].
 template <int D>

@@ -1,5 +1,7 @@
 #include "model/contacts.h"
 
+#include "contact/collisions.h"
+
 namespace mpm::model
 {
 template <class G>
@@ -41,7 +43,10 @@ void end_contacts(Model<G>& model, const TimeStep& step)
   sum_reactions(model);
   const auto gravity = gravity_at(model, step.start);
   for (auto& contact : model.contacts)
-    end_step<G::dim>(step, gravity, contact);
+    accelerate<G::dim>(step, gravity, contact);
+  resolve_collisions(model.collisions, model.contacts);
+  for (auto& contact : model.contacts)
+    end_step(step.dt, contact);
 }
 
 template <class G>

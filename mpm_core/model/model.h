@@ -98,9 +98,10 @@ struct Model
   Particles<D> particles;
   std::vector<Law> laws;
   std::vector<VelocityField<G>> fields = std::vector<VelocityField<G>>(1);
-  std::vector<Index> field_of_law;  ///< number of the velocity field of the particles that follow each law
-  std::vector<Contact<D>> contacts; ///< with rigid surfaces
-  std::optional<PoreWater> water;   ///< in the pores of the soil
+  std::vector<Index> field_of_law;   ///< number of the velocity field of the particles that follow each law
+  std::vector<Contact<D>> contacts;  ///< with rigid surfaces
+  std::vector<Collision> collisions; ///< of rigid bodies among one another
+  std::optional<PoreWater> water;    ///< in the pores of the soil
   std::vector<Index> outflow_tags;
   Vector<D> gravity{};     ///< [m/s2]
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]

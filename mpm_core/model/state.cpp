@@ -95,7 +95,12 @@ void for_each_number(M& model, F&& f)
   if (model.water)
     f("water_inflow", Kind::sum, model.water->inflow);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
-    for_each_number("contact_" + std::to_string(k) + "_", model.contacts[k], f);
+  {
+    const std::string name = "contact_" + std::to_string(k) + "_";
+    for_each_number(name, model.contacts[k], f);
+    if (!model.collisions.empty())
+      for_each_entry(name + "collision_impulse", Kind::common, model.contacts[k].body.collision_impulse, f);
+  }
   f("sorts", Kind::own, model.totals.sorts);
   f("order_changes", Kind::own, model.order.out_of_order);
   f("order_cost", Kind::own, model.order.cost);

@@ -1,5 +1,6 @@
 #include "python/bindings.h"
 
+#include "contact/collisions.h"
 #include "model/contacts.h"
 #include "python/arrays.h"
 
@@ -106,6 +107,7 @@ py::dict contact_state(const Model<G>& model, std::size_t number)
   state["area"] = sums.reaction.area;
   state["sticking"] = sums.reaction.sticking;
   state["energy"] = sums.reaction.energy;
+  state["collision_impulse"] = body.collision_impulse;
   state["displacement"] = body.displacement;
   state["velocity"] = body.velocity;
   state["rotation"] = body.rotation;
@@ -133,7 +135,18 @@ void bind_contacts_of(py::module_& m)
           contact.slip = slip;
           model.contacts.push_back(std::move(contact));
         });
-  m.def("clear_contacts", [](Model<G>& model) { model.contacts.clear(); });
+  m.def("clear_contacts",
+        [](Model<G>& model)
+        {
+          model.contacts.clear();
+          model.collisions.clear();
+        });
+  m.def("add_collision",
+        [](Model<G>& model, std::size_t ball, std::size_t other, double friction, double restitution) {
+          model.collisions.push_back({ball, other, friction, restitution});
+        });
+  m.def("distance_between", [](const Model<G>& model, std::size_t ball, std::size_t other)
+        { return distance_between(model.contacts.at(ball), model.contacts.at(other)); });
   m.def("contact_state", &contact_state<G>);
 }
 } // namespace

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
@@ -15,6 +15,7 @@ from . import _core, partition
 from ._core import InputError, RunError
 from .checkpoint_file import Arrays, CheckpointFile, Column, write_file
 from .collective import collectively
+from .collisions import set_collisions
 from .contact import require_surfaces, set_contacts
 from .description import parsed
 from .fingerprint import fingerprint
@@ -83,12 +84,13 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         for field in there.get("added_fields", []):
             if field["name"] not in {known["name"] for known in model.particles.schedule()}:
                 model.add_field(**field)
-        before, water = _replace_contacts(model, there.get("contacts", [])), _water(model)
+        contacts = there.get("contacts", []), there.get("collisions", [])
+        before, water = _replace_contacts(model, *contacts), _water(model)
         _take_water(model, there.get("water"))
         try:
             _core.restore(model._core, *_state(model, file), name)
         except RunError:
-            _replace_contacts(model, before)
+            _replace_contacts(model, *before)
             _take_water(model, water)
             raise
     _take(model, there)
@@ -130,11 +132,16 @@ def _state(model: Model, file: CheckpointFile) -> tuple[Arrays, Arrays, Arrays, 
     return file.particles(columns, equal_part), {}, file.totals(widths["ranks"], slice(0, n_ranks)), False
 
 
-def _replace_contacts(model: Model, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Give the model other contacts; returns those that it had."""
-    before, model._contacts = model._contacts, []
+_Entries: TypeAlias = list[dict[str, Any]]
+
+
+def _replace_contacts(model: Model, contacts: _Entries, collisions: _Entries) -> tuple[_Entries, _Entries]:
+    """Give the model other contacts and collisions; returns those that it had."""
+    before = model._contacts, model._collisions
+    model._contacts, model._collisions = [], []
     _core.clear_contacts(model._core)
-    collectively(model.comm, lambda: set_contacts(model, entries))
+    collectively(model.comm, lambda: set_contacts(model, contacts))
+    set_collisions(model, collisions)
     return before
 
 
@@ -193,6 +200,7 @@ def _description(model: Model) -> dict[str, Any]:
         "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
         "contacts": model._contacts,
+        "collisions": model._collisions,
         "water": _water(model),
         "absorbing": model._absorbing_state(),
         "implicit": None if model._control is None else vars(model._control),

@@ -13,6 +13,7 @@ from . import _core
 from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
+from .collisions import add_collision
 from .mesh import floats
 from .outlines import Outline, outline
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
@@ -55,6 +56,11 @@ class RigidContact:
         Its difference between two times over their distance is the mean force, without the noise of single steps.
         """
         return self._vector("impulse")
+
+    @property
+    def collision_impulse(self) -> NDArray[np.float64]:
+        """Impulse of other bodies on this one since the first collision of the model was declared [N s], shape (D,)."""
+        return self._vector("collision_impulse")
 
     @property
     def moment(self) -> NDArray[np.float64]:
@@ -147,6 +153,30 @@ class RigidContact:
         arms = np.zeros((len(np.atleast_1d(np.asarray(points))), 3))
         arms[:, :dim] = floats("points", points, (None, dim)) - self._centre
         return self.velocity + np.cross(self._vector("spin"), arms)[:, :dim]
+
+    def add_collision(self, other: RigidContact, *, friction: float = 0.0, restitution: float = 0.0) -> None:
+        """Let this body collide with another rigid surface of the model, which without this it passes through.
+
+        One of them is a `Disc` or a `Sphere`, the other any surface; one of them at least is a `FreeBody`. Where they touch,
+        impulses keep them apart: with friction bodies roll or slide, with restitution they bounce until they rest. Momentum is
+        kept to round-off, and no impulse adds energy (docs/contact.md). Other bodies count as prescribed.
+
+        Args:
+            other: another surface of the model, apart from this one.
+            friction: coefficient mu of Coulomb friction [-]; 0 is smooth.
+            restitution: velocity of separation over that of approach, from 0, no bounce, to 1, elastic.
+
+        Raises:
+            InputError: an argument out of its range, bodies that overlap, with the depth, that collide already, of which none is
+                round or none moves freely, or of another model.
+
+        Note:
+            Collective.
+
+        Example:
+            >>> boulder.add_collision(ground, friction=0.5, restitution=0.3)
+        """
+        add_collision(self, other, friction, restitution)
 
     @property
     def kinetic_energy(self) -> float:
