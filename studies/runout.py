@@ -2,7 +2,7 @@
 
 The body between the ground before the slide and the surface on which it breaks loose is filled with particles, which touch the
 ground that is left with friction. Maps of the deposit, of the largest thickness and speed, and of where the slide has been are
-written as ESRI ASCII grids and drawn over a hillshade.
+written as ESRI ASCII grids or GeoTIFF and drawn over a hillshade.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from common.figures import Pictures
 from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
-from common.options import add_count, add_number, check, study_parser
+from common.options import add_choice, add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.progress import Progress
 from common.ranks import run_study
@@ -45,7 +45,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
-                   help="heights of the ground before the slide, .asc or .xyz (default: a valley given by formulas)")  # fmt: skip
+                   help="heights of the ground before the slide: .asc, .tif, .xyz (default: a valley by formulas)")  # fmt: skip
     p.add_argument(
         "--rupture", type=Path, default=None, metavar="FILE", help="heights of the ground that the slide leaves"
     )
@@ -68,6 +68,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)
     add_number(p, "--time", 20.0, "s", "duration", above=0)
     add_count(p, "--frames", 80, "times at which maps and particles are taken")
+    add_choice(p, "--grids", "asc", ("asc", "tif"), "files of the maps: ESRI ASCII grids, or GeoTIFF by rasterio")
     add_picture_options(p)
     return p
 
@@ -172,7 +173,10 @@ def run(
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", COLUMNS, comm) as history,
         ModelOutput(
-            model, folder / "particles", particle_fields=("velocity", "displacement", "volume", "id")
+            model,
+            folder / "particles",
+            particle_fields=("velocity", "displacement", "volume", "id"),
+            bodies=folder / "bodies",
         ) as output,
         Progress("slide", a.time, comm) as progress,
     ):
@@ -194,10 +198,10 @@ def run(
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
-def write_maps(found: dict[str, terrain.Raster], rupture: terrain.Raster, folder: Path) -> Pictures:
+def write_maps(a: Namespace, found: dict[str, terrain.Raster], rupture: terrain.Raster, folder: Path) -> Pictures:
     """Maps as grids, the ground as a surface for ParaView, and pictures to draw. On the first rank."""
     for name, raster in found.items():
-        terrain.write_raster(folder / f"{name}.asc", raster)
+        terrain.write_raster(folder / f"{name}.{a.grids}", raster)
     rupture.triangles().write(folder / "ground.obj")
     return {
         name: partial(save_map, folder / f"{name}.png", rupture, found[name], label) for name, label in LABELS.items()
@@ -231,7 +235,7 @@ def main(arguments: list[str] | None = None) -> int:
         "reached_area_m2": float(found["reached"].values.sum() * rupture.spacing**2), "outflow_mass_kg": report.outflow_mass,
         "particle_steps_per_second": report.particle_steps / seconds, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
-    pictures = write_maps(found, rupture, folder) if comm.rank == 0 else {}
+    pictures = write_maps(a, found, rupture, folder) if comm.rank == 0 else {}
     write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {})
     if comm.rank == 0:
         if stopped:

@@ -1,4 +1,4 @@
-"""Heights on a grid of square cells, from and to ESRI ASCII grids and XYZ files."""
+"""Heights on a grid of square cells, from and to ESRI ASCII grids, GeoTIFF and XYZ files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError
+from fenics_bridge.terrain.geotiff import read_geotiff, write_geotiff
 
+TIFF = (".tif", ".tiff")
 STEEPEST = 20.0
 """Mean slope above which the coordinates of a raster are taken for degrees"""
 
@@ -117,7 +119,9 @@ class Raster:
 def read_raster(
     path: str | Path, *, crs: str | None = None, window: tuple[Sequence[float], Sequence[float]] | None = None
 ) -> Raster:
-    """Read heights from a file: an ESRI ASCII grid (.asc), or points x y z of a grid in any order (.xyz, .txt).
+    """Read heights from a file: an ESRI ASCII grid (.asc), GeoTIFF (.tif), or points x y z of a grid in any order (.xyz, .txt).
+
+    GeoTIFF needs rasterio (Debian: python3-rasterio).
 
     Args:
         path: the file.
@@ -126,31 +130,41 @@ def read_raster(
 
     Raises:
         InputError: a file that is missing or damaged, points that are no grid of square cells, gaps (with their number and the
-            first one), degrees in place of metres, and an unknown coordinate reference.
+            first one), degrees in place of metres, an unknown coordinate reference, and GeoTIFF without rasterio.
     """
     path = Path(path)
     readers = {".asc": _read_ascii, ".xyz": _read_points, ".txt": _read_points}
-    if path.suffix.lower() not in readers:
-        raise InputError(f"path: got {str(path)!r}, expected a file ending in {', '.join(readers)}")
-    try:
-        text = path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"path: {str(path)!r} cannot be read: {error}") from None
-    x, y, values = readers[path.suffix.lower()](text, str(path))
-    raster = Raster(x, y, values, _reference(path, crs))
+    ending = path.suffix.lower()
+    if ending in TIFF:
+        x, y, values, inside = read_geotiff(path)
+    elif ending in readers:
+        try:
+            x, y, values = readers[ending](path.read_text(), str(path))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"path: {str(path)!r} cannot be read: {error}") from None
+        inside = ""
+    else:
+        raise InputError(f"path: got {str(path)!r}, expected a file ending in {', '.join((*readers, *TIFF))}")
+    raster = Raster(x, y, values, _reference(path, crs if crs is not None else inside or None))
     raster = raster if window is None else raster.window(*window)
     _check_heights(raster, str(path))
     return raster
 
 
 def write_raster(path: str | Path, raster: Raster) -> None:
-    """Write an ESRI ASCII grid, and a .prj beside it that names the coordinate reference.
+    """Write a GeoTIFF (.tif), or else an ESRI ASCII grid, and a .prj beside it that names the coordinate reference.
 
     Args:
         path: the file.
         raster: values; those that are not numbers are gaps (-9999).
+
+    Raises:
+        InputError: GeoTIFF without rasterio, or with a coordinate reference that it does not know.
     """
     path = Path(path)
+    if path.suffix.lower() in TIFF:
+        write_geotiff(path, raster.x, raster.y, raster.values, raster.crs)
+        return
     header = (f"ncols {len(raster.x)}\nnrows {len(raster.y)}\nxllcenter {raster.x[0]!r}\nyllcenter {raster.y[0]!r}\n"
               f"cellsize {raster.spacing!r}\nNODATA_value -9999\n")  # fmt: skip
     values = np.where(np.isfinite(raster.values), raster.values, -9999)[::-1]
