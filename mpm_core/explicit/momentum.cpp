@@ -54,36 +54,77 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field)
     impose<G::dim>(support, field.velocity[support.node]);
 }
 
+namespace
+{
+/// External force on a node, gravity included, and its displacement over the step
+template <int D>
+struct NodeWork
+{
+  Vector<D> external, displacement;
+};
+
+template <class G, int D = G::dim>
+inline NodeWork<D> work_of_node(const VelocityField<G>& field, Index i, const Vector<G::dim>& gravity, double dt)
+{
+  NodeWork<D> work;
+  for (int a = 0; a < D; ++a)
+  {
+    work.external[a] = field.nodes[i].traction[a] + field.nodes[i].mass * gravity[a];
+    work.displacement[a] = 0.5 * dt * (field.start_velocity[i][a] + field.velocity[i][a]);
+  }
+  return work;
+}
+
+/// Work of the reactions at the nodes with boundary conditions: of what the forces on them leave of m_i a_i.
+template <class G, int D = G::dim>
+double work_of_supports(const VelocityField<G>& field, std::span<const unsigned char> owned,
+                        const Vector<G::dim>& gravity, double damping, double dt)
+{
+  double sum = 0;
+  for (const Support<D>& support : field.supports)
+  {
+    const Index i = support.node;
+    if (!owned[i] || !field.part.has_node[i] || is_light(field, i))
+      continue;
+    const NodeSums<D>& node = field.nodes[i];
+    const NodeWork<D> work = work_of_node(field, i, gravity, dt);
+    for (int a = 0; a < D; ++a)
+    {
+      const double residual = work.external[a] - node.internal[a];
+      const double drag = local_damping(damping, residual, node.mass * field.start_velocity[i][a], dt);
+      sum += (node.mass * field.acceleration[i][a] - residual + drag) * work.displacement[a];
+    }
+  }
+  return sum;
+}
+} // namespace
+
 template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
                 double damping, double dt, Totals& totals)
 {
   constexpr int D = G::dim;
-  double at_end = 0;
-  Totals sums; // beside the model's: a sum kept in a register need not wait for memory
+  double at_end = 0, external = 0, internal = 0, of_rest = 0; // sums kept in registers need not wait for memory
   for (Index i : field.part.nodes)
   {
     const NodeSums<D>& node = field.nodes[i];
     if (!owned[i] || is_light(field, i))
       continue;
-    const Vector<D>& start = field.start_velocity[i];
+    const NodeWork<D> work = work_of_node(field, i, gravity, dt);
     for (int a = 0; a < D; ++a)
     {
-      const double external = node.traction[a] + node.mass * gravity[a];
-      const double u = 0.5 * dt * (start[a] + field.velocity[i][a]);
-      const double residual = external - node.internal[a];
-      const double drag = local_damping(damping, residual, node.mass * start[a], dt);
-      sums.external_work += external * u;
-      sums.internal_work += node.internal[a] * u;
+      external += work.external[a] * work.displacement[a];
+      internal += node.internal[a] * work.displacement[a];
+      of_rest += (work.external[a] - node.internal[a] - node.mass * field.acceleration[i][a]) * work.displacement[a];
       at_end += node.internal[a] * dt * field.velocity[i][a];
-      sums.damping_work += drag * u;
-      sums.support_work += (node.mass * field.acceleration[i][a] - residual + drag) * u;
     }
   }
-  totals.external_work += sums.external_work;
-  totals.internal_work += sums.internal_work;
-  totals.damping_work += sums.damping_work;
-  totals.support_work += sums.support_work;
+  // What the forces leave of m_i a_i is the drag, and at boundary conditions the reactions too.
+  const double of_supports = work_of_supports(field, owned, gravity, damping, dt);
+  totals.external_work += external;
+  totals.internal_work += internal;
+  totals.support_work += of_supports;
+  totals.damping_work += damping == 0 ? 0 : of_rest + of_supports;
   return at_end;
 }
 

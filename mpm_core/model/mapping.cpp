@@ -169,9 +169,10 @@ void find_start_velocity(VelocityField<G>& field)
   {
     const NodeSums<G::dim>& node = field.nodes[i];
     const bool light = is_light(field, i);
+    const double per_mass = light ? 0 : 1 / node.mass;
     field.has_light_nodes |= light;
     for (int a = 0; a < G::dim; ++a)
-      field.start_velocity[i][a] = light ? 0 : node.momentum[a] / node.mass;
+      field.start_velocity[i][a] = node.momentum[a] * per_mass;
   }
   for (const auto& support : field.supports)
     impose<G::dim>(support, field.start_velocity[support.node]);
