@@ -99,10 +99,10 @@ double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index
 /// @param dt        [s]
 inline double local_damping(double alpha, double residual, double momentum, double dt)
 {
-  if (alpha == 0)
-    return 0;
-  const double impulse = (1 + alpha) * residual * dt;
-  const double slowed = impulse == 0 ? 0 : std::clamp(-momentum / impulse, 0.0, 1.0); // part of the step until the stop
-  return alpha * residual * (1 - 2 * slowed);
+  // The force that stops the node at the step's end with its drag; R times the part of the step until the stop lies
+  // between zero and R. Selections of values, since branches on the signs of velocities cannot be predicted.
+  const double stopping = -1 / ((1 + alpha) * dt) * momentum;
+  const double slowing = std::max(std::min(residual, 0.0), std::min(std::max(residual, 0.0), stopping));
+  return alpha * (residual - 2 * slowing);
 }
 } // namespace mpm::model
