@@ -105,6 +105,12 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
     shrink_part(mesh, exchange, field);
   begin_integration(mesh, exchange, particles, runs, field);
   const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
+  const auto scatter_particles = [&](auto&& stress_of)
+  {
+    field.has_light_nodes =
+        scatter<G>(mesh, part_of_particles(field), field.moments, stress_of, field.tractions, field.nodes,
+                   2 * field.least_mass); // twice: sums of several cells have round-off
+  };
   if (!field.integration.averaged_by_law.empty())
   {
     average_stress_of_soils(mesh, exchange, runs, field);
@@ -116,12 +122,12 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
         stress[k] += change;
       return stress;
     };
-    scatter<G>(mesh, part_of_particles(field), field.moments, averaged, field.tractions, field.nodes);
+    scatter_particles(averaged);
     add_resting_sums(mesh, averaged, field);
   }
   else
   {
-    scatter<G>(mesh, part_of_particles(field), field.moments, integrated, field.tractions, field.nodes);
+    scatter_particles(integrated);
     if (field.integration.kind == Integration::particles)
       add_resting_sums(field);
     else
@@ -164,13 +170,10 @@ Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField
 template <class G>
 void find_start_velocity(VelocityField<G>& field)
 {
-  field.has_light_nodes = false;
   for (Index i : field.part.nodes)
   {
     const NodeSums<G::dim>& node = field.nodes[i];
-    const bool light = is_light(field, i);
-    const double per_mass = light ? 0 : 1 / node.mass;
-    field.has_light_nodes |= light;
+    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
     for (int a = 0; a < G::dim; ++a)
       field.start_velocity[i][a] = node.momentum[a] * per_mass;
   }

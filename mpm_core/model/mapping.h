@@ -51,7 +51,6 @@ inline Vector<G::dim> velocity_of_vertex(const Mesh<G::dim>& mesh, const Velocit
 }
 
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.
-/// @post field.has_light_nodes
 template <class G>
 void find_start_velocity(VelocityField<G>& field);
 

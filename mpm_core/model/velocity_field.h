@@ -62,7 +62,7 @@ struct VelocityField
   std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
   std::vector<Vector<D>> damping_force; ///< of Rayleigh damping, likewise; else empty
   double least_mass = 0;                ///< nodes below this mass are not moved [kg]
-  bool has_light_nodes = false;         ///< whether there are such nodes in this explicit step
+  bool has_light_nodes = false;         ///< whether a cell with particles may have one in this explicit step
 
   // How its nodes move
   std::vector<Support<D>> supports;          ///< its boundary conditions

@@ -5,6 +5,7 @@
 #include "mesh/part.h"
 #include "transfer/by_vertex.h"
 
+#include <limits>
 #include <span>
 
 namespace mpm::transfer
@@ -50,13 +51,17 @@ inline void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMom
 
 /// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
 /// @param stress_of  what a cell integrates [N m], sum V_p sigma_p or what takes its place; a callable Index -> Working
-/// @param tractions  one per cell, or empty
+/// @param tractions   one per cell, or empty
+/// @param least_mass  [kg]
+/// @returns whether a vertex gets no more than the least mass from a cell, whose particles then lie on the facet
+/// opposite to it
 template <class G, class StressOf>
-void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
+bool scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
              StressOf&& stress_of, std::span<const TractionMoments<G::dim>> tractions,
-             std::span<NodeSums<G::dim>> nodes)
+             std::span<NodeSums<G::dim>> nodes, double least_mass = 0)
 {
   constexpr int D = G::dim;
+  double least = std::numeric_limits<double>::infinity();
   for (Index node : part.nodes)
     nodes[node] = {};
   for (Index c : part.cells)
@@ -76,6 +81,7 @@ void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const Cel
     for (int k = 0; k <= D; ++k)
     {
       NodeSums<D>& node = nodes[mesh.cells[c][k]];
+      least = mass[k] < least ? mass[k] : least;
       node.mass += mass[k];
       for (int a = 0; a < D; ++a)
       {
@@ -86,6 +92,7 @@ void scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const Cel
     if (!tractions.empty())
       scatter_tractions<D>(mesh, c, tractions[c], nodes);
   }
+  return least <= least_mass;
 }
 
 /// The momentum `sum m_p N_i sum_j N_j change_j` of particles that all had the velocity of the nodal field `change` at
