@@ -15,6 +15,7 @@ import argparse
 import json
 import resource
 import sys
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
@@ -63,15 +64,19 @@ class FiniteElements:
 
 
 class Particles:
-    """Quasi-static steps of particles, one in each cell."""
+    """Quasi-static steps of particles, one in each cell; with pore water, which leaves on top and at the slope."""
 
-    def __init__(self, cells: int, soil: Any, nmd: bool) -> None:
+    def __init__(self, cells: int, soil: Any, nmd: bool, conductivity: float | None = None) -> None:
         parts = slope(cells)
         self._model = mpm.Model(bridge.background_mesh(*parts), soil)
         self.tetrahedra = self._model.seed(density=1e3 / 9.81, per_cell=1)
         for tag, axis in SUPPORTS:
             self._model.fix(tag) if axis is None else self._model.roller(tag, axis)
         self.nodes = parts[0].topology.index_map(0).size_global
+        if conductivity is not None:
+            self._model.add_water(porosity=0.4, conductivity=conductivity, modulus=np.inf)
+            for tag in (2, 6):
+                self._model.hold_pore_pressure(tag, 0.0)
         self._nmd, self._solver, self._time = nmd, _Watched(), 0.0
 
     def step(self, unit_weight: float) -> tuple[int, list[int], str]:
@@ -105,7 +110,7 @@ class _Watched(mpm.Newton):
         return solver
 
 
-def rows(kind: type, cells: int, soil: Any, nmd: bool, loads: list[float]) -> list[dict[str, Any]]:
+def rows(kind: Any, cells: int, soil: Any, nmd: bool, loads: list[float]) -> list[dict[str, Any]]:
     """A row for each load; the first one has the set-up in its memory, not in its time."""
     wall = perf_counter()
     body, found = kind(cells, soil, nmd), []
@@ -116,7 +121,7 @@ def rows(kind: type, cells: int, soil: Any, nmd: bool, loads: list[float]) -> li
         cpu = comm.allreduce(process_time() - cpu, MPI.MAX)
         peak = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
         found.append({
-            "kind": kind.__name__, "ranks": comm.size, "tetrahedra": body.tetrahedra, "nodes": body.nodes, "nmd": nmd,
+            "kind": type(body).__name__, "ranks": comm.size, "tetrahedra": body.tetrahedra, "nodes": body.nodes, "nmd": nmd,
             "unit_weight_kN_per_m3": load, "newton": newton, "krylov_mean": float(np.mean(krylov)) if krylov else 0.0,
             "krylov_most": max(krylov, default=0), "cpu_seconds_per_rank": cpu, "wall_seconds": perf_counter() - wall,
             "setup_wall_seconds": setup, "memory_MB": peak, "reason": reason,
@@ -141,12 +146,14 @@ def main() -> None:
     parser.add_argument("--elastic", action="store_true", help="linear elastic soil")
     parser.add_argument("--nmd", action="store_true", help="average volumetric strains over nodes")
     parser.add_argument("--particles", action="store_true", help="implicit particles in place of finite elements")
+    parser.add_argument(
+        "--water", type=float, metavar="K", help="with --particles: pore water, and its conductivity [m/s]"
+    )
     parser.add_argument("--json", type=Path, help="write the results to this file as well")
     a = parser.parse_known_args()[0]  # others are for PETSc
     soil = law(a.dilation_angle, a.elastic)
-    found = [
-        row for n in a.cells for row in rows(Particles if a.particles else FiniteElements, n, soil, a.nmd, a.loads)
-    ]
+    kind = partial(Particles, conductivity=a.water) if a.particles else FiniteElements
+    found = [row for n in a.cells for row in rows(kind, n, soil, a.nmd, a.loads)]
     if a.json and comm.rank == 0:
         a.json.write_text(json.dumps(found, indent=2) + "\n")
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope
+from petsc4py import PETSc
 
 import mpm_core as mpm
 
@@ -63,6 +64,18 @@ def test_a_bank_consolidates_alike_on_any_partition(comm, owners_of):
         assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-10)
     assert alone.water_inflow() < -1e-3 * alone.water_volume()
     assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-10)
+
+
+@pytest.mark.parametrize("owners_of", [scattered, one_does_all])
+def test_the_field_split_works_on_any_partition(comm, owners_of):
+    """Also where ranks have no nodes; it ends at the tolerance of Newton's method."""
+    options = PETSc.Options("split_")
+    options["pc_type"] = "fieldsplit"
+    model, alone = consolidating_bank(comm, owners_of), consolidating_bank(MPI.COMM_SELF)
+    list(model.implicit(4e3, dt=1e3, quasi_static=True, solver=mpm.Newton(tolerance=1e-10, prefix="split_")))
+    list(alone.implicit(4e3, dt=1e3, quasi_static=True, solver=mpm.Newton(tolerance=1e-10)))
+    options.delValue("pc_type")
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-6)
 
 
 def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path):

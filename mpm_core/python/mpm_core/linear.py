@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from .field_split import FieldSplit, split_options
 from .petsc import (
     ALONE_LIMIT,
     DIRECT_LIMIT,
@@ -56,13 +57,18 @@ class Tangent:
             self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, dim), step.mean_stress_places())
             self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
-        coupled = n > dim  # multigrid of one kind does not solve for displacements and pressures together
-        direct = coupled or step.total_nodes <= DIRECT_LIMIT[dim]
+        coupled = n > dim
+        splits = coupled and PETSc.Options(prefix).getString("pc_type", "") == "fieldsplit"
+        direct = step.total_nodes <= DIRECT_LIMIT[dim] and not splits
         alone = step.total_nodes <= ALONE_LIMIT[dim]
-        self._options = direct_options(comm.size, alone) if direct else multigrid_options(dim, RTOL)
+        iterative = split_options if coupled else multigrid_options
+        self._options = direct_options(comm.size, alone) if direct else iterative(dim, RTOL)
         self._comm = comm
         self._ksp = new_solver(comm, prefix)
-        self._near_null_space = None if coupled else rigid_body_motions(step.points, comm)
+        motions = rigid_body_motions(step.points, comm)
+        self._near_null_space = None if coupled else motions
+        kind = PETSc.Options(prefix).getString("pc_type", self._options["pc_type"])
+        self._split = FieldSplit(self._stiffness, dim, motions) if coupled and kind == "fieldsplit" else None
         self.iterations = 0
         """Krylov iterations of the last solution."""
         self.failure = ""
@@ -89,6 +95,8 @@ class Tangent:
         if self._near_null_space is not None:
             self.matrix.setNearNullSpace(self._near_null_space)
         self._ksp.setOperators(self.matrix)
+        if self._split is not None:
+            self._split.attach(self._ksp.getPC(), self.matrix)
         with defaults(self._prefix, self._options):
             self._ksp.setFromOptions()
             self._ksp.setUp()
