@@ -11,7 +11,7 @@ import numpy as np
 import wall
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
-from common.body_runs import scheme
+from _rows import followed
 from common.earth_pressure import stress_field
 from mpi4py import MPI
 
@@ -19,30 +19,12 @@ ROUGH = 20.0  # degrees
 RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "field of stresses, Lancellotta 2002", "plane wedge, Coulomb 1776"
 
 
-class Rows:
-    """The columns of a history, without a file."""
-
-    def __init__(self):
-        self.rows = []
-
-    def __len__(self):
-        return len(self.rows)
-
-    def __getitem__(self, column):
-        return np.array([row[column] for row in self.rows])
-
-
 def moved(motion, friction_angle, quick):
     """The options, and the rows of the study's history."""
     size = ["--cell-size", "0.1", "--speed", "0.02"] if quick else []
     a = wall.parse(["--motion", motion, "--wall-friction-angle", str(friction_angle), *size])
-    model, rows = wall.build(a), Rows()
-    body = model.contacts[0]
-    rows.rows.append(wall.row(a, body, rows, model.report()))
     until = wall.end(a)
-    for report in model.explicit(until, every=(until - wall.at_rest(a)) / 20, **scheme(a)):
-        rows.rows.append(wall.row(a, body, rows, report))
-    return a, rows
+    return a, followed(a, wall.build(a), until, (until - wall.at_rest(a)) / 20, wall.row)
 
 
 def run(quick: bool, folder) -> Result:

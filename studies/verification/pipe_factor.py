@@ -1,0 +1,81 @@
+"""A pipe that is pulled through clay: the factor of full flow, from smooth to rough.
+
+Half of a rigid pipe deep in weightless Tresca soil under a uniform pressure, so that no gap opens behind it. The load over
+diameter and shear strength at collapse is that of Randolph and Houlsby (1984),
+
+N = pi + 2 D + 2 cos D + 4 (cos D/2 + sin D/2),   D = asin(alpha)
+
+with the roughness alpha. For a rough pipe it is exact; for a smooth one it comes from stresses in equilibrium, and the
+mechanism of Martin and Randolph (2006) lies less than a per cent above it. Soil that sticks to a rough pipe has to
+shear within the cells around it, so that coarse cells give more.
+"""
+
+import numpy as np
+from _case import Check, Kind, Result, run_alone
+from _plots import save_comparison
+from common.summary import ROOT
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+RADIUS, STRENGTH, RIGIDITY, POISSON, DENSITY = 0.5, 1e3, 300.0, 0.49, 1000.0  # m, Pa, G / s_u, -, kg/m3
+PRESSURE, SPEED, WAY = 15.0, 5e-4, 0.04
+"""Over the strength; over that of elastic waves; over the diameter"""
+
+
+def exact(face):
+    delta = np.pi / 2 if face == "rough" else 0.0
+    return np.pi + 2 * delta + 2 * np.cos(delta) + 4 * (np.cos(delta / 2) + np.sin(delta / 2))
+
+
+def pulled(face, cell_size):
+    """The factor, and the curve of displacement over the diameter and load over diameter and strength."""
+    parameters = {"radius": RADIUS, "size": 8 * RADIUS, "edge_size": cell_size, "far_size": cell_size + 0.6}
+    clay = mpm.tresca(young=2 * (1 + POISSON) * RIGIDITY * STRENGTH, poisson=POISSON, shear_strength=STRENGTH)
+    mesh = bridge.read_mesh(ROOT / "meshes" / "pipe.geo", MPI.COMM_WORLD, parameters=parameters)
+    model = mpm.Model(bridge.background_mesh(*mesh), clay)
+    model.seed(density=DENSITY, per_cell=3, cell_tag="soil")
+    model.roller("axis", normal=(1, 0))
+    model.fix("far")
+    pressure = np.array([-1.0, -1.0, -1.0, 0.0]) * PRESSURE * STRENGTH
+    model.particles.set("stress", np.tile(pressure, (len(model.particles), 1)))
+    radius = RADIUS + model.gap(mpm.Disc((0, 0), RADIUS)) - 1e-9
+    speed = SPEED * np.sqrt(clay.p_wave_modulus / DENSITY)
+    motion = ([0.0, 0.1 * WAY * 2 * RADIUS / speed], [(0.0, 0.0), (0.0, -speed)])
+    # Soil that is pressed on a rough pipe is weaker than the contact, and fails itself.
+    pipe = model.add_contact(mpm.Disc((0, 0), radius), friction=1.0 if face == "rough" else 0.0, velocity=motion)
+    until, rows = 1.05 * WAY * 2 * RADIUS / speed, [(0.0, 0.0, 0.0)]
+    for report in model.explicit(until, every=until / 30, nmd=True, pic=0.01, integration=mpm.Integration.MIXED):
+        rows.append((report.time, -pipe.displacement[1], pipe.impulse[1]))
+    time, way, impulse = np.array(rows).T
+    factor = np.diff(impulse) / np.diff(time) / (radius * STRENGTH)
+    return factor[-8:].mean(), np.column_stack([way[1:] / (2 * radius), factor])
+
+
+def run(quick: bool, folder) -> Result:
+    # --- 1. Smooth and rough pipes -----------------------------------------------------------------------------------
+    checks, curves, cell_size = [], {}, 0.1 if quick else 0.025
+    for face in ("rough",) if quick else ("smooth", "rough"):
+        found, curves[face] = pulled(face, cell_size)
+        name = f"factor of a {face} pipe"
+        source = "Randolph and Houlsby 1984"
+        checks.append(Check(name, exact(face), source, found, 0.3 if quick else 0.05))
+    if not quick:
+        coarse, fine = pulled("rough", 2 * cell_size)[0], checks[-1].computed
+        ratio = abs(fine - exact("rough")) / abs(coarse - exact("rough"))
+        checks.append(Check("error of the factor of a rough pipe, over that on cells twice as large", 0.6, "falls with the cells",
+                            ratio, 0.0, kind=Kind.AT_MOST))  # fmt: skip
+
+    # --- 2. Picture --------------------------------------------------------------------------------------------------
+    if MPI.COMM_WORLD.rank == 0:
+        ends = np.array([0.0, max(curve[-1, 0] for curve in curves.values())])
+        lines = {f"{face}, exact": (ends, np.full(2, exact(face))) for face in curves}
+        save_comparison(folder / "load.png", {name: tuple(curve.T) for name, curve in curves.items()}, lines,
+                        ("Displacement over the diameter [-]", "Load over diameter and $s_u$ [-]"), joined=True,
+                        limits=((0.0, None), (0.0, None)))  # fmt: skip
+    return Result(checks, {"load.png": "Load on pipes that are pulled through clay"})
+
+
+if __name__ == "__main__":
+    run_alone(run)
