@@ -15,8 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import Pictures, save_figure
 from common.files import OutputError
+from common.followed import cells_near, mean_displacement, numbers_in
 from common.movie import frame_of
-from common.options import add_count, add_number, check, study_parser
+from common.options import add_count, add_number, change_defaults, check, study_parser
 from common.page import Page
 from common.plots import AXES, SHEAR_STRAIN, WIDTH, paper_style, save_history
 from common.ranks import run_study
@@ -50,14 +51,14 @@ def parser() -> ArgumentParser:
     add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--unit-weight", 60e3, "N/m3", "unit weight under which the slope fails", above=0)
     add_soil_options(p, dilation_angle=0.0)
-    p.set_defaults(young=100e6)
+    change_defaults(p, young=1e9)
     add_number(p, "--damping", 0.1, "-", "local damping", at_least=0, below=1)
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
     add_count(p, "--frames", 40, "times of the history")
     add_number(
         p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
     )
-    add_number(p, "--displacement", 0.1, "-", "displacement over the cell size above which it does", above=0)
+    add_number(p, "--displacement", 0.01, "-", "displacement over the cell size above which it does", above=0)
     return p
 
 
@@ -119,34 +120,21 @@ def model_of(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------
 
 
-def cells_near(model: mpm.Model, place: np.ndarray, reach: float) -> np.ndarray:
-    """Numbers over all ranks of the soil cells whose centres are near a place."""
-    mesh, n = model.mesh, model.mesh.owned_cells
-    centres = mesh.points[mesh.cells[:n]].mean(axis=1)
-    near = (np.linalg.norm(centres - place, axis=1) < reach) & (mesh.cell_tags[:n] == bridge.SOIL)
-    return np.concatenate(comm.allgather(mesh.global_cells[:n][near]))
-
-
-def displacement_of(model: mpm.Model, cells: np.ndarray, per_cell: int) -> float:
-    """Mean displacement [m] of the soil that was in some cells at the start, known by the numbers of its particles."""
-    p = model.particles
-    rows = np.isin(p.id // per_cell, cells)
-    sums = comm.allreduce(np.append((p.mass[:, None] * p.displacement)[rows].sum(axis=0), p.mass[rows].sum()))
-    return float(np.linalg.norm(sums[:2]) / sums[2])
-
-
 def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> dict:
     """Slide to the end; history, time and the last frame."""
     model = model_of(a, mesh, fem, resting)
     run = a.height / np.tan(np.radians(a.angle))
     level = level_of(a)
     places = {"crest": np.array([level, a.height]), "toe": np.array([level + run, 0.0])}
-    cells = {name: cells_near(model, place, 2 * a.cell_size) for name, place in places.items()}
+    followed = {
+        name: numbers_in(model, cells_near(model, place, 2 * a.cell_size, [bridge.SOIL]))
+        for name, place in places.items()
+    }
     conversion = mpm.Conversion(plastic_strain=a.plastic_strain, displacement=a.displacement)
     rows, seconds, started = [(0.0, 0.0, 0.0, 0.0)], 0.0, process_time()
     for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, conversion=conversion):
         seconds += process_time() - started
-        moved = [displacement_of(model, cells[name], a.particles_per_cell) for name in ("crest", "toe")]
+        moved = [float(np.linalg.norm(mean_displacement(model, followed[name]))) for name in ("crest", "toe")]
         rows.append(
             (report.time, *moved, report.converted_cells / max(1, report.converted_cells + report.resting_cells))
         )
