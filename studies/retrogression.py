@@ -40,7 +40,8 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 COLUMNS = [
-    "time_s", "retrogression_m", "runout_m", "work_of_stresses_J_per_m", "kinetic_energy_J_per_m", "plastic_fraction", "dt_s"
+    "time_s", "retrogression_m", "runout_m", "work_of_stresses_J_per_m", "kinetic_energy_J_per_m", "plastic_fraction", "dt_s",
+    "resting_cells",
 ]  # fmt: skip
 MEASURES = {
     "retrogression_m": "Failed length of the crest [m]", "runout_m": "Run-out past the toe [m]",
@@ -61,7 +62,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_slope_options(p)
     change_defaults(
-        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=18e3,
+        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=17e3,
         material="softening", young=2e6, poisson=0.45, cohesion=15e3, friction_angle=0.0, residual_cohesion=4e3,
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
@@ -76,6 +77,7 @@ def parser() -> ArgumentParser:
     add_picture_options(p)
     add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
     add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
+    add_switch(p, "--coupled", False, "let cells rest as finite elements until the clay in them fails")
     return p
 
 
@@ -91,12 +93,15 @@ def start(case: SlopeCase) -> float:
             f"--unit-weight is {case.args.unit_weight:g} N/m3, but the intact slope carries only "
             f"{fem.load.unit_weight:g} N/m3"
         )
-    return bridge.initialise(case.model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio
+    resting = case.args.coupled
+    handover = bridge.initialise(case.model, fem, count_displacement=False, equilibrate=False, resting=resting)
+    return handover.unbalanced_ratio
 
 
 def disturb(case: SlopeCase) -> None:
-    """Take strength from the clay around the toe."""
-    x = case.model.particles.position
+    """Take strength from the clay around the toe, cell by cell, so that it is the same in particles and in resting cells."""
+    mesh = case.model.mesh
+    x = mesh.points[mesh.cells[case.model.particles.cell]].mean(axis=1)
     near = np.hypot(x[:, 0] - case.toe, x[:, 1]) < case.args.disturbed
     case.model.set_state("cohesion_deviation", np.where(near, -case.args.disturbed_loss, 0.0))
 
@@ -126,7 +131,7 @@ class Slide:
         self.history.add(
             time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=max(0.0, front - self.case.toe),
             work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy,
-            plastic_fraction=report.plastic_fraction, dt_s=report.dt,
+            plastic_fraction=report.plastic_fraction, dt_s=report.dt, resting_cells=report.resting_cells,
         )  # fmt: skip
         frame = particle_frame(self.case.model, report.time)
         if frame is not None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[3] / "studies"
@@ -68,23 +69,14 @@ def test_bad_options_are_named(tmp_path, options, named):
     assert named in result.stderr
 
 
+SMALL_BANK = (
+    "--cell-size 1 --crest 8 --runout-length 6 --height 4 --angle 45 --mesh crossed --unit-weight 24e3 --cohesion 24e3 "
+    "--reference-length 1 --disturbed 2 --time 3 --frames 3"
+).split()
+
+
 def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
-    small = [
-        "--cell-size",
-        "1",
-        "--crest",
-        "8",
-        "--runout-length",
-        "6",
-        "--height",
-        "4",
-        "--angle",
-        "45",
-        "--mesh",
-        "crossed",
-    ]
-    soil = ["--unit-weight", "24e3", "--cohesion", "24e3", "--reference-length", "1", "--disturbed", "2"]
-    result = study("retrogression", tmp_path, *small, *soil, "--time", "3", "--frames", "3", "--meshes", "two")
+    result = study("retrogression", tmp_path, *SMALL_BANK, "--meshes", "two")
     assert result.returncode == 0, result.stderr
     found = summary(tmp_path)["cells"]
     assert set(found) == {"1_m", "0.5_m"}
@@ -96,3 +88,18 @@ def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
         assert float(last.split(",")[3]) > 0
     for name in ("meshes.png", "history_0.5.csv", "displacement_1.png"):
         assert (tmp_path / name).stat().st_size > 0
+
+
+def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
+    # Most of the run-out is beyond the tenth of a cell up to which a cell may rest.
+    found = []
+    for name, more in (("particles", []), ("coupled", ["--coupled"])):
+        result = study("retrogression", tmp_path / name, *SMALL_BANK, *more, "--meshes", "one", "--no-pictures")
+        assert result.returncode == 0, result.stderr
+        found.append(summary(tmp_path / name)["cells"]["1_m"])
+        rows = np.loadtxt(tmp_path / name / "history_1.csv", delimiter=",", skiprows=1)
+    particles, coupled = found
+    assert rows[0, 7] > rows[-1, 7] > 0  # resting cells, of which some have turned into particles
+    assert coupled["initial_out_of_balance_ratio"] < 1e-6
+    assert abs(coupled["runout_m"] - particles["runout_m"]) < 0.2  # two tenths of a cell
+    assert coupled["work_of_stresses_J_per_m"] == pytest.approx(particles["work_of_stresses_J_per_m"], rel=0.03)
