@@ -1,13 +1,13 @@
 #include "explicit/explicit_step.h"
 
 #include "explicit/momentum.h"
+#include "explicit/particle_update.h"
+#include "explicit/two_phase_step.h"
 #include "materials/laws/association.h"
 #include "model/absorbing.h"
-#include "model/cell_change.h"
 #include "model/contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
-#include "model/particle_pass.h"
 #include "model/resting_nodes.h"
 
 #include <algorithm>
@@ -29,21 +29,6 @@ void find_means(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Explicit
     average_strains(mesh, exchange, field, dt);
   if (options.integration == Integration::dual_domain)
     average_gradients(mesh, exchange, field);
-}
-
-/// Nodes to particles: v_p += dt sum N_i a_i (18), x_p += dt sum N_i v_i (20), and with `stress` strains, stresses and
-/// volumes, in one pass that also takes the cells' moments along; then the mesh is reset under the particles.
-/// @note Collective
-template <class G>
-void update_particles(Model<G>& model, const ExplicitOptions& options, double dt, bool stress, PhaseClock& clock)
-{
-  clock.begin(Phase::particles);
-  particle_pass(model, {dt, true, stress, options.pic_fraction, options.nmd, dt});
-  agree_on_failure(model);
-  if (model.failure)
-    return;
-  clock.begin(Phase::migration);
-  migrate_particles(model);
 }
 
 /// Adds forces at the nodes beside those of gravity and stresses: of rigid surfaces, of damping, of absorbing sides.
@@ -158,11 +143,28 @@ namespace
 constexpr double averaged_in_non_associated_soil = 0.5;
 
 /// Finds by law the fraction of averaging; empty without nodal mixed discretisation.
-void find_averaged_laws(const std::vector<Law>& laws, bool nmd, std::vector<double>& averaged)
+/// @param filled  whether water with its own velocity fills the pores, whose pressure is most of what averages change
+void find_averaged_laws(const std::vector<Law>& laws, bool nmd, bool filled, std::vector<double>& averaged)
 {
   averaged.clear();
   for (std::size_t k = 0; nmd && k < laws.size(); ++k)
-    averaged.push_back(is_non_associated(laws[k]) ? averaged_in_non_associated_soil : 1);
+    averaged.push_back(is_non_associated(laws[k]) && !filled ? averaged_in_non_associated_soil : 1);
+}
+
+template <class G>
+void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
+{
+  if (has_two_phases(model))
+    return two_phase_step(model, options, dt);
+  switch (options.stress_update)
+  {
+  case StressUpdate::modified_last:
+    return modified_update_stress_last(model, options, dt);
+  case StressUpdate::last:
+    return update_stress_last(model, options, dt);
+  case StressUpdate::first:
+    return update_stress_first(model, options, dt);
+  }
 }
 } // namespace
 
@@ -172,22 +174,11 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = options.integration;
-    find_averaged_laws(model.laws, options.nmd, field.integration.averaged_by_law);
+    find_averaged_laws(model.laws, options.nmd, has_two_phases(model), field.integration.averaged_by_law);
   }
   model.last.dt = dt;
   begin_contacts(model, {model.time, dt});
-  switch (options.stress_update)
-  {
-  case StressUpdate::modified_last:
-    modified_update_stress_last(model, options, dt);
-    break;
-  case StressUpdate::last:
-    update_stress_last(model, options, dt);
-    break;
-  case StressUpdate::first:
-    update_stress_first(model, options, dt);
-    break;
-  }
+  take_step(model, options, dt);
   if (model.failure)
     return;
   end_contacts(model, {model.time, dt});
@@ -201,9 +192,10 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 namespace
 {
 /// Adds squares of f_ext - f_int over unsupported directions, of f_ext, and of reactions.
-template <class G>
-void add_squares(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
-                 std::array<double, 3>& squares)
+/// @param sums_of  nodal sums of soil and water together; a callable Index -> NodeSums
+template <class G, class SumsOf>
+void add_squares(const VelocityField<G>& field, SumsOf&& sums_of, std::span<const unsigned char> owned,
+                 const Vector<G::dim>& gravity, std::array<double, 3>& squares)
 {
   constexpr int D = G::dim;
   auto support = field.supports.begin();
@@ -211,7 +203,7 @@ void add_squares(const VelocityField<G>& field, std::span<const unsigned char> o
   {
     while (support != field.supports.end() && support->node < static_cast<Index>(i))
       ++support;
-    const NodeSums<D>& node = field.nodes[i];
+    const NodeSums<D> node = sums_of(i);
     if (!owned[i] || is_light(field, static_cast<Index>(i)))
       continue;
     Vector<D> external, unbalanced;
@@ -234,12 +226,41 @@ void add_squares(const VelocityField<G>& field, std::span<const unsigned char> o
 }
 } // namespace
 
+namespace
+{
+/// Sums of soil and water together.
+template <class G>
+NodeSums<G::dim> sums_of_phases(const Model<G>& model, std::size_t i)
+{
+  NodeSums<G::dim> sums = model.fields.front().nodes[i];
+  const NodeSums<G::dim>& water = model.water_field.motion.nodes[i];
+  sums.mass += water.mass;
+  for (int a = 0; a < G::dim; ++a)
+    sums.internal[a] += water.internal[a];
+  return sums;
+}
+
+/// Modulus over density of the fastest compression wave in a particle [m2/s2].
+template <class G, int D = G::dim>
+double wave_squared(const Model<G>& model, Index p, double modulus)
+{
+  const Particles<D>& particles = model.particles;
+  const double volume = particles.volume[p];
+  if (!has_two_phases(model))
+    return modulus * volume / particles.mass[p];
+  return fast_wave_squared(modulus, model.water->modulus, particles.porosity[0][p], particles.mass[p] / volume,
+                           particles.water_mass[0][p] / volume);
+}
+} // namespace
+
 template <class G>
 double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
 {
   std::array<double, 3> squares{};
   for (const VelocityField<G>& field : model.fields)
-    add_squares(field, model.exchange.owned, gravity, squares);
+    add_squares(
+        field, [&](std::size_t i) { return has_two_phases(model) ? sums_of_phases(model, i) : field.nodes[i]; },
+        model.exchange.owned, gravity, squares);
   MPI_Allreduce(MPI_IN_PLACE, squares.data(), 3, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   const double acting = squares[1] > 0 ? squares[1] : squares[2];
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
@@ -254,10 +275,11 @@ double critical_time_step(const Model<G>& model)
     for (const Run& run : points.runs)
     {
       const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
-      double density = std::numeric_limits<double>::infinity();
+      const double modulus = p_wave_modulus(points.laws[run.material]);
+      double fastest = 0;
       for (Index p = run.first; p < run.last; ++p)
-        density = std::min(density, points.particles.mass[p] / points.particles.volume[p]);
-      squared = std::min(squared, h * h * density / p_wave_modulus(points.laws[run.material]));
+        fastest = std::max(fastest, wave_squared(model, p, modulus));
+      squared = std::min(squared, h * h / fastest);
     }
   MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
   return std::sqrt(squared);

@@ -40,7 +40,7 @@ template <class G>
 double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 
 /// Critical time step (16): the smallest of h_min / c_d over the particles and resting cells, c_d = sqrt((K + 4G/3) /
-/// rho_p). [s]
+/// rho_p); with water that has its own velocity that of the fast wave. [s]
 /// @note Collective
 template <class G>
 double critical_time_step(const Model<G>& model);

@@ -47,6 +47,9 @@ std::string failure_text(const Model<G>& model, const Failure<D>& failure)
     if (failure.kind == Failure<D>::Kind::law_failed_in_parts)
       out << ", also when it was cut into " << most_parts << " parts";
     break;
+  case Failure<D>::Kind::closed_pores:
+    out << "has no pores left, by a volume that is smaller than that of its grains";
+    break;
   case Failure<D>::Kind::lost_volume:
     out << "is in a cell that would lose its volume by the strain increment " << show(failure.strain_increment);
     break;
@@ -167,6 +170,10 @@ void take_energies(const Model<G>& model, Diagnostics& d)
     for (Index i : field.part.nodes)
       if (model.exchange.owned[i])
         d.nodal_kinetic_energy += 0.5 * field.nodes[i].mass * dot<D>(field.velocity[i], field.velocity[i]);
+  const VelocityField<G>& water = model.water_field.motion;
+  for (Index i : water.part.nodes)
+    if (model.exchange.owned[i])
+      d.nodal_kinetic_energy += 0.5 * water.nodes[i].mass * dot<D>(water.velocity[i], water.velocity[i]);
 }
 
 /// The works and energies since the balance began, of which the largest says what an unexplained one amounts to.
@@ -195,10 +202,18 @@ Diagnostics diagnostics(const Model<G>& model)
   }
   if (!model.failure)
     check_conservation(model, d);
+  if (has_two_phases(model))
+    for (Index p = 0; p < particles.size(); ++p)
+    {
+      d.mass += particles.water_mass[0][p];
+      for (int i = 0; i < D; ++i)
+        d.momentum[i] += particles.water_mass[0][p] * particles.water_velocity[i][p];
+    }
   d.external_work = model.totals.external_work;
   d.internal_work = model.totals.internal_work;
   d.damping_work = model.totals.damping_work;
   d.support_work = model.totals.support_work;
+  d.drag_work = model.totals.drag_work;
   take_energies(model, d);
   auto scales = energy_scales(model, d.kinetic_energy, d.stored_energy);
   MPI_Allreduce(MPI_IN_PLACE, scales.data(), static_cast<int>(scales.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);

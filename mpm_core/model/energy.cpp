@@ -24,7 +24,16 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
     const auto& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
     kinetic += 0.5 * relative_product<D>(gradient, gradient, moments.mass_xixi);
   }
-  return {kinetic, particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
+  double of_water = 0;
+  if (particles.water_velocity.present)
+  {
+    const Vector<D> w = at<D>(particles.water_velocity.columns, p);
+    kinetic += 0.5 * particles.water_mass[0][p] * dot<D>(w, w);
+    const double pressure = particles.pore_pressure[0][p];
+    of_water = 0.5 * particles.volume[p] * particles.porosity[0][p] * pressure * pressure / model.water->modulus;
+  }
+  return {kinetic,
+          of_water + particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};
 }
 
 template <class G, int D>
@@ -45,8 +54,8 @@ double energy_balance(const Model<G, D>& model, double kinetic)
 {
   const Totals& totals = model.totals;
   const EnergyBook& book = model.energy;
-  return totals.external_work + totals.support_work - totals.damping_work - (book.stress_work - book.ahead) -
-         book.pic_loss - kinetic - book.outflow_kinetic;
+  return totals.external_work + totals.support_work - totals.damping_work - totals.drag_work -
+         (book.stress_work - book.ahead) - book.pic_loss - kinetic - book.outflow_kinetic;
 }
 
 template <class G, int D>

@@ -3,6 +3,7 @@
 #include "model/integration.h"
 #include "model/pore_forces.h"
 #include "model/resting_nodes.h"
+#include "model/water_mapping.h"
 
 #include <algorithm>
 #include <utility>
@@ -144,9 +145,17 @@ void map_to_nodes(Model<G>& model)
   {
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     if (model.water)
-      add_surface_pressures(model.mesh, *model.water, field);
+      add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
     sum_shared(model.exchange, field.nodes);
   }
+  if (!has_two_phases(model))
+    return;
+  WaterField<G>& water = model.water_field;
+  water_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, *model.water, model.fields.front(),
+                 water);
+  add_surface_pressures(model.mesh, *model.water, &PressureCondition::held, water.motion);
+  sum_shared(model.exchange, water.motion.nodes);
+  sum_shared(model.exchange, water.nodes);
 }
 
 template <class G>

@@ -7,7 +7,7 @@
 #include "materials/laws/law.h"
 #include "model/energy.h"
 #include "model/pore_water.h"
-#include "model/velocity_field.h"
+#include "model/water_field.h"
 #include "parallel/far_search.h"
 #include "parallel/migration.h"
 #include "transfer/kinematics.h"
@@ -29,7 +29,8 @@ struct Failure
     not_finite,
     law_failed,
     law_failed_in_parts, ///< also when the strain increment was cut
-    lost_volume
+    lost_volume,
+    closed_pores
   };
   Kind kind;
   Index material;
@@ -53,6 +54,7 @@ struct Totals
   double internal_work = 0;          ///< of stresses
   double damping_work = 0;           ///< taken out by local damping
   double support_work = 0;           ///< of prescribed velocities
+  double drag_work = 0;              ///< taken out by the flow of water through the soil
 };
 
 /// Of the last step, on this rank.
@@ -102,6 +104,7 @@ struct Model
   std::vector<Contact<D>> contacts;  ///< with rigid surfaces
   std::vector<Collision> collisions; ///< of rigid bodies among one another
   std::optional<PoreWater> water;    ///< in the pores of the soil
+  WaterField<G> water_field;         ///< its motion, where it has its own; see `has_two_phases`
   std::vector<Index> outflow_tags;
   Vector<D> gravity{};     ///< [m/s2]
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]
@@ -127,6 +130,13 @@ template <class G>
 inline const VelocityField<G>& field_of(const Model<G>& model, Index material)
 {
   return model.fields[static_cast<std::size_t>(model.field_of_law[static_cast<std::size_t>(material)])];
+}
+
+/// Whether soil and water have a velocity each.
+template <class G>
+inline bool has_two_phases(const Model<G>& model)
+{
+  return model.particles.water_velocity.present;
 }
 
 /// Gives the model its laws, with storage for their state variables, and the number of the velocity field of each.

@@ -8,7 +8,7 @@ template <class G, int D>
 void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const std::vector<Run>& runs,
                      VelocityField<G>& field)
 {
-  if (!particles.pore_pressure.present)
+  if (!particles.pore_pressure.present || particles.water_velocity.present)
     return;
   for (const Run& run : runs)
   {
@@ -67,17 +67,19 @@ void press(const Mesh<D>& mesh, const PressureCondition& condition, Index cell, 
 } // namespace
 
 template <class G>
-void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, VelocityField<G>& field)
+void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, bool PressureCondition::*acting,
+                           VelocityField<G>& field)
 {
   for (const PressureCondition& condition : water.conditions)
-    for (Index c = 0; c < mesh.owned_cells && condition.presses; ++c)
+    for (Index c = 0; c < mesh.owned_cells && condition.*acting; ++c)
       for (int k = 0; k <= G::dim && field.moments[c].volume > 0; ++k)
         if (mesh.facet_tags[c][k] == condition.facet_tag)
           press<G>(mesh, condition, c, k, field.nodes);
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, VelocityField<G>&);                       \
+  template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, bool PressureCondition::*,                \
+                                      VelocityField<G>&);                                                              \
   template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const std::vector<Run>&,                \
                                 VelocityField<G>&);
 INSTANTIATE(PlaneStrain)

@@ -4,6 +4,7 @@
 
 #include "base/types.h"
 
+#include <limits>
 #include <vector>
 
 namespace mpm::model
@@ -20,9 +21,10 @@ struct PressureCondition
 
 struct PoreWater
 {
-  double unit_weight = 9810;    ///< gamma_w [N/m3]
-  double modulus = 2.2e9;       ///< K_w [Pa], may be infinite
-  bool kozeny_carman = false;   ///< whether the conductivity follows the porosity n as n^3 / (1 - n)^2
+  double unit_weight = 9810;  ///< gamma_w [N/m3]
+  double modulus = 2.2e9;     ///< K_w [Pa], may be infinite
+  bool kozeny_carman = false; ///< whether the conductivity follows the porosity n as n^3 / (1 - n)^2
+  double suction_limit = std::numeric_limits<double>::infinity(); ///< below that pores are not full; explicit runs [Pa]
   bool drained_surface = false; ///< whether the pressure is zero at the free surface, wherever that is
   std::vector<PressureCondition> conditions;
   double inflow = 0; ///< water that has entered at the nodes of this rank since the start [m3]

@@ -93,7 +93,10 @@ void for_each_number(M& model, F&& f)
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   if (model.water)
+  {
     f("water_inflow", Kind::sum, model.water->inflow);
+    f("drag_work", Kind::sum, model.totals.drag_work);
+  }
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
   {
     const std::string name = "contact_" + std::to_string(k) + "_";

@@ -41,6 +41,8 @@ struct Particles
   OptionalColumns<D * D> displacement_gradient;
   OptionalColumns<1> pore_pressure, porosity, conductivity; ///< of water in the soil
   OptionalColumns<D> pressure_gradient;
+  OptionalColumns<D> water_velocity; ///< of water that moves by itself; `mass` is then that of the grains
+  OptionalColumns<1> water_mass;
   std::vector<Index> material;
   std::vector<Index> cell;
   std::vector<AddedField> added; ///< fields that the run has declared for itself
@@ -59,7 +61,10 @@ void for_each_field(P& particles, F&& f)
   f(Field{"velocity", "m/s", "Velocity", settable}, particles.velocity);
   f(Field{"stress", "Pa", "Cauchy stress, tension positive", settable}, particles.stress);
   f(Field{"volume", "m^D", "Volume, per metre of thickness in plane strain", settable}, particles.volume);
-  f(Field{"mass", "kg", "Mass, per metre of thickness in plane strain", settable}, particles.mass);
+  f(Field{"mass", "kg",
+          "Mass, per metre of thickness in plane strain; of the grains alone where water has its own velocity",
+          settable},
+    particles.mass);
   f(Field{"deviatoric_strain", "-", "Accumulated deviatoric strain, sum of sqrt(2/3 de : de)", settable},
     particles.deviatoric_strain);
   f(Field{"state", "as the law says",
@@ -81,6 +86,10 @@ void for_each_field(P& particles, F&& f)
   f(Field{"pressure_gradient", "Pa/m", "Gradient of the pore pressure", settable}, particles.pressure_gradient);
   f(Field{"porosity", "-", "Volume of the pores over that of the soil", settable}, particles.porosity);
   f(Field{"conductivity", "m/s", "Hydraulic conductivity", settable}, particles.conductivity);
+  f(Field{"water_velocity", "m/s", "Velocity of the pore water where it has its own, in explicit runs", settable},
+    particles.water_velocity);
+  f(Field{"water_mass", "kg", "Mass of the pore water where it has its own velocity, per metre in plane strain"},
+    particles.water_mass);
   f(Field{"material", "-", "Number of the law"}, particles.material);
   f(Field{"cell", "-", "Number of the cell on this rank that holds the particle"}, particles.cell);
   for (auto& added : particles.added)

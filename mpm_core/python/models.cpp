@@ -1,12 +1,15 @@
 #include "python/bindings.h"
 
 #include "explicit/run.h"
+#include "explicit/two_phase_step.h"
 #include "mesh/search.h"
 #include "model/absorbing.h"
 #include "model/mapping.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
 #include "model/resting.h"
+#include "model/water_boundary.h"
+#include "model/water_mapping.h"
 #include "parallel/partition.h"
 #include "particles/seed.h"
 #include "python/arrays.h"
@@ -48,12 +51,12 @@ py::dict as_dict(const Diagnostics& d)
       "particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
       "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
       "external_work"_a = d.external_work, "internal_work"_a = d.internal_work, "damping_work"_a = d.damping_work,
-      "support_work"_a = d.support_work, "stress_work"_a = d.stress_work, "stored_energy"_a = d.stored_energy,
-      "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss, "nodal_kinetic_energy"_a = d.nodal_kinetic_energy,
-      "unexplained_energy"_a = d.unexplained_energy, "energy_scale"_a = d.energy_scale,
-      "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles), "outflow_mass"_a = d.outflow_mass,
-      "particle_steps"_a = d.particle_steps, "plastic_fraction"_a = d.plastic_fraction,
-      "resting_cells"_a = static_cast<std::int64_t>(d.resting_cells),
+      "support_work"_a = d.support_work, "drag_work"_a = d.drag_work, "stress_work"_a = d.stress_work,
+      "stored_energy"_a = d.stored_energy, "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss,
+      "nodal_kinetic_energy"_a = d.nodal_kinetic_energy, "unexplained_energy"_a = d.unexplained_energy,
+      "energy_scale"_a = d.energy_scale, "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
+      "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
+      "plastic_fraction"_a = d.plastic_fraction, "resting_cells"_a = static_cast<std::int64_t>(d.resting_cells),
       "converted_cells"_a = static_cast<std::int64_t>(d.converted_cells), "unbalanced_ratio"_a = d.unbalanced_ratio);
 }
 
@@ -207,6 +210,9 @@ void bind_model(py::module_& m, const std::string& suffix)
              }
              set_supports(model, requests);
            })
+      .def("split_phases", &split_phases<G>)
+      .def_property_readonly("has_two_phases", &has_two_phases<G>)
+      .def("set_impervious", [](M& model, const std::vector<Index>& facet_tags) { set_impervious(model, facet_tags); })
       .def("set_absorbing_sides",
            [](M& model, const std::vector<std::tuple<Index, double, double, double, Index>>& given)
            {
@@ -368,11 +374,13 @@ dimensions.)")
       .value("PLANE_STRAIN", Geometry::plane_strain)
       .value("AXISYMMETRIC", Geometry::axisymmetric)
       .value("SOLID", Geometry::solid);
+  m.def("fast_wave_squared", &fast_wave_squared);
   py::class_<PoreWater>(m, "PoreWater")
       .def(py::init<>())
       .def_readwrite("unit_weight", &PoreWater::unit_weight)
       .def_readwrite("modulus", &PoreWater::modulus)
       .def_readwrite("kozeny_carman", &PoreWater::kozeny_carman)
+      .def_readwrite("suction_limit", &PoreWater::suction_limit)
       .def_readwrite("drained_surface", &PoreWater::drained_surface)
       .def_readwrite("inflow", &PoreWater::inflow)
       .def("set_conditions",

@@ -97,7 +97,7 @@ def follow(
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", columns, comm, keep_before=model.time if again else None) as history,
         ModelOutput(model, particles, mesh, a.fields.split(","), float32=not a.float64, compression=a.compression,
-                    bodies=bodies) as files,
+                    bodies=bodies if model.contacts else None) as files,
         Progress(a.study, until, comm) as progress,
     ):  # fmt: skip
         result = BodyRun(history)
@@ -159,7 +159,7 @@ def body_pictures(a: Namespace, scene: Scene | None, result: BodyRun, folder: Pa
     kinds = {"strain": ("shear_strain", SHEAR_STRAIN), "displacement": ("displacement", DISPLACEMENT)}
     pictures: dict[str, Callable[[], object]] = {
         name: partial(save_particles, folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
-                      title=title, bodies=last["bodies"])
+                      title=title, bodies=last.get("bodies"))
         for name, (key, quantity) in kinds.items()
     }  # fmt: skip
     if a.film:

@@ -15,9 +15,11 @@ import mpm_core as mpm
 from .plots import (
     DISPLACEMENT,
     PORE_PRESSURE,
+    POROSITY,
     SHEAR_STRAIN,
     SPEED,
     VERTICAL_STRESS,
+    WATER_PRESSURE,
     Quantity,
     Scene,
     axis_labels,
@@ -27,6 +29,8 @@ from .plots import (
 QUANTITIES = {
     "shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS, "speed": SPEED
 }  # fmt: skip
+WET_QUANTITIES = {"pore_pressure": WATER_PRESSURE, "porosity": POROSITY}
+"""Frames of models with pore water have them too"""
 PORE = "excess_pore_pressure"
 """The state variable; frames of models that have it have it too"""
 ALIKE = ("time", "bodies")
@@ -71,6 +75,9 @@ def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
     pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
+    if model.has_water:
+        pore |= model.particles.single(*WET_QUANTITIES)
+        del pore["position"]
     area = p["volume"]
     if model.geometry == mpm.Geometry.AXISYMMETRIC:
         area = area / p["position"][:, 0]

@@ -80,6 +80,8 @@ DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
 VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="viridis")
 PORE_PRESSURE = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
+WATER_PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
+POROSITY = Quantity("Porosity", "-", colours="cividis")
 SPEED = Quantity("Speed", "m/s", colours="plasma")
 
 

@@ -24,7 +24,7 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
-                     "coupled_consolidation", "wet_ground"),  # fmt: skip
+                     "coupled_consolidation", "wet_ground", "two_phase"),  # fmt: skip
     "Earthquakes": ("newmark_block",),
     "Axial symmetry": (
         "axisymmetric_cylinder",

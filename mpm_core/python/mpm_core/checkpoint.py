@@ -214,7 +214,9 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
     return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
 
 
-_WATER = ("unit_weight", "modulus", "kozeny_carman", "drained_surface")
+_WATER = ("unit_weight", "modulus", "suction_limit", "kozeny_carman", "drained_surface")
+
+_MAY_BE_INFINITE = ("modulus", "suction_limit")
 
 
 def _water(model: Model) -> dict[str, Any] | None:
@@ -223,7 +225,8 @@ def _water(model: Model) -> dict[str, Any] | None:
     if water is None:
         return None
     values = {name: getattr(water, name) for name in _WATER}
-    return {**values, "modulus": repr(water.modulus), "conditions": [list(one) for one in model._water_conditions]}
+    texts = {name: repr(getattr(water, name)) for name in _MAY_BE_INFINITE}
+    return {**values, **texts, "conditions": [list(one) for one in model._water_conditions]}
 
 
 def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
@@ -232,7 +235,8 @@ def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
         return
     water = _core.PoreWater()
     for name in _WATER:
-        setattr(water, name, float(entry[name]) if name == "modulus" else entry[name])
+        if name in entry:  # older checkpoints have no suction_limit
+            setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
     model._core.water = water
     model._set_water_conditions(
         [(tag, value, slope, held, loads) for tag, value, slope, held, loads in entry["conditions"]]

@@ -121,12 +121,12 @@ def _is_history(value: Any) -> bool:
 def _is_water(value: Any) -> bool:
     if value is None:
         return True
-    numbers = {"unit_weight", "modulus"}
+    texts = {"modulus", "suction_limit"}  # as they may be infinite; files of before explicit runs had it lack the limit
     return (
         isinstance(value, dict)
-        and set(value) == numbers | {"kozeny_carman", "drained_surface", "conditions"}
+        and set(value) | {"suction_limit"} == texts | {"unit_weight", "kozeny_carman", "drained_surface", "conditions"}
         and _is_number(value["unit_weight"])
-        and isinstance(value["modulus"], str)
+        and all(isinstance(value[key], str) for key in texts & set(value))
         and all(isinstance(value[key], bool) for key in ("kozeny_carman", "drained_surface"))
         and _are(_is_water_condition, value["conditions"])
     )

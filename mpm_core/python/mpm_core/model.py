@@ -36,6 +36,7 @@ from .resting import Conversion, checked_conversion, refuse_resting
 from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
+from .two_phase import begin_two_phases, refuse_two_phases
 from .views import model_text
 
 CONVERSION = Conversion()
@@ -253,12 +254,12 @@ class Model(Body):
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, a law failed; with the place. Energy does not add up.
         """
-        refuse_water(self, "the explicit scheme")
         damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
         if damping and self._free_fields:
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which know rayleigh only; expected 0"
             )
+        begin_two_phases(self, integration, stress_update, damped)
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
@@ -339,6 +340,7 @@ class Model(Body):
         refuse_resting(self, "the implicit scheme")
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()
+        refuse_two_phases(self, "implicit()")
         if nmd:
             refuse_water(self, "nodal mixed discretisation")
         if second_order:
@@ -398,6 +400,7 @@ class Model(Body):
         refuse_contacts(self, "equilibrate()")
         refuse_resting(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
+        refuse_two_phases(self, "equilibrate()")
         options = collectively(
             self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
         )

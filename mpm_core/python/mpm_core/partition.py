@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ._core import InputError
 from .mesh import Mesh
 from .rows import exchanged, found
+from .two_phase import set_impervious
 
 if TYPE_CHECKING:
     from .body import Body
@@ -79,6 +80,7 @@ def take_mesh(body: Body, mesh: Mesh) -> None:
     body._core.set_partition(mesh._core)
     body._core.set_supports(body._conditions)
     body.mesh = mesh
+    set_impervious(body)
     if absorbing:
         body._retake_absorbing(absorbing)
     body.repartitions += 1

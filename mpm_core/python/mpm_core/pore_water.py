@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
@@ -20,6 +21,19 @@ from .particles import Particles
 WaterCondition: TypeAlias = tuple[int, float, float, bool, bool]
 """Facet tag; pressure at height 0 [Pa] and its increase with height [Pa/m]; whether the pore water has it; whether it presses on
 the soil"""
+
+
+STANDARD_GRAVITY = 9.81
+"""By which the unit weight of water is its density [m/s2]"""
+
+
+class WaveSpeeds(NamedTuple):
+    """Compression waves in saturated soil [m/s]; Verruijt, Soil Dynamics (2010), section 5."""
+
+    undrained: float
+    """Soil and water move together: sqrt((E + K_w / n) / rho), E the oedometric modulus of the soil"""
+    fast: float
+    """The faster one without drag, which no wave exceeds with it; the time step of explicit runs is that of this wave"""
 
 
 class PoreWater(Conditions):
@@ -37,9 +51,10 @@ class PoreWater(Conditions):
         unit_weight: float = 9810.0,
         modulus: float = 2.2e9,
         kozeny_carman: bool = False,
+        suction_limit: float = np.inf,
         drained_surface: bool = False,
     ) -> None:
-        """Fill the pores of all particles with water, which from then on flows in implicit steps.
+        """Fill the pores of all particles with water, which from then on flows in implicit and explicit steps.
 
         Stresses of the particles are then effective stresses, and their density is that of the saturated soil. Pore pressures
         begin at zero, see `set_pore_pressure`. A boundary without a condition is impervious, see `hold_pore_pressure`.
@@ -51,6 +66,8 @@ class PoreWater(Conditions):
             unit_weight: of water [N/m3].
             modulus: bulk modulus of water [Pa]; may be infinite.
             kozeny_carman: let the conductivity follow the porosity as n^3 / (1 - n)^2.
+            suction_limit: largest suction of the water [Pa], 0 or more, in explicit runs: where soil grows beyond it, its pores
+                are not full, and pressure comes back when they are. By default the water bears any.
             drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh.
 
         Raises:
@@ -63,6 +80,9 @@ class PoreWater(Conditions):
             if not modulus > 0:
                 raise InputError(f"modulus is {modulus} Pa, expected a positive number, or infinity")
             water.modulus, water.kozeny_carman = float(modulus), bool(kozeny_carman)
+            if not suction_limit >= 0:
+                raise InputError(f"suction_limit is {suction_limit} Pa, expected 0 or more")
+            water.suction_limit = float(suction_limit)
             water.drained_surface = bool(drained_surface)
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             _require_pores(n, k)
@@ -81,6 +101,32 @@ class PoreWater(Conditions):
         self.particles.set("pore_pressure", np.zeros(len(n)))
         self.particles.set("pressure_gradient", np.zeros((len(n), self.mesh.dim)))
         self._set_water_conditions([])
+
+    @property
+    def has_water(self) -> bool:
+        """Whether the pores of the particles hold water. Not collective."""
+        return self._core.water is not None
+
+    def wave_speeds(self) -> WaveSpeeds:
+        """Speeds of the compression waves that the pore water makes fast, the largest over the particles. Collective.
+
+        Raises:
+            InputError: on all ranks, for a model without water.
+        """
+        self._require_water()
+        p, water = self.particles, self._core.water
+        n, volume = p.porosity, p.volume
+        density, of_water = p.mass / volume, n * water.unit_weight / STANDARD_GRAVITY
+        if self._core.has_two_phases:
+            density = density + p.water_mass / volume
+        modulus = np.array([law.p_wave_modulus for law in self.laws])[p.material] if len(p) else np.empty(0)
+        undrained = (modulus + water.modulus / n) / density
+        fast = [
+            _core.fast_wave_squared(e, water.modulus, pores, rho - wet, wet)
+            for e, pores, rho, wet in zip(modulus, n, density, of_water, strict=True)
+        ]
+        squared = (float(max(values, default=0.0)) for values in (undrained, fast))
+        return WaveSpeeds(*(float(np.sqrt(self.comm.allreduce(value, MPI.MAX))) for value in squared))
 
     def _values(self, name: str, given: Field) -> NDArray[np.float64]:
         """Values of all particles of this rank: (n,)."""

@@ -36,6 +36,8 @@ class Report:
     """Energy taken out by local damping"""
     support_work: float
     """Work of prescribed velocities"""
+    drag_work: float
+    """Energy taken out by pore water that flows through the soil with a velocity of its own"""
     stress_work: float
     """Work of the particles' stresses on their strains: stored energy and plastic dissipation"""
     stored_energy: float

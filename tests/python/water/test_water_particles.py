@@ -210,8 +210,6 @@ def test_mistakes_are_named():
         model.hold_pore_pressure(17, level=1.0)
     with pytest.raises(mpm.InputError, match="has no prescribed pore pressure"):
         model.seal(RIGHT)
-    with pytest.raises(mpm.InputError, match="the explicit scheme does not know"):
-        model.explicit(1.0)
     model.roller(TOP, (0, 1))
     with pytest.raises(mpm.InputError, match="the pressure is undetermined"):
         list(model.implicit(1.0, dt=1.0, quasi_static=True))

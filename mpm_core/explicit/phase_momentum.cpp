@@ -1,0 +1,230 @@
+#include "explicit/phase_momentum.h"
+
+#include "model/mapping.h"
+
+#include <algorithm>
+
+namespace mpm::explicit_scheme
+{
+namespace
+{
+/// Forces on the phases of a node but for drag and damping, and what moves.
+template <int D>
+struct PhaseForces
+{
+  double soil_mass, water_mass, drag;
+  Vector<D> on_soil, on_water;
+  Vector<D> external_on_soil, external_on_water;
+};
+
+template <class G, int D = G::dim>
+PhaseForces<D> phase_forces(const VelocityField<G>& soil, const WaterField<G>& water, Index i,
+                            const Vector<G::dim>& gravity, double density)
+{
+  const NodeSums<D>& s = soil.nodes[i];
+  const NodeSums<D>& w = water.motion.nodes[i];
+  PhaseForces<D> f{s.mass, is_light(water.motion, i) ? 0 : w.mass, water.nodes[i].drag, {}, {}, {}, {}};
+  const double porosity =
+      f.water_mass == 0 ? 0 : std::min(1.0, f.water_mass / (density * water.nodes[i].volume)); // filled part of it
+  for (int a = 0; a < D; ++a)
+  {
+    const double held = porosity * w.traction[a];
+    f.external_on_water[a] = f.water_mass * gravity[a] + held;
+    f.external_on_soil[a] = f.soil_mass * gravity[a] + s.traction[a] - held;
+    f.on_water[a] = f.external_on_water[a] - porosity * w.internal[a];
+    f.on_soil[a] = f.external_on_soil[a] - s.internal[a] - (1 - porosity) * w.internal[a];
+  }
+  return f;
+}
+
+/// Velocities of soil and water, or damping forces on them.
+template <int D>
+struct Phases
+{
+  Vector<D> soil, water;
+};
+
+/// Local damping of the node as a whole, by mass.
+template <int D>
+Phases<D> damping_forces(const PhaseForces<D>& f, const Phases<D>& start, double damping, double dt)
+{
+  Phases<D> forces{};
+  const double mass = f.soil_mass + f.water_mass;
+  for (int a = 0; a < D; ++a)
+  {
+    const double drag = local_damping(damping, f.on_soil[a] + f.on_water[a],
+                                      f.soil_mass * start.soil[a] + f.water_mass * start.water[a], dt);
+    forces.soil[a] = drag * f.soil_mass / mass;
+    forces.water[a] = drag * f.water_mass / mass;
+  }
+  return forces;
+}
+
+/// Velocities at the end where nothing is prescribed: the mean, and the difference after drag.
+template <int D>
+Phases<D> free_velocities(const PhaseForces<D>& f, const Phases<D>& damped, const Phases<D>& start, double dt)
+{
+  Phases<D> end;
+  const double ms = f.soil_mass, mw = f.water_mass, mass = ms + mw;
+  for (int a = 0; a < D; ++a)
+  {
+    const double soil = start.soil[a] + dt * (f.on_soil[a] - damped.soil[a]) / ms;
+    const double water = mw == 0 ? soil : start.water[a] + dt * (f.on_water[a] - damped.water[a]) / mw;
+    const double relative = mw == 0 ? 0 : (water - soil) / (1 + dt * f.drag * (1 / ms + 1 / mw));
+    const double mean = (ms * soil + mw * water) / mass;
+    end.soil[a] = mean - mw / mass * relative;
+    end.water[a] = mean + ms / mass * relative;
+  }
+  return end;
+}
+
+/// Prescribed velocities of the soil; the water beside it has the drag of that soil.
+template <int D>
+void hold_soil(const Support<D>& support, const PhaseForces<D>& f, const Phases<D>& damped, const Phases<D>& start,
+               double dt, Phases<D>& end)
+{
+  for (int k = 0; k < support.count && f.water_mass > 0; ++k)
+  {
+    const Vector<D>& n = support.direction[k];
+    const double force = dot<D>(n, f.on_water) - dot<D>(n, damped.water), by_drag = dt * f.drag / f.water_mass;
+    const double along =
+        (dot<D>(n, start.water) + dt * force / f.water_mass + by_drag * support.value[k]) / (1 + by_drag);
+    const double change = along - dot<D>(n, end.water);
+    for (int a = 0; a < D; ++a)
+      end.water[a] += change * n[a];
+  }
+  impose<D>(support, end.soil);
+}
+
+/// The entry of each node in turn, of entries sorted by node.
+template <class T>
+class EntryOf
+{
+public:
+  explicit EntryOf(const std::vector<T>& entries) : _next(entries.begin()), _end(entries.end()) {}
+  /// @param node  not below that of the last call
+  const T* operator()(Index node)
+  {
+    while (_next != _end && _next->node < node)
+      ++_next;
+    return _next != _end && _next->node == node ? &*_next : nullptr;
+  }
+
+private:
+  typename std::vector<T>::const_iterator _next, _end;
+};
+
+/// Gives soil and water one velocity along impervious directions: that of their momentum, or that of the soil.
+template <int D>
+void close(const ImperviousNode<D>& side, double soil_part, Phases<D>& v)
+{
+  for (int k = 0; k < side.count; ++k)
+  {
+    const Vector<D>& n = side.direction[k];
+    const double relative = dot<D>(n, v.water) - dot<D>(n, v.soil);
+    for (int a = 0; a < D; ++a)
+    {
+      v.soil[a] += (1 - soil_part) * relative * n[a];
+      v.water[a] -= soil_part * relative * n[a];
+    }
+  }
+}
+} // namespace
+
+template <class G>
+void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, double dt, double density,
+                              VelocityField<G>& soil, WaterField<G>& water)
+{
+  constexpr int D = G::dim;
+  EntryOf support_of(soil.supports);
+  EntryOf side_of(water.impervious);
+  for (Index i : soil.part.nodes)
+  {
+    if (is_light(soil, i))
+    {
+      soil.acceleration[i] = water.motion.acceleration[i] = {};
+      continue;
+    }
+    const PhaseForces<D> f = phase_forces<G>(soil, water, i, gravity, density);
+    const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
+    const Phases<D> damped = damping_forces<D>(f, start, damping, dt);
+    Phases<D> end = free_velocities<D>(f, damped, start, dt);
+    const ImperviousNode<D>* side = side_of(i);
+    if (side)
+      close<D>(*side, f.soil_mass / (f.soil_mass + f.water_mass), end);
+    if (const Support<D>* support = support_of(i))
+      hold_soil<D>(*support, f, damped, start, dt, end);
+    if (side)
+      close<D>(*side, 1, end);
+    for (int a = 0; a < D; ++a)
+    {
+      soil.acceleration[i][a] = (end.soil[a] - start.soil[a]) / dt;
+      water.motion.acceleration[i][a] = (end.water[a] - start.water[a]) / dt;
+    }
+  }
+}
+
+template <class G>
+void close_sides(const VelocityField<G>& soil, const WaterField<G>& water, std::span<Vector<G::dim>> soil_velocity,
+                 std::span<Vector<G::dim>> water_velocity)
+{
+  constexpr int D = G::dim;
+  EntryOf support_of(soil.supports);
+  for (const ImperviousNode<D>& side : water.impervious)
+  {
+    const Index i = side.node;
+    if (!soil.part.has_node[i] || is_light(soil, i))
+      continue;
+    Phases<D> v{soil_velocity[i], water_velocity[i]};
+    close<D>(side, soil.nodes[i].mass / (soil.nodes[i].mass + water.motion.nodes[i].mass), v);
+    if (const Support<D>* support = support_of(i))
+      impose<D>(*support, v.soil);
+    close<D>(side, 1, v);
+    soil_velocity[i] = v.soil;
+    water_velocity[i] = v.water;
+  }
+}
+
+template <class G>
+void add_phase_work(const VelocityField<G>& soil, const WaterField<G>& water, std::span<const unsigned char> owned,
+                    const Vector<G::dim>& gravity, double damping, double dt, double density, Totals& totals)
+{
+  constexpr int D = G::dim;
+  for (Index i : soil.part.nodes)
+  {
+    if (!owned[i] || is_light(soil, i))
+      continue;
+    const PhaseForces<D> f = phase_forces<G>(soil, water, i, gravity, density);
+    const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
+    const Phases<D> damped = damping_forces<D>(f, start, damping, dt);
+    for (int a = 0; a < D; ++a)
+    {
+      const double us = 0.5 * dt * (start.soil[a] + soil.velocity[i][a]);
+      const double uw = 0.5 * dt * (start.water[a] + water.motion.velocity[i][a]);
+      const double relative = start.water[a] - start.soil[a] +
+                              dt * (water.motion.acceleration[i][a] - soil.acceleration[i][a]); // at the end
+      const double drag = f.drag * relative;
+      const double force_s = f.soil_mass * soil.acceleration[i][a],
+                   force_w = f.water_mass * water.motion.acceleration[i][a];
+      totals.external_work += f.external_on_soil[a] * us + f.external_on_water[a] * uw;
+      totals.internal_work +=
+          (f.external_on_soil[a] - f.on_soil[a]) * us + (f.external_on_water[a] - f.on_water[a]) * uw;
+      totals.damping_work += damped.soil[a] * us + damped.water[a] * uw;
+      totals.drag_work += drag * (uw - us);
+      totals.support_work += (force_s - f.on_soil[a] + damped.soil[a] - drag) * us +
+                             (force_w - f.on_water[a] + damped.water[a] + drag) * uw;
+    }
+  }
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void find_phase_accelerations(const Vector<G::dim>&, double, double, double, VelocityField<G>&,             \
+                                         WaterField<G>&);                                                              \
+  template void close_sides(const VelocityField<G>&, const WaterField<G>&, std::span<Vector<G::dim>>,                  \
+                            std::span<Vector<G::dim>>);                                                                \
+  template void add_phase_work(const VelocityField<G>&, const WaterField<G>&, std::span<const unsigned char>,          \
+                               const Vector<G::dim>&, double, double, double, Totals&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::explicit_scheme

@@ -1,0 +1,99 @@
+#include "model/water_boundary.h"
+
+#include <cmath>
+#include <map>
+
+namespace mpm::model
+{
+namespace
+{
+/// Below this length of the mean of unit normals the facets around a node meet under an angle of more than 37 degrees.
+constexpr double nearly_plane = 0.95;
+
+/// Sum of the outward normals of facets, and of their areas; plain doubles.
+template <int D>
+struct FacetNormal
+{
+  Vector<D> normal;
+  double area;
+};
+
+/// Those of the facets with a tag around each node.
+/// @note Collective
+template <int D>
+std::vector<FacetNormal<D>> nodal_normals(const Mesh<D>& mesh, NodeExchange& exchange, Index facet_tag)
+{
+  std::vector<FacetNormal<D>> normals(mesh.points.size(), FacetNormal<D>{});
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+    for (int k = 0; k <= D; ++k)
+      if (mesh.facet_tags[c][k] == facet_tag)
+        for (Index node : facet_nodes<D>(mesh.cells[c], k))
+        {
+          const Vector<D>& gradient = mesh.shapes[c].gradient[k]; // inward, one over the height
+          normals[node].area += mesh.shapes[c].volume * norm<D>(gradient);
+          for (int a = 0; a < D; ++a)
+            normals[node].normal[a] -= mesh.shapes[c].volume * gradient[a];
+        }
+  sum_shared(exchange, normals);
+  return normals;
+}
+
+/// Adds a direction, of which the part along those that are there already is left out.
+template <int D>
+void add_direction(Vector<D> n, ImperviousNode<D>& node)
+{
+  for (int k = 0; k < node.count; ++k)
+  {
+    const double along = dot<D>(n, node.direction[k]);
+    for (int a = 0; a < D; ++a)
+      n[a] -= along * node.direction[k][a];
+  }
+  const double length = norm<D>(n);
+  if (length < 1e-6)
+    return;
+  for (double& component : n)
+    component /= length;
+  node.direction[node.count++] = n;
+}
+
+/// The unit vector along a normal; all axes where facets meet under an angle.
+template <int D>
+void add_directions(const FacetNormal<D>& facets, ImperviousNode<D>& node)
+{
+  const double length = norm<D>(facets.normal);
+  const bool plane = length > nearly_plane * facets.area;
+  for (int a = 0; a < (plane ? 1 : D); ++a)
+  {
+    Vector<D> direction{};
+    direction[a] = 1;
+    for (int b = 0; plane && b < D; ++b)
+      direction[b] = facets.normal[b] / length;
+    add_direction<D>(direction, node);
+  }
+}
+} // namespace
+
+template <class G>
+void set_impervious(Model<G>& model, std::span<const Index> facet_tags)
+{
+  std::map<Index, ImperviousNode<G::dim>> by_node;
+  for (Index tag : facet_tags)
+  {
+    const auto normals = nodal_normals(model.mesh, model.exchange, tag);
+    for (Index i = 0; i < model.mesh.n_nodes(); ++i)
+      if (normals[i].area > 0)
+      {
+        by_node[i].node = i;
+        add_directions<G::dim>(normals[i], by_node[i]);
+      }
+  }
+  model.water_field.impervious.clear();
+  for (const auto& [node, impervious] : by_node)
+    model.water_field.impervious.push_back(impervious);
+}
+
+#define INSTANTIATE(G) template void set_impervious(Model<G>&, std::span<const Index>);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::model

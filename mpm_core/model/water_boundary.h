@@ -1,0 +1,14 @@
+#pragma once
+/// @file
+/// Where water of its own velocity cannot leave the soil.
+
+#include "model/model.h"
+
+namespace mpm::model
+{
+/// Makes facets with these tags impervious, in the place of those that were: there (w - v) . n = 0 for the normal n of
+/// the facets. Where facets of a tag meet at a node under an angle, w = v.
+/// @note Collective
+template <class G>
+void set_impervious(Model<G>& model, std::span<const Index> facet_tags);
+} // namespace mpm::model

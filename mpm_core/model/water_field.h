@@ -1,0 +1,45 @@
+#pragma once
+/// @file
+/// The pore water as a phase that moves by itself, where the soil is.
+
+#include "model/velocity_field.h"
+
+namespace mpm::model
+{
+/// Moments of the soil in one cell that the water needs beside its own; xi is the position from the cell's centre.
+template <int D>
+struct PoreMoments
+{
+  Vector<D> volume_xi; ///< sum V_p xi
+  double drag;         ///< sum V_p n^2 gamma_w / k [N s/m]
+  Vector<D> drag_xi;   ///< the same times xi
+};
+
+/// Nodal sums of these; plain doubles, so that shared nodes are summed in one message.
+struct PoreNode
+{
+  double volume; ///< V_i = sum V_p N_i
+  double drag;   ///< c_i = sum V_p n^2 gamma_w / k N_i [N s/m]
+};
+
+/// Directions along which no water leaves the soil at a node, (w - v) . direction[k] = 0 for k < count; orthonormal.
+template <int D>
+struct ImperviousNode
+{
+  Index node;
+  int count;
+  std::array<Vector<D>, D> direction;
+};
+
+/// `motion` has masses, momenta and velocities of the water; its stresses are -p, its volumes those of the soil, its
+/// volumetric strains the mass that leaves a volume over a step [kg/m3].
+template <class G, int D = G::dim>
+struct WaterField
+{
+  VelocityField<G> motion;
+  std::vector<PoreMoments<D>> cells;
+  std::vector<PoreNode> nodes;
+  std::vector<ImperviousNode<D>> impervious; ///< by rising node
+  std::vector<Vector<D>> flux;               ///< j_i = m_w,i / V_i (w_i - v_i) [kg/(m2 s)]
+};
+} // namespace mpm::model

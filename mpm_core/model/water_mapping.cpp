@@ -1,0 +1,212 @@
+#include "model/water_mapping.h"
+
+#include "model/mapping.h"
+#include "parallel/agreement.h"
+#include "transfer/lanes.h"
+
+namespace mpm::model
+{
+namespace
+{
+/// Water of full pores in a particle.
+template <int D>
+double water_mass(const Particles<D>& particles, const PoreWater& water, Index p)
+{
+  const double density = water.unit_weight / standard_gravity * (1 + particles.pore_pressure[0][p] / water.modulus);
+  return density * particles.porosity[0][p] * particles.volume[p];
+}
+
+template <int D>
+void check_phases(const Particles<D>& particles, const PoreWater& water)
+{
+  if (!(water.modulus < std::numeric_limits<double>::infinity()))
+    throw InputError("modulus of the pore water is infinite, expected a finite one in explicit runs");
+  for (Index p = 0; p < particles.size(); ++p)
+    if (!(water_mass(particles, water, p) < particles.mass[p]))
+      throw InputError("mass of particle " + std::to_string(particles.id[p]) + " is " +
+                       std::to_string(particles.mass[p]) + " kg, expected more than that of the water in its pores, " +
+                       std::to_string(water_mass(particles, water, p)) + " kg; densities are of the saturated soil");
+}
+} // namespace
+
+template <class G>
+void split_phases(Model<G>& model)
+{
+  Particles<G::dim>& particles = model.particles;
+  collectively(model.exchange.comm, [&] { check_phases(particles, *model.water); });
+  const auto size = static_cast<std::size_t>(particles.size());
+  require(particles.water_velocity, size);
+  require(particles.water_mass, size);
+  particles.water_velocity.columns = particles.velocity;
+  for (Index p = 0; p < particles.size(); ++p)
+  {
+    const double mass = water_mass(particles, *model.water, p);
+    particles.water_mass[0][p] = mass;
+    particles.mass[p] -= mass;
+  }
+  model.ready = false;
+  model.energy.stale = true;
+}
+
+namespace
+{
+/// Sums over the particles of a run, added to the moments of its cell.
+template <class G, int D = G::dim>
+void add_moments(const Particles<D>& particles, double unit_weight, const Run& run, const CellShape<D>& shape,
+                 CellMoments<G>& motion, PoreMoments<D>& pores)
+{
+  std::array<const double*, 2 * D + 5> columns;
+  for (int i = 0; i < D; ++i)
+  {
+    columns[i] = particles.position[i].data();
+    columns[D + i] = particles.water_velocity[i].data();
+  }
+  constexpr int mass_at = 2 * D, volume_at = mass_at + 1, pressure_at = mass_at + 2, porosity_at = mass_at + 3,
+                conductivity_at = mass_at + 4;
+  columns[mass_at] = particles.water_mass[0].data();
+  columns[volume_at] = particles.volume.data();
+  columns[pressure_at] = particles.pore_pressure[0].data();
+  columns[porosity_at] = particles.porosity[0].data();
+  columns[conductivity_at] = particles.conductivity[0].data();
+  struct Sums
+  {
+    Lanes volume, mass, drag, pressure;
+    std::array<Lanes, D> volume_xi, mass_xi, drag_xi, momentum;
+    std::array<Lanes, n_symmetric<D>> mass_xixi;
+    std::array<std::array<Lanes, D>, D> momentum_xi;
+  } sums{};
+  const auto add = [&sums, unit_weight, centre = shape.centre](const Piece<2 * D + 5>& piece, const LaneMask& mine)
+  {
+    const Lanes mass = mine ? piece[mass_at] : Lanes{}, volume = mine ? piece[volume_at] : Lanes{};
+    const Lanes drag = volume * piece[porosity_at] * piece[porosity_at] * unit_weight / piece[conductivity_at];
+    sums.mass += mass;
+    sums.volume += volume;
+    sums.drag += drag;
+    sums.pressure += volume * piece[pressure_at];
+    std::array<Lanes, D> xi, mass_xi;
+    for (int i = 0; i < D; ++i)
+    {
+      xi[i] = piece[i] - centre[i];
+      mass_xi[i] = mass * xi[i];
+      sums.mass_xi[i] += mass_xi[i];
+      sums.volume_xi[i] += volume * xi[i];
+      sums.drag_xi[i] += drag * xi[i];
+    }
+    for (int k = 0; k < n_symmetric<D>; ++k)
+      sums.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+    for (int a = 0; a < D; ++a)
+    {
+      sums.momentum[a] += mass * piece[D + a];
+      for (int b = 0; b < D; ++b)
+        sums.momentum_xi[a][b] += mass_xi[b] * piece[D + a];
+    }
+  };
+  add_lanes(columns, run.first, run.last, add);
+  motion.volume += sum(sums.volume);
+  motion.mass += sum(sums.mass);
+  pores.drag += sum(sums.drag);
+  for (int k : normal_component<G>)
+    motion.stress[k] -= sum(sums.pressure);
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    motion.mass_xixi[k] += sum(sums.mass_xixi[k]);
+  for (int a = 0; a < D; ++a)
+  {
+    motion.mass_xi[a] += sum(sums.mass_xi[a]);
+    motion.momentum[a] += sum(sums.momentum[a]);
+    pores.volume_xi[a] += sum(sums.volume_xi[a]);
+    pores.drag_xi[a] += sum(sums.drag_xi[a]);
+    for (int b = 0; b < D; ++b)
+      motion.momentum_xi[a][b] += sum(sums.momentum_xi[a][b]);
+  }
+}
+
+/// The water is where the soil is.
+template <class G>
+void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterField<G>& field)
+{
+  VelocityField<G>& motion = field.motion;
+  const auto nodes = mesh.points.size(), cells = static_cast<std::size_t>(mesh.owned_cells);
+  motion.part = soil.part;
+  motion.least_mass = soil.least_mass;
+  motion.integration.kind = soil.integration.kind;
+  motion.integration.averaged_by_law = soil.integration.averaged_by_law;
+  motion.moments.resize(cells);
+  motion.nodes.resize(nodes);
+  motion.volumetric_strain.resize(nodes);
+  for (auto* values : {&motion.start_velocity, &motion.acceleration, &motion.velocity_change, &motion.velocity})
+    values->resize(nodes);
+  field.cells.resize(cells);
+  field.nodes.resize(nodes);
+  field.flux.resize(nodes);
+}
+} // namespace
+
+template <class G>
+void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Particles<G::dim>& particles,
+                    const std::vector<Run>& runs, const PoreWater& water, const VelocityField<G>& soil,
+                    WaterField<G>& field)
+{
+  constexpr int D = G::dim;
+  follow_soil(mesh, soil, field);
+  VelocityField<G>& motion = field.motion;
+  for (Index c : motion.part.cells)
+  {
+    motion.moments[c] = {};
+    field.cells[c] = {};
+  }
+  for (const Run& run : runs)
+    add_moments<G>(particles, water.unit_weight, run, mesh.shapes[run.cell], motion.moments[run.cell],
+                   field.cells[run.cell]);
+  particles_to_nodes(mesh, exchange, particles, runs, motion);
+  for (Index i : motion.part.nodes)
+    field.nodes[i] = {};
+  for (Index c : motion.part.cells)
+    for (int k = 0; k <= D; ++k)
+    {
+      const Vector<D>& gradient = mesh.shapes[c].gradient[k];
+      PoreNode& node = field.nodes[mesh.cells[c][k]];
+      node.volume += at_vertex<D>(motion.moments[c].volume, field.cells[c].volume_xi, gradient);
+      node.drag += at_vertex<D>(field.cells[c].drag, field.cells[c].drag_xi, gradient);
+    }
+}
+
+template <class G>
+void find_flux(const VelocityField<G>& soil, WaterField<G>& field)
+{
+  for (Index i : soil.part.nodes)
+  {
+    const bool light = is_light(soil, i) || is_light(field.motion, i);
+    const double content = light ? 0 : field.motion.nodes[i].mass / field.nodes[i].volume;
+    for (int a = 0; a < G::dim; ++a)
+      field.flux[i][a] = content * (field.motion.velocity[i][a] - soil.velocity[i][a]);
+  }
+}
+
+template <class G>
+double outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt)
+{
+  double divergence = 0;
+  for (int k = 0; k <= G::dim; ++k)
+    divergence += dot<G::dim>(field.flux[mesh.cells[cell][k]], mesh.shapes[cell].gradient[k]);
+  return dt * divergence;
+}
+
+template <class G>
+void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt, WaterField<G>& field)
+{
+  const auto volume_of = [&](Index c) { return field.motion.moments[c].volume; }; // so that no water is lost or made
+  const auto outflow_of = [&](Index c, double volume) { return volume * outflow(mesh, field, c, dt); };
+  average_over_nodes(mesh, field.motion.part, volume_of, outflow_of, exchange, field.motion.volumetric_strain);
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void split_phases(Model<G>&);                                                                               \
+  template void water_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&, const std::vector<Run>&,  \
+                               const PoreWater&, const VelocityField<G>&, WaterField<G>&);                             \
+  template void find_flux(const VelocityField<G>&, WaterField<G>&);                                                    \
+  template double outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                                   \
+  template void average_outflow(const Mesh<G::dim>&, NodeExchange&, double, WaterField<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::model

@@ -1,0 +1,52 @@
+"""Soil and water with a velocity each: what an explicit run of a model with pore water needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ._core import Geometry, InputError, Integration, StressUpdate
+from .rayleigh import Rayleigh
+
+if TYPE_CHECKING:
+    from .body import Body
+    from .model import Model
+
+
+def begin_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:
+    """Give the water of a model its own mass and velocity, unless it has them. Collective."""
+    if model._core.water is None:
+        return
+    _require_two_phases(model, integration, stress_update, rayleigh)
+    model._check_water()
+    if not model._core.has_two_phases:
+        model._core.split_phases()
+    set_impervious(model)
+
+
+def set_impervious(body: Body) -> None:
+    """Let no water pass the facets that hold the soil, but for those with a prescribed pore pressure. Collective."""
+    if body._core.water is not None:
+        pervious = {tag for tag, _, _, held, _ in body._water_conditions if held}
+        body._core.set_impervious(sorted({tag for tag, _, _ in body._conditions} - pervious))
+
+
+def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:
+    refused = {
+        "axial symmetry": model.geometry == Geometry.AXISYMMETRIC,
+        "several velocity fields": max(model._velocity_fields) > 0,
+        "resting cells": model._core.has_resting_cells,
+        "rigid surfaces": bool(model._contacts),
+        "absorbing sides": bool(model._absorbing),
+        "Rayleigh damping": rayleigh != Rayleigh(),
+        "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
+        f"stress_update {stress_update}": stress_update != StressUpdate.MODIFIED_LAST,
+    }
+    for what, there in refused.items():
+        if there:
+            raise InputError(f"the model has pore water, expected an explicit run without {what}")
+
+
+def refuse_two_phases(model: Model, scheme: str) -> None:
+    """Raises InputError after an explicit run, in which the water has a velocity of its own."""
+    if model._core.has_two_phases:
+        raise InputError(f"the pore water has a velocity of its own since explicit(), which {scheme} does not know")

@@ -1,0 +1,215 @@
+"""A slope of loose saturated sand loses its strength and runs out as a flow slide, until its pore water has left.
+
+The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise
+by a part of the effective vertical stresses, as an earthquake raises them, and effective stresses fall by as much. Soil and
+water then move by velocities of their own: the excess pressures drive the water out, upwards, and the sand regains its strength
+from its base on. The less conductive the sand, the longer it flows.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common import body_runs
+from common.body_runs import BodyRun, follow
+from common.checkpoint import check_restart
+from common.figures import Pictures, save_figure
+from common.files import OutputError
+from common.history import History
+from common.movie import QUANTITIES, WET_QUANTITIES, Movie
+from common.options import add_number, check, study_parser
+from common.plots import CURVES, Scene, paper_style, save_particles
+from common.ranks import run_study
+from common.results import open_results
+from common.scenes import scene_of
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+GRAVITY, WATER = 9.81, 1000.0  # m/s2, kg/m3
+GRAINS = 2650.0
+COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "water_out_m2", "fastest_m_per_s",
+           "kinetic_energy_J", "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """All options; units stand in the help."""
+    p = study_parser(__doc__)
+    add_number(p, "--height", 3.0, "m", "height of the slope", above=0)
+    add_number(p, "--angle", 12.0, "degrees", "angle of the slope", above=0, below=60)
+    add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
+    add_number(p, "--runout", 8.0, "m", "length of the mesh past the toe", above=0)
+    add_number(p, "--cell-size", 0.25, "m", "side of the squares, which are cut in four", above=0)
+    add_number(p, "--pressure-ratio", 0.9, "-", "rise of the pore pressures over the effective vertical stresses",
+               at_least=0, below=1)  # fmt: skip
+    add_number(p, "--conductivity", 1e-3, "m/s", "hydraulic conductivity", above=0)
+    add_number(p, "--porosity", 0.45, "-", "porosity of the loose sand", above=0, below=1)
+    add_number(p, "--water-modulus", 2e7, "Pa", "bulk modulus of the water; below 2.2e9 steps are longer", above=0)
+    add_number(p, "--young", 1e7, "Pa", "Young's modulus of the sand", above=0)
+    add_number(p, "--friction-angle", 33.0, "degrees", "friction angle of the sand", above=0, below=50)
+    add_number(p, "--cohesion", 100.0, "Pa", "cohesion of the sand", at_least=0)
+    add_number(p, "--time", 6.0, "s", "duration", above=0)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.002, nmd=True, frames=60)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    check(p, a.angle < a.friction_angle, lambda: f"--angle is {a.angle:g}, expected less than --friction-angle, "
+          f"{a.friction_angle:g} degrees")  # fmt: skip
+    check_restart(p, a, body_runs.MAY_CHANGE)
+    return a
+
+
+# --- 2. The slope ----------------------------------------------------------------------------------------------------
+
+
+def density(a: Namespace) -> float:
+    """Of the saturated sand [kg/m3]."""
+    return float((1 - a.porosity) * GRAINS + a.porosity * WATER)
+
+
+def depth(a: Namespace, x: np.ndarray) -> np.ndarray:
+    """Depth of places (n, 2) below the surface of the slope at the start [m]; zero above it."""
+    surface = np.clip(a.height - (x[:, 0] - a.crest) * np.tan(np.radians(a.angle)), 0.0, a.height)
+    return np.maximum(surface - x[:, 1], 0.0)
+
+
+def build(a: Namespace) -> mpm.Model:
+    """The slope at rest, and then with the raised pore pressures. Collective."""
+    mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="fitted", runout=a.runout)
+    sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
+                           dilation_angle=0.0)  # fmt: skip
+    model = mpm.Model(bridge.background_mesh(*mesh), sand)
+    if a.restart is not None:
+        model.restore(a.restart)
+        return model
+    model.seed(density=density(a), per_cell=a.particles_per_cell, cell_tag=bridge.SOIL)
+    model.roller(bridge.LEFT, (1, 0))
+    model.roller(bridge.RIGHT, (1, 0))
+    model.fix(bridge.BASE)
+    model.set_gravity((0.0, -GRAVITY))
+    model.add_water(porosity=a.porosity, conductivity=a.conductivity, modulus=a.water_modulus, kozeny_carman=True,
+                    suction_limit=0.0)  # fmt: skip
+    model.rebalance()
+    raise_pressures(a, model)
+    return model
+
+
+def raise_pressures(a: Namespace, model: mpm.Model) -> None:
+    """Bring the slope to equilibrium, and turn a part of its effective stresses into pore pressure. Collective."""
+    p, buoyant = model.particles, (density(a) - WATER) * GRAVITY
+    model.set_pore_pressure(lambda x: WATER * GRAVITY * depth(a, x))
+    p.set("stress", -buoyant * depth(a, p.position)[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
+    model.equilibrate(integration=mpm.Integration.MIXED)
+    p.set("initial_position", p.position)  # displacements count from here
+    raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)
+    p.set("pore_pressure", p.pore_pressure + raised)
+    p.set("stress", p.stress + raised[:, None] * np.array([1.0, 1.0, 1.0, 0.0]))
+
+
+# --- 3. The slide ----------------------------------------------------------------------------------------------------
+
+
+def row(a: Namespace, model: mpm.Model, _: History, report: mpm.Report) -> dict[str, float]:
+    """A row of the history. Collective."""
+    p = model.particles
+    weighed = np.array([p.volume @ p.pore_pressure, p.volume @ (p.pore_pressure - p.stress[:, 1])])
+    pressure, total = comm.allreduce(weighed)
+    toe = a.crest + a.height / np.tan(np.radians(a.angle))
+    top = p.initial_position[:, 1] > a.height - a.cell_size
+    crest = top & (p.initial_position[:, 0] > 0.5 * a.crest) & (p.initial_position[:, 0] < a.crest)
+    count, settled = comm.allreduce(np.array([crest.sum(), -p.displacement[crest, 1].sum()]))
+    front = comm.allreduce(float(p.position[:, 0].max(initial=0.0)), MPI.MAX)
+    fastest = comm.allreduce(float(np.linalg.norm(p.velocity, axis=1).max(initial=0.0)), MPI.MAX)
+    return {
+        "time_s": report.time, "runout_m": front - toe, "crest_settlement_m": settled / max(count, 1),
+        "pressure_ratio": pressure / total, "water_out_m2": -model.water_inflow(), "fastest_m_per_s": fastest,
+        "kinetic_energy_J": report.kinetic_energy, "unexplained_fraction_of_energy": report.unexplained_fraction,
+        "dt_s": report.dt,
+    }  # fmt: skip
+
+
+# --- 4. Pictures -----------------------------------------------------------------------------------------------------
+
+
+def draw_course(path: Path, history: History) -> None:
+    """Run-out and mean pore pressure over total vertical stress, over time."""
+    with paper_style():
+        figure, (above, below) = plt.subplots(2, 1, figsize=(4.6, 4.2), sharex=True, layout="constrained")
+        above.plot(history["time_s"], history["runout_m"], color=CURVES[0])
+        above.set(ylabel="Run-out past the toe [m]", ylim=(0, None))
+        below.plot(history["time_s"], history["pressure_ratio"], color=CURVES[1])
+        below.set(
+            xlabel="Time [s]", ylabel="Mean pore pressure over\ntotal vertical stress [-]", xlim=(0, None), ylim=(0, 1)
+        )
+        for axes in (above, below):
+            axes.tick_params(top=True, right=True)
+            axes.grid(linewidth=0.3, color="#d0d0d0")
+        save_figure(figure, path, dpi=200)
+
+
+def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
+    """The course of the slide, the particles at three times, and a film."""
+    pictures = body_runs.body_pictures(a, scene, result, folder, f"after {result.history['time_s'][-1]:.3g} s")
+    if scene is None or not pictures:
+        return pictures
+    frames = result.frames
+    for name, frame in {"start": frames[0], "slide": frames[len(frames) // 4], "end": frames[-1]}.items():
+        for key, quantity in WET_QUANTITIES.items():
+            pictures[f"{key}_{name}"] = partial(
+                save_particles, folder / f"{key}_{name}.png", scene, frame["position"], frame["volume"], frame[key], quantity,
+                title=f"after {float(frame['time']):.3g} s",
+            )  # fmt: skip
+    return {"course": lambda: draw_course(folder / "course.png", result.history), **pictures}
+
+
+# --- 5. All together -------------------------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    begin = perf_counter()
+    folder = open_results(a, comm)
+    model = build(a)
+    result = follow(a, model, a.time, COLUMNS, partial(row, a, model), folder, shown="runout_m")
+    history, scene = result.history, scene_of(model, [bridge.SOIL])
+    speeds = model.wave_speeds()
+    results = {
+        "runout_m": history["runout_m"][-1], "crest_settlement_m": history["crest_settlement_m"][-1],
+        "fastest_m_per_s": history["fastest_m_per_s"].max(), "pressure_ratio_at_start": history["pressure_ratio"][0],
+        "pressure_ratio_in_the_end": history["pressure_ratio"][-1], "water_out_m2": history["water_out_m2"][-1],
+        "water_modulus_Pa": a.water_modulus, "undrained_wave_m_per_s": speeds.undrained, "fast_wave_m_per_s": speeds.fast,
+        "critical_time_step_s": model.critical_time_step(),
+    }  # fmt: skip
+    said = (
+        f"run-out {results['runout_m']:.2f} m, crest settled by {results['crest_settlement_m']:.2f} m; water of "
+        f"{a.water_modulus:.3g} Pa: undrained wave {speeds.undrained:.0f} m/s, critical step "
+        f"{1e6 * results['critical_time_step_s']:.0f} us"
+    )
+    captions = {
+        "course": "Run-out, and mean pore pressure over total vertical stress",
+        **{f"{key}_{name}": f"{quantity.name}: {text}"
+           for key, quantity in WET_QUANTITIES.items()
+           for name, text in (("start", "at the start"), ("slide", "as it slides"), ("end", "in the end"))},
+    }  # fmt: skip
+    return body_runs.write_results(
+        a, model, result, folder, results, said, begin=begin,
+        movies=[Movie("flow slide", scene, result.frames, {**WET_QUANTITIES, **QUANTITIES})] if scene is not None else [],
+        captions=captions, pictures=drawn(a, scene, result, folder),
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    run_study(main, mpm.InputError, mpm.RunError, OutputError)

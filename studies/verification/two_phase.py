@@ -1,0 +1,157 @@
+"""Soil and pore water with a velocity each, by explicit steps: waves, consolidation, critical gradient.
+
+A saturated column on a fixed base between rollers. Without drag it swings in its first mode as either of the two compression
+waves (Verruijt, Soil Dynamics, 2010, section 5): det(K - c² M) = 0 with K = [E + (1-n)² K_w/n, (1-n) K_w; (1-n) K_w, n K_w] and
+M = diag((1-n) rho_s, n rho_w). With much drag soil and water move together, and a load runs through the column as one front.
+Slowly it consolidates as Terzaghi has it; c_v is that with compressible water, k / gamma_w / (1/E + n/K_w).
+"""
+
+import numpy as np
+from _case import Check, Kind, Result, run_alone
+from _plots import save_comparison
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+HEIGHT, LOAD, GRAVITY, UNIT_WEIGHT = 1.0, 10e3, 9.81, 9810.0  # m, Pa, m/s2, N/m3
+POROSITY, GRAINS, WATER = 0.4, 2650.0, 1000.0  # -, kg/m3
+DENSITY = (1 - POROSITY) * GRAINS + POROSITY * WATER
+SOIL = mpm.LinearElastic(young=10e6, poisson=0.3)
+OEDOMETER = SOIL.p_wave_modulus
+BASE, TOP = 3, 4
+COMM = MPI.COMM_WORLD
+
+
+def column(cells, conductivity, modulus, law=SOIL, headroom=0.0):
+    """The column, two cells wide, under empty cells up to a headroom [m]."""
+    size = HEIGHT / cells
+    rows = cells + round(headroom / size)
+    mesh = bridge.box_mesh(
+        COMM, (2 * size, rows * size), (2, rows), body=((0.0, 0.0), (2 * size, HEIGHT)) if headroom else None
+    )
+    model = mpm.Model(bridge.background_mesh(*mesh), law)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=bridge.BODY if headroom else None)
+    model.roller(1, (1, 0))
+    model.roller(2, (1, 0))
+    model.fix(BASE)
+    model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus)
+    return model
+
+
+def gathered(model, *names):
+    """Fields of all particles, on all ranks."""
+    parts = COMM.allgather([getattr(model.particles, name) for name in names])
+    return [np.concatenate([part[k] for part in parts]) for k in range(len(names))]
+
+
+def modes(modulus):
+    """Speeds of the slow and the fast wave without drag [m/s], and their velocities (v, w) in columns."""
+    n = POROSITY
+    coupling = (1 - n) * modulus
+    stiffness = np.array([[OEDOMETER + (1 - n) ** 2 * modulus / n, coupling], [coupling, n * modulus]])
+    masses = np.array([(1 - n) * GRAINS, n * WATER])
+    squared, shapes = np.linalg.eigh(stiffness / np.sqrt(np.outer(masses, masses)))
+    return np.sqrt(squared), shapes / np.sqrt(masses)[:, None]
+
+
+def speed_of_swing(cells, modulus, which):
+    """4 H / T of the first mode [m/s], the period T from two zeros of the momentum."""
+    speeds, shapes = modes(modulus)
+    model = column(cells, 1e3, modulus)
+    model.explicit(1e-9).last()
+    p = model.particles
+    shape = 1e-4 * np.sin(0.5 * np.pi * p.position[:, 1] / HEIGHT)
+    p.set("velocity", np.column_stack([0 * shape, shapes[0, which] * shape]))
+    p.set("water_velocity", np.column_stack([0 * shape, shapes[1, which] * shape]))
+    rows = [(report.time, report.momentum[1]) for report in model.explicit(4.2 / speeds[which], every_steps=1)]
+    times, momentum = np.array(rows).T
+    k = np.flatnonzero(momentum[:-1] * momentum[1:] < 0)
+    zeros = times[k] - momentum[k] * (times[k + 1] - times[k]) / (momentum[k + 1] - momentum[k])
+    return 2 * HEIGHT / (zeros[1] - zeros[0])
+
+
+def terzaghi(z, factor):
+    m = np.pi * (np.arange(200) + 0.5)
+    return np.sin(m * (1 - z / HEIGHT)[:, None]) @ (2 / m * np.exp(-(m**2) * factor))
+
+
+def run(quick: bool, folder) -> Result:
+    checks, curves, exact = [], {}, {}
+
+    # --- 1. Both waves without drag ----------------------------------------------------------------------------------
+    modulus = 2.2e8
+    for which, name in ((0, "slow"), (1, "fast")):
+        speed = modes(modulus)[0][which]
+        found = speed_of_swing(20 if quick else 40, modulus, which)
+        checks.append(Check(f"speed of the {name} wave", speed, "det(K - c² M) = 0", found, 0.01, "m/s"))
+
+    # --- 2. A front in undrained soil ---------------------------------------------------------------------------------
+    stiff = modulus / POROSITY
+    undrained, ratio = np.sqrt((OEDOMETER + stiff) / DENSITY), stiff / (OEDOMETER + stiff)
+    model = column(100 if quick else 200, 1e-8, modulus)
+    model.traction(TOP, (0.0, -LOAD))
+    fronts = []
+    for part in (0.3, 0.7):
+        model.explicit(part * HEIGHT / undrained, nmd=True).last()
+        x, p = gathered(model, "position", "pore_pressure")
+        z = x[:, 1]
+        fronts.append(1 - z[p > 0.5 * ratio * LOAD].min())
+    behind = (z > 0.5) & (z < 0.85)
+    speed = (fronts[1] - fronts[0]) / 0.4 * undrained
+    checks.append(Check("speed of the front, undrained", undrained, "√((E + K_w/n) / ρ)", speed, 0.02, "m/s"))
+    checks.append(
+        Check("pore pressure behind it over the load", ratio, "K_w/n / (E + K_w/n)", p[behind].mean() / LOAD, 0.01)
+    )
+
+    # --- 3. Consolidation, from the undrained equilibrium --------------------------------------------------------------
+    modulus, conductivity = 2.2e7, 2e-4
+    stiff = modulus / POROSITY
+    first = LOAD * stiff / (OEDOMETER + stiff)
+    c_v = conductivity / UNIT_WEIGHT / (1 / OEDOMETER + 1 / stiff)
+    model = column(20, conductivity, modulus)
+    model.traction(TOP, (0.0, -LOAD))
+    model.set_pore_pressure(first)
+    stress = (first - LOAD) * np.array([3 / 7, 1.0, 3 / 7, 0.0])
+    model.particles.set("stress", np.tile(stress, (len(model.particles), 1)))
+    for factor in (0.1, 0.2, 0.5):
+        model.explicit(factor * HEIGHT**2 / c_v).last()
+        x, p = gathered(model, "position", "pore_pressure")
+        expected = first * terzaghi(x[:, 1], factor)
+        worst = np.argmax(np.abs(p - expected))
+        checks.append(Check(f"pore pressure, worst particle, T = {factor:g}", expected[worst] / LOAD, "Terzaghi 1925",
+                            p[worst] / LOAD, 0.02, scale=1.0))  # fmt: skip
+        order = np.argsort(x[:, 1])
+        curves[f"$T = {factor:g}$"] = (p[order] / LOAD, x[order, 1])
+        line = np.linspace(0, HEIGHT, 101)
+        exact[f"Terzaghi, $T = {factor:g}$"] = (first * terzaghi(line, factor) / LOAD, line)
+
+    # --- 4. Flow upwards through sand without cohesion: rest below the critical gradient, lift-off above ---------------
+    critical = (GRAINS / WATER - 1) * (1 - POROSITY)
+    sand = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=0.0, friction_angle=30.0, dilation_angle=0.0)
+    for fraction in (0.9, 1.1):
+        model = column(10, 1e-2, 2.2e7, law=sand, headroom=0.5)
+        model.set_gravity((0.0, -GRAVITY))
+        head = UNIT_WEIGHT * HEIGHT * (1 + fraction * critical)
+        model.hold_pore_pressure(BASE, head, presses=False)
+        p = model.particles
+        model.set_pore_pressure(lambda x, head=head: head * (1 - x[:, 1] / HEIGHT))
+        vertical = min(0.0, fraction - 1) * critical * UNIT_WEIGHT * (HEIGHT - p.position[:, 1])
+        p.set("stress", vertical[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
+        model.explicit(0.2, nmd=True).last()
+        rise = gathered(model, "displacement")[0][:, 1].mean()
+        name = f"mean rise in 0.2 s at {fraction:g} of the critical gradient"
+        kind, bound = (Kind.AT_MOST, 0.2) if fraction < 1 else (Kind.AT_LEAST, 2.0)
+        source = "(G_s - 1) (1 - n): at rest below, lifts off above"
+        checks.append(Check(name, bound, source, 1e3 * rise, 0.0, "mm", kind=kind))
+
+    # --- 5. Picture ----------------------------------------------------------------------------------------------------
+    if COMM.rank == 0:
+        save_comparison(folder / "pressure.png", curves, exact, ("Pore pressure over load [-]", "Height over $H$ [-]"))
+    return Result(
+        checks, {"pressure.png": "Pore pressure of the particles in a column that consolidates, by explicit steps"}
+    )
+
+
+if __name__ == "__main__":
+    run_alone(run)

@@ -1,0 +1,68 @@
+"""Soil and water with a velocity each on several ranks: the same as on one, and restarts to the last bit."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope
+
+FIELDS = (
+    "position",
+    "velocity",
+    "stress",
+    "volume",
+    "state",
+    "pore_pressure",
+    "porosity",
+    "conductivity",
+    "water_velocity",
+    "water_mass",
+)
+
+
+def wet_slope(comm, owners_of=bands):
+    """A block that slides on an incline, while its water drains at its surface and at its left side."""
+    model = sliding_slope(comm, owners_of)
+    model.add_water(porosity=0.4, conductivity=1e-3, modulus=2.2e7, kozeny_carman=True, suction_limit=1e3)
+    model.set_pore_pressure(lambda x: 9810.0 * (0.4 - x[:, 1]))
+    model.hold_pore_pressure(1, level=0.3)
+    return model
+
+
+def slide(model, until=0.05, **options):
+    *_, report = model.explicit(until, every=0.01, since=0.0, nmd=True, **options)
+    return report
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_slide_of_two_phases_is_the_same_on_any_partition(comm, owners_of):
+    model, alone = wet_slope(comm, owners_of), wet_slope(MPI.COMM_SELF)
+    report, expected = slide(model), slide(alone)
+    assert report.plastic_fraction > 0
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
+    assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-8)
+    for name in ("mass", "kinetic_energy", "drag_work", "support_work", "unbalanced_ratio"):
+        assert getattr(report, name) == pytest.approx(getattr(expected, name), rel=1e-8)
+
+
+def test_a_repartition_changes_nothing(comm):
+    model, alone = wet_slope(comm, one_does_all), wet_slope(MPI.COMM_SELF)
+    slide(model, 0.02)
+    model.rebalance()
+    slide(model)
+    slide(alone)
+    assert model.repartitions == (comm.size > 1)
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
+
+
+def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path):
+    path = comm.bcast(str(tmp_path / "wet.h5"))
+    model = wet_slope(comm)
+    slide(model, 0.02)
+    model.save(path)
+    slide(model)
+    again = wet_slope(comm)
+    again.restore(path)
+    slide(again)
+    for name, values in all_by_id(model, FIELDS).items():
+        np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)
+    assert again.report().drag_work == model.report().drag_work

@@ -1,0 +1,209 @@
+"""Explicit steps of soil and water with a velocity each: waves, consolidation, gradients, conservation, energy."""
+
+import numpy as np
+import pytest
+from core_cases import box
+
+import mpm_core as mpm
+
+POROSITY, GRAINS, WATER, GAMMA = 0.4, 2650.0, 1000.0, 9810.0
+DENSITY = (1 - POROSITY) * GRAINS + POROSITY * WATER
+ELASTIC = mpm.LinearElastic(young=10e6, poisson=0.3)
+OEDOMETER = ELASTIC.p_wave_modulus
+LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+
+
+def column(cells, *, conductivity=1e-3, modulus=2.2e8, law=ELASTIC, height=1.0, per_cell=3, dim=2):
+    """A saturated column on a fixed base between rollers, two cells wide."""
+    size = 2 * height / cells
+    mesh = box(
+        [2] * (dim - 1) + [cells], [size] * (dim - 1) + [height], diagonals="alternating" if dim == 2 else "one-way"
+    )
+    model = mpm.Model(mesh, law)
+    model.seed(density=DENSITY, per_cell=per_cell)
+    for axis in range(dim - 1):
+        for end in (1, 2):
+            model.roller(2 * axis + end, np.eye(dim)[axis])
+    model.fix(2 * dim - 1)
+    model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus)
+    return model
+
+
+# --- consolidation ----------------------------------------------------------------------------------------------------
+
+
+def test_a_loaded_column_consolidates_as_terzaghi_has_it():
+    """With water of compressibility n / K_w beside that of the skeleton 1 / M: c_v = k / gamma_w / (1/M + n/K_w), and the
+    pressure begins at 1 / (1 + M n / K_w) of the load. The column begins in that undrained equilibrium, without waves.
+    """
+    load, modulus, conductivity = 10e3, 2.2e7, 2e-4
+    model = column(20, conductivity=conductivity, modulus=modulus)
+    model.traction(TOP, (0.0, -load))
+    stiff = POROSITY / modulus
+    first = load / (1 + OEDOMETER * stiff)
+    model.set_pore_pressure(first)
+    horizontal = 0.3 / 0.7
+    model.particles.set(
+        "stress", (first - load) * np.tile([horizontal, 1.0, horizontal, 0.0], (len(model.particles), 1))
+    )
+    c_v = conductivity / GAMMA / (1 / OEDOMETER + stiff)
+    m = np.pi * (np.arange(200) + 0.5)
+    for factor in (0.2, 0.5):
+        list(model.explicit(factor / c_v))
+        z, p = model.particles.position[:, 1], model.particles.pore_pressure
+        exact = np.sin(m * (1 - z)[:, None]) @ (2 / m * np.exp(-(m**2) * factor)) * first
+        assert p == pytest.approx(exact, abs=0.02 * load)
+        degree = 1 - np.sum(2 / m**2 * np.exp(-(m**2) * factor))
+        left = -model.water_inflow() / (0.1 * load / OEDOMETER)
+        assert left == pytest.approx(degree, abs=0.01)
+
+
+# --- waves ------------------------------------------------------------------------------------------------------------
+
+
+def modes(modulus):
+    """Speeds of the slow and the fast compression wave without drag, and their velocities (v, w): det(K - c^2 M) = 0."""
+    n, ratio = POROSITY, modulus / POROSITY
+    stiffness = np.array([[OEDOMETER + (1 - n) ** 2 * ratio, (1 - n) * modulus], [(1 - n) * modulus, n * modulus]])
+    masses = np.array([(1 - n) * GRAINS, n * WATER])
+    squared, shapes = np.linalg.eigh(stiffness / np.sqrt(np.outer(masses, masses)))
+    return np.sqrt(squared), shapes / np.sqrt(masses)[:, None]
+
+
+@pytest.mark.parametrize("which, speed, cells", [(0, 73.2, 20), (1, 589.6, 40)], ids=["slow", "fast"])
+def test_a_column_without_drag_swings_with_the_speeds_of_both_waves(which, speed, cells):
+    """Its first mode with a fixed base and a free top is a quarter of a wave, with the period 4 H / c."""
+    speeds, shapes = modes(2.2e8)
+    assert speeds[which] == pytest.approx(speed, rel=1e-3)
+    model = column(cells, conductivity=1e3)
+    list(model.explicit(1e-9))
+    p = model.particles
+    shape = 1e-4 * np.sin(0.5 * np.pi * p.position[:, 1])
+    p.set("velocity", np.column_stack([0 * shape, shapes[0, which] * shape]))
+    p.set("water_velocity", np.column_stack([0 * shape, shapes[1, which] * shape]))
+    times, swing = [], []
+    for report in model.explicit(4.2 / speeds[which], every_steps=1):
+        times.append(report.time)
+        swing.append((p.mass * p.velocity[:, 1] + p.water_mass * p.water_velocity[:, 1]).sum())
+    swing = np.array(swing)
+    zero = np.flatnonzero(swing[:-1] * swing[1:] < 0)
+    crossings = [times[k] - swing[k] * (times[k + 1] - times[k]) / (swing[k + 1] - swing[k]) for k in zero]
+    assert 2 * (crossings[1] - crossings[0]) == pytest.approx(4 / speeds[which], rel=0.01)
+
+
+def test_a_front_in_undrained_soil_has_its_speed_and_pressure():
+    """Soil and water move together: c^2 = (E + K_w / n) / rho, and behind the front p / q = K_w / n / (E + K_w / n)."""
+    stiff = 2.2e8 / POROSITY
+    speed, ratio = np.sqrt((OEDOMETER + stiff) / DENSITY), stiff / (OEDOMETER + stiff)
+    assert (speed, ratio) == (pytest.approx(532.1, rel=1e-3), pytest.approx(0.97611, rel=1e-5))
+    model = column(200, conductivity=1e-8)
+    model.traction(TOP, (0.0, -10e3))
+    fronts = []
+    for part in (0.3, 0.7):
+        list(model.explicit(part / speed, nmd=True))
+        z, p = model.particles.position[:, 1], model.particles.pore_pressure
+        fronts.append(1 - z[p > 0.5 * ratio * 10e3].min())
+    assert fronts[1] - fronts[0] == pytest.approx(0.4, abs=0.005)  # a cell
+    behind = (z > 0.5) & (z < 0.85)
+    assert p[behind].mean() == pytest.approx(ratio * 10e3, rel=0.01)
+
+
+# --- gradients ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fraction", [0.8, 1.2])
+def test_soil_rests_below_the_critical_gradient_and_lifts_off_above(fraction):
+    """i_c = (G_s - 1) (1 - n): there the flow carries the buoyant weight, and effective stresses vanish."""
+    critical = (GRAINS / WATER - 1) * (1 - POROSITY)
+    sand = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=0.0, friction_angle=30.0, dilation_angle=0.0)
+    size = 0.1
+    mesh = box((2, 15), (2 * size, 1.5), diagonals="alternating", body=((0, 0), (2 * size, 1.0)))
+    model = mpm.Model(mesh, sand)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.roller(LEFT, (1, 0))
+    model.roller(RIGHT, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=POROSITY, conductivity=1e-2, modulus=2.2e7)
+    head = GAMMA * (1 + fraction * critical)
+    model.hold_pore_pressure(BASE, head, presses=False)
+    p, z = model.particles, model.particles.position[:, 1]
+    model.set_pore_pressure(lambda x: head * (1 - x[:, 1]))
+    effective = -min(0.0, fraction - 1) * critical * GAMMA * (1 - z)
+    p.set("stress", -effective[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
+    list(model.explicit(0.3, nmd=True))
+    rise = p.displacement[:, 1].mean()
+    if fraction < 1:
+        assert abs(rise) < 1e-3 and p.stress[:, 1].min() < -0.1 * effective.max()
+    else:
+        assert rise > 5e-3
+
+
+# --- conservation -----------------------------------------------------------------------------------------------------
+
+
+def test_water_is_neither_made_nor_lost():
+    """What particles have lost is what flowed over their surface; and what of it has left is there twice: in the masses, and
+    in the pores and their pressure, m_w = rho_w n V (1 + p / K_w)."""
+    model = column(10, modulus=2.2e7)
+    model.set_gravity((0.0, -9.81))
+    p = model.particles
+    list(model.explicit(1e-9))
+    start = p.water_mass.sum()
+    list(model.explicit(0.05, nmd=True))
+    assert model.water_inflow() < -1e-6
+    assert p.water_mass.sum() - start == pytest.approx(WATER * model.water_inflow(), abs=1e-10 * start)
+    filled = WATER * p.porosity * p.volume * (1 + p.pore_pressure / 2.2e7)
+    np.testing.assert_allclose(p.water_mass, filled, rtol=1e-12)
+    np.testing.assert_allclose((1 - p.porosity) * p.volume, (1 - POROSITY) * 0.2 / len(p), rtol=1e-12)  # of the grains
+
+
+def test_phases_exchange_momentum_without_making_any():
+    """Without weight or boundary conditions, in a motion that is undrained at the nodes but not in the particles."""
+    mesh = box((6, 6), (3.0, 3.0), body=((1.0, 1.0), (2.0, 2.0)))
+    model = mpm.Model(mesh, ELASTIC)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.add_water(porosity=POROSITY, conductivity=1e-2, modulus=2.2e7)
+    list(model.explicit(1e-9))
+    p = model.particles
+    z = p.position - 1.5
+    p.set("velocity", np.column_stack([1.0 + z[:, 1], -0.5 + z[:, 0]]))
+    p.set("water_velocity", np.column_stack([1.0 - z[:, 1], -0.5 + 0.3 * z[:, 1]]))
+    start = p.mass @ p.velocity + p.water_mass @ p.water_velocity
+    left, masses = np.zeros(2), p.water_mass
+    for _ in model.explicit(2e-3, every_steps=1, nmd=True):
+        left += (masses - p.water_mass) @ p.water_velocity  # carried away by water that flows out of particles
+        masses = p.water_mass
+    now = p.mass @ p.velocity + p.water_mass @ p.water_velocity
+    np.testing.assert_allclose(now + left, start, atol=1e-12 * np.abs(start).max())
+
+
+# --- input ------------------------------------------------------------------------------------------------------------
+
+
+def test_input_that_explicit_water_cannot_work_with():
+    model = column(4)
+    with pytest.raises(mpm.InputError, match="modulus of the pore water is infinite"):
+        still = column(4, modulus=np.inf)
+        still.explicit(1.0)
+    with pytest.raises(mpm.InputError, match="expected more than that of the water in its pores"):
+        light = column(4)
+        light.particles.set("mass", 0.1 * light.particles.mass)
+        light.explicit(1.0)
+    with pytest.raises(mpm.InputError, match="without DUAL_DOMAIN integration"):
+        model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)
+    with pytest.raises(mpm.InputError, match="suction_limit is -1.0 Pa, expected 0 or more"):
+        model.add_water(porosity=0.4, conductivity=1e-3, suction_limit=-1.0)
+    with pytest.raises(mpm.InputError, match="above the critical time step"):
+        list(model.explicit(1.0, dt=1.1 * model.wave_speeds().fast))
+    with pytest.raises(mpm.InputError, match="which implicit\\(\\) does not know"):
+        model.implicit(1.0, dt=0.1)
+
+
+def test_the_step_is_that_of_the_fast_wave():
+    model = column(20, modulus=2.2e9)
+    waves = model.wave_speeds()
+    assert waves == (pytest.approx(1664.5, rel=1e-3), pytest.approx(1857, rel=1e-3))  # Verruijt's formulae, by hand
+    list(model.explicit(1e-9))
+    altitude = 0.05 / np.sqrt(2)  # of a square of 0.05 m cut in two
+    assert model.critical_time_step() == pytest.approx(altitude / waves.fast, rel=1e-6)
