@@ -49,7 +49,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--angle", 12.0, "degrees", "angle of the slope", above=0, below=60)
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
     add_number(p, "--runout", 8.0, "m", "length of the mesh past the toe", above=0)
-    add_number(p, "--cell-size", 0.25, "m", "side of the squares, which are cut in four", above=0)
+    add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "rise of the pore pressures over the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip
     add_number(p, "--conductivity", 1e-3, "m/s", "hydraulic conductivity", above=0)
@@ -88,7 +88,7 @@ def depth(a: Namespace, x: np.ndarray) -> np.ndarray:
 
 def build(a: Namespace) -> mpm.Model:
     """The slope at rest, and then with the raised pore pressures. Collective."""
-    mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="fitted", runout=a.runout)
+    mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="gmsh", runout=a.runout)
     sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
                            dilation_angle=0.0)  # fmt: skip
     model = mpm.Model(bridge.background_mesh(*mesh), sand)

@@ -44,18 +44,27 @@ struct Phases
   Vector<D> soil, water;
 };
 
-/// Local damping of the node as a whole, by mass.
+/// Local damping of the node as a whole, by mass; none where the soil is held, whose reaction is no residual.
 template <int D>
-Phases<D> damping_forces(const PhaseForces<D>& f, const Phases<D>& start, double damping, double dt)
+Phases<D> damping_forces(const PhaseForces<D>& f, const Support<D>* support, const Phases<D>& start, double damping,
+                         double dt)
 {
-  Phases<D> forces{};
-  const double mass = f.soil_mass + f.water_mass;
+  Vector<D> force;
+  for (int a = 0; a < D; ++a)
+    force[a] = local_damping(damping, f.on_soil[a] + f.on_water[a],
+                             f.soil_mass * start.soil[a] + f.water_mass * start.water[a], dt);
+  if (support)
+  {
+    Support<D> held = *support;
+    held.value.fill(0);
+    impose<D>(held, force);
+  }
+  Phases<D> forces;
+  const double soil_part = f.soil_mass / (f.soil_mass + f.water_mass);
   for (int a = 0; a < D; ++a)
   {
-    const double drag = local_damping(damping, f.on_soil[a] + f.on_water[a],
-                                      f.soil_mass * start.soil[a] + f.water_mass * start.water[a], dt);
-    forces.soil[a] = drag * f.soil_mass / mass;
-    forces.water[a] = drag * f.water_mass / mass;
+    forces.soil[a] = force[a] * soil_part;
+    forces.water[a] = force[a] * (1 - soil_part);
   }
   return forces;
 }
@@ -147,12 +156,13 @@ void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, dou
     }
     const PhaseForces<D> f = phase_forces<G>(soil, water, i, gravity, density);
     const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
-    const Phases<D> damped = damping_forces<D>(f, start, damping, dt);
+    const Support<D>* support = support_of(i);
+    const Phases<D> damped = damping_forces<D>(f, support, start, damping, dt);
     Phases<D> end = free_velocities<D>(f, damped, start, dt);
     const ImperviousNode<D>* side = side_of(i);
     if (side)
       close<D>(*side, f.soil_mass / (f.soil_mass + f.water_mass), end);
-    if (const Support<D>* support = support_of(i))
+    if (support)
       hold_soil<D>(*support, f, damped, start, dt, end);
     if (side)
       close<D>(*side, 1, end);
@@ -190,13 +200,14 @@ void add_phase_work(const VelocityField<G>& soil, const WaterField<G>& water, st
                     const Vector<G::dim>& gravity, double damping, double dt, double density, Totals& totals)
 {
   constexpr int D = G::dim;
+  EntryOf support_of(soil.supports);
   for (Index i : soil.part.nodes)
   {
     if (!owned[i] || is_light(soil, i))
       continue;
     const PhaseForces<D> f = phase_forces<G>(soil, water, i, gravity, density);
     const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
-    const Phases<D> damped = damping_forces<D>(f, start, damping, dt);
+    const Phases<D> damped = damping_forces<D>(f, support_of(i), start, damping, dt);
     for (int a = 0; a < D; ++a)
     {
       const double us = 0.5 * dt * (start.soil[a] + soil.velocity[i][a]);

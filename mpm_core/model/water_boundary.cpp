@@ -74,8 +74,16 @@ void add_directions(const FacetNormal<D>& facets, ImperviousNode<D>& node)
 } // namespace
 
 template <class G>
-void set_impervious(Model<G>& model, std::span<const Index> facet_tags)
+void set_impervious(Model<G>& model, std::span<const Index> facet_tags, std::span<const Index> supplied_tags)
 {
+  auto& supplied = model.water_field.supplied;
+  supplied.assign(model.mesh.points.size(), 0);
+  for (Index tag : supplied_tags)
+  {
+    const std::vector<double> on_facet = nodes_on_facets(model.mesh, model.exchange, tag);
+    for (std::size_t i = 0; i < supplied.size(); ++i)
+      supplied[i] |= on_facet[i] > 0;
+  }
   std::map<Index, ImperviousNode<G::dim>> by_node;
   for (Index tag : facet_tags)
   {
@@ -92,7 +100,7 @@ void set_impervious(Model<G>& model, std::span<const Index> facet_tags)
     model.water_field.impervious.push_back(impervious);
 }
 
-#define INSTANTIATE(G) template void set_impervious(Model<G>&, std::span<const Index>);
+#define INSTANTIATE(G) template void set_impervious(Model<G>&, std::span<const Index>, std::span<const Index>);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

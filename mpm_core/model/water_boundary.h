@@ -8,7 +8,8 @@ namespace mpm::model
 {
 /// Makes facets with these tags impervious, in the place of those that were: there (w - v) . n = 0 for the normal n of
 /// the facets. Where facets of a tag meet at a node under an angle, w = v.
+/// @param supplied_tags  facets where water may enter
 /// @note Collective
 template <class G>
-void set_impervious(Model<G>& model, std::span<const Index> facet_tags);
+void set_impervious(Model<G>& model, std::span<const Index> facet_tags, std::span<const Index> supplied_tags);
 } // namespace mpm::model

@@ -10,16 +10,21 @@ namespace mpm::model
 template <int D>
 struct PoreMoments
 {
-  Vector<D> volume_xi; ///< sum V_p xi
-  double drag;         ///< sum V_p n^2 gamma_w / k [N s/m]
-  Vector<D> drag_xi;   ///< the same times xi
+  Vector<D> volume_xi;     ///< sum V_p xi
+  double drag;             ///< sum V_p n^2 gamma_w / k [N s/m]
+  Vector<D> drag_xi;       ///< the same times xi
+  double pores;            ///< sum n V_p
+  Vector<D> pore_velocity; ///< sum n V_p w_p
 };
 
 /// Nodal sums of these; plain doubles, so that shared nodes are summed in one message.
+template <int D>
 struct PoreNode
 {
-  double volume; ///< V_i = sum V_p N_i
-  double drag;   ///< c_i = sum V_p n^2 gamma_w / k N_i [N s/m]
+  double volume;     ///< V_i = sum V_p N_i
+  double drag;       ///< c_i = sum V_p n^2 gamma_w / k N_i [N s/m]
+  Vector<D> outward; ///< sum V_c grad N_i, the integral of N_i n over the surface of the soil
+  double around;     ///< sum V_c |grad N_i|
 };
 
 /// Directions along which no water leaves the soil at a node, (w - v) . direction[k] = 0 for k < count; orthonormal.
@@ -38,7 +43,8 @@ struct WaterField
 {
   VelocityField<G> motion;
   std::vector<PoreMoments<D>> cells;
-  std::vector<PoreNode> nodes;
+  std::vector<PoreNode<D>> nodes;
+  std::vector<unsigned char> supplied;       ///< per node: 1 where water may enter the soil
   std::vector<ImperviousNode<D>> impervious; ///< by rising node
   std::vector<Vector<D>> flux;               ///< j_i = m_w,i / V_i (w_i - v_i) [kg/(m2 s)]
 };

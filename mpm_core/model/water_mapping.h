@@ -31,8 +31,11 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
                     WaterField<G>& field);
 
 /// Mass flux of the water relative to the soil at the nodes, j_i = m_w,i / V_i (w_i - v_i).
+///
+/// Where pores may run empty, no water enters at the free surface: there is none outside, so that what flows inwards
+/// leaves its place empty.
 template <class G>
-void find_flux(const VelocityField<G>& soil, WaterField<G>& field);
+void find_flux(const VelocityField<G>& soil, const PoreWater& water, WaterField<G>& field);
 
 /// Mass that flows out of a unit of volume of a cell over dt, dt div j [kg/m3].
 template <class G>

@@ -15,6 +15,8 @@ struct WaterChange
 {
   double growth;           ///< volumetric strain of the soil
   double outflow;          ///< mass that leaves a unit of volume [kg/m3]
+  double content;          ///< mass in a unit of volume of the pores at the start [kg/m3]
+  Vector<D> exchange;      ///< change of its velocity as it spreads evenly over them
   AffineField<D> velocity; ///< by which that of the water changes
 };
 
@@ -26,9 +28,15 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   double divergence = 0;
   for (int k = 0; k <= D; ++k)
     divergence += dot<D>(velocity_of_vertex(mesh, soil, cell, k), mesh.shapes[cell].gradient[k]);
+  const CellMoments<G>& moments = water.motion.moments[cell];
+  const PoreMoments<D>& pores = water.cells[cell];
+  const double content = moments.mass / pores.pores;
+  Vector<D> exchange;
+  for (int a = 0; a < D; ++a)
+    exchange[a] = (moments.momentum[a] - content * pores.pore_velocity[a]) / moments.mass;
   return {nmd ? averaged_strain(mesh, soil, cell, dt * divergence) : dt * divergence,
           nmd ? mean_of_nodes<D>(mesh.cells[cell], water.motion.volumetric_strain) : outflow(mesh, water, cell, dt),
-          affine_field<D>(mesh, cell, change)};
+          content, exchange, affine_field<D>(mesh, cell, change)};
 }
 
 /// sum V p
@@ -68,7 +76,7 @@ bool change_water(Particles<D>& particles, const PoreWater& water, const Run& ru
                       {
                         const Lanes volume = piece[volume_at], before = piece[porosity_at];
                         const Lanes pores = volume * (before + c.growth), porosity = pores / (volume * (1 + c.growth));
-                        piece[mass_at] -= volume * c.outflow;
+                        piece[mass_at] = volume * (c.content * before - c.outflow);
                         const Lanes pressure = modulus * (piece[mass_at] / (density * pores) - 1);
                         piece[pressure_at] = pressure > least ? pressure : Lanes{} + least;
                         piece[porosity_at] = porosity;
@@ -80,7 +88,7 @@ bool change_water(Particles<D>& particles, const PoreWater& water, const Run& ru
                         }
                         for (int a = 0; a < D; ++a)
                         {
-                          Lanes w = flip_fraction * piece[D + a] + c.velocity.value[a];
+                          Lanes w = flip_fraction * (piece[D + a] + c.exchange[a]) + c.velocity.value[a];
                           for (int b = 0; b < D; ++b)
                             w += c.velocity.gradient[a][b] * (piece[b] - x0[b]);
                           piece[D + a] = w;

@@ -11,7 +11,9 @@ namespace mpm::model
 ///
 ///     m_w -= V dt div j,  n V += V dt div v,  p = K_w (m_w / (rho_w n V) - 1),
 ///
-/// which is (n / K_w) dp/dt = -div v - div (n (w - v)) for small p / K_w; it is no lower than the limit of suction.
+/// First the water of a cell spreads evenly over its pores, with its momentum: particles that came from other cells
+/// would keep pressures of their own, whose sum alone acts on the nodes. The above is (n / K_w) dp/dt = -div v - div (n
+/// (w - v)) for small p / K_w; it is no lower than the limit of suction.
 /// @param flip_fraction  of the water's own velocity that is kept
 /// @param nmd            take the means of `average_strains` and `average_outflow`
 /// @pre particles are where they were at the step's start

@@ -212,7 +212,9 @@ void bind_model(py::module_& m, const std::string& suffix)
            })
       .def("split_phases", &split_phases<G>)
       .def_property_readonly("has_two_phases", &has_two_phases<G>)
-      .def("set_impervious", [](M& model, const std::vector<Index>& facet_tags) { set_impervious(model, facet_tags); })
+      .def("set_impervious", 
+           [](M& model, const std::vector<Index>& facet_tags, const std::vector<Index>& supplied_tags)
+           { set_impervious(model, facet_tags, supplied_tags); })
       .def("set_absorbing_sides",
            [](M& model, const std::vector<std::tuple<Index, double, double, double, Index>>& given)
            {

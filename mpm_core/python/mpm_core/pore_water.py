@@ -67,7 +67,8 @@ class PoreWater(Conditions):
             modulus: bulk modulus of water [Pa]; may be infinite.
             kozeny_carman: let the conductivity follow the porosity as n^3 / (1 - n)^2.
             suction_limit: largest suction of the water [Pa], 0 or more, in explicit runs: where soil grows beyond it, its pores
-                are not full, and pressure comes back when they are. By default the water bears any.
+                are not full, and pressure comes back when they are; no water enters at free surfaces then. By default
+                it bears any.
             drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh.
 
         Raises:

@@ -27,7 +27,7 @@ def set_impervious(body: Body) -> None:
     """Let no water pass the facets that hold the soil, but for those with a prescribed pore pressure. Collective."""
     if body._core.water is not None:
         pervious = {tag for tag, _, _, held, _ in body._water_conditions if held}
-        body._core.set_impervious(sorted({tag for tag, _, _ in body._conditions} - pervious))
+        body._core.set_impervious(sorted({tag for tag, _, _ in body._conditions} - pervious), sorted(pervious))
 
 
 def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:

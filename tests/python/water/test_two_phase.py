@@ -162,7 +162,7 @@ def test_phases_exchange_momentum_without_making_any():
     """Without weight or boundary conditions, in a motion that is undrained at the nodes but not in the particles."""
     mesh = box((6, 6), (3.0, 3.0), body=((1.0, 1.0), (2.0, 2.0)))
     model = mpm.Model(mesh, ELASTIC)
-    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.seed(density=DENSITY, per_cell=1, cell_tag=1)
     model.add_water(porosity=POROSITY, conductivity=1e-2, modulus=2.2e7)
     list(model.explicit(1e-9))
     p = model.particles
@@ -176,6 +176,76 @@ def test_phases_exchange_momentum_without_making_any():
         masses = p.water_mass
     now = p.mass @ p.velocity + p.water_mass @ p.water_velocity
     np.testing.assert_allclose(now + left, start, atol=1e-12 * np.abs(start).max())
+
+
+def test_saturated_soil_in_free_fall_stays_as_it_is():
+    mesh = box((6, 6), (3.0, 3.0), body=((1.0, 1.0), (2.0, 2.0)))
+    model = mpm.Model(mesh, ELASTIC)
+    model.seed(density=DENSITY, per_cell=6, cell_tag=1)
+    model.add_water(porosity=POROSITY, conductivity=1e-4, modulus=2.2e8)
+    model.set_gravity((0.0, -9.81))
+    *_, report = model.explicit(0.02, nmd=True)
+    p = model.particles
+    for velocity in (p.velocity, p.water_velocity):
+        np.testing.assert_allclose(velocity, np.tile([0.0, -9.81 * 0.02], (len(p), 1)), atol=1e-12)
+    np.testing.assert_allclose(p.pore_pressure, 0, atol=1e-6)
+    np.testing.assert_allclose(report.momentum, [0.0, -9.81 * 0.02 * DENSITY], rtol=1e-12, atol=1e-9)
+    assert abs(report.unexplained_fraction) < 1e-10
+
+
+# --- limits -----------------------------------------------------------------------------------------------------------
+
+
+def test_without_flow_the_soil_is_that_of_the_undrained_law():
+    """A square that hangs over its base under suddenly applied weight swings as with total stresses of the undrained law."""
+    soil, modulus, moved = mpm.LinearElastic(young=2e6, poisson=0.3), 2.2e7, []
+    for law in (soil, mpm.Undrained(soil, water_modulus=modulus, porosity=POROSITY)):
+        mesh = box((12, 10), (1.5, 1.25), diagonals="alternating", body=((0, 0), (1.0, 1.0)))
+        model = mpm.Model(mesh, law)
+        model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+        model.roller(LEFT, (1, 0))
+        model.fix(BASE)
+        model.set_gravity((0.0, -9.81))
+        if law is soil:
+            model.add_water(porosity=POROSITY, conductivity=1e-10, modulus=modulus)
+        *_, report = model.explicit(0.05, nmd=True)
+        assert report.unexplained_fraction > -1e-3  # no energy from nothing
+        moved.append(model.particles.displacement[np.argsort(model.particles.id)])
+    assert np.abs(moved[0] - moved[1]).max() <= 0.02 * np.abs(moved[1]).max()
+
+
+def test_soil_at_rest_under_water_has_its_buoyant_weight():
+    model = column(10, conductivity=1e-1, modulus=2.2e7)
+    model.set_gravity((0.0, -9.81))
+    list(model.explicit(1.0, nmd=True, damping=0.5))
+    p, z = model.particles, model.particles.position[:, 1]
+    row = np.floor(5 * z).astype(int)  # averages of alternating diagonals tell pairs of rows apart only
+    for column_of, weight in ((-p.stress[:, 1], (DENSITY - WATER) * 9.81), (p.pore_pressure, GAMMA)):
+        means = np.bincount(row, column_of) / np.bincount(row)
+        np.testing.assert_allclose(means, weight * (1 - 0.2 * (np.arange(5) + 0.5)), atol=0.01 * weight)
+
+
+# --- pores that run empty ---------------------------------------------------------------------------------------------
+
+
+def test_a_column_drains_at_its_base_by_its_conductivity():
+    """Without suction water falls by its weight alone, with the gradient 1, as long as pores at the base are full: k t leave
+    the column there, none enters at its top, and none is lost."""
+    conductivity, until = 2e-2, 2.0
+    model = column(10, conductivity=conductivity, modulus=2.2e7, height=1.0)
+    model.set_gravity((0.0, -9.81))
+    p = model.particles
+    model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=2.2e7, suction_limit=0.0)
+    model.hold_pore_pressure(BASE, 0.0)
+    p.set("stress", DENSITY * 9.81 * (p.position[:, 1] - 1)[:, None] * np.array([3 / 7, 1.0, 3 / 7, 0.0]))
+    list(model.explicit(1e-9))
+    start = p.water_mass.sum()
+    list(model.explicit(until, nmd=True, damping=0.2))
+    assert -model.water_inflow() == pytest.approx(0.2 * conductivity * until, rel=0.05)
+    assert start - p.water_mass.sum() == pytest.approx(-WATER * model.water_inflow(), abs=1e-10 * start)
+    full = p.water_mass / (WATER * p.porosity * p.volume)
+    z = p.position[:, 1]
+    assert full[z > 0.9].max() < 0.8 and full[z < 0.2].min() > 0.99
 
 
 # --- input ------------------------------------------------------------------------------------------------------------
