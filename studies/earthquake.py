@@ -18,6 +18,7 @@ from common.earthquake_plots import save_amplification, save_ground, save_motion
 from common.earthquake_site import (
     STEP,
     STIFF,
+    column_layers,
     damping_of,
     laws_of,
     linear_column,
@@ -167,7 +168,7 @@ def amplified(a: Namespace, motion: mpm.Motion, history: History) -> tuple[tuple
     band = (a.frequency / 2, a.highest_frequency) if a.motion == "noise" else (a.frequency / 2, 2 * a.frequency)
     shear = [young / (2 * (1 + a.poisson)) for young in (a.young, a.stiff_young)]
     density = a.unit_weight / GRAVITY
-    layers = [(a.height + a.soil_depth, shear[0], density), (a.stiff_depth, shear[1], density)]
+    layers = [(thickness, modulus, density) for thickness, modulus in zip(column_layers(a), shear)]
 
     def ratio(time, velocity, outcrop, smoothing):
         outcrop = np.interp(time, outcrop.time, outcrop.velocity, left=0, right=0)

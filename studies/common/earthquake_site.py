@@ -93,10 +93,16 @@ def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
     return model
 
 
+def column_layers(a: Namespace) -> tuple[float, float]:
+    """Thickness of soil and of the stiffer layer behind the crest, of whole cells [m]."""
+    soil, stiff = (a.cell_size * round(depth / a.cell_size) for depth in (a.height + a.soil_depth, a.stiff_depth))
+    return soil, stiff
+
+
 def linear_column(a: Namespace, motion: mpm.Motion, until: float) -> tuple[np.ndarray, np.ndarray]:
     """Times and velocities at the surface of a linear column of the ground behind the crest, one cell wide."""
-    counts = round((a.height + a.soil_depth + a.stiff_depth) / a.cell_size)
-    size, height = (a.cell_size, counts * a.cell_size), round(a.stiff_depth / a.cell_size) * a.cell_size
+    soil, stiff = column_layers(a)
+    size, height, counts = (a.cell_size, soil + stiff), stiff, round((soil + stiff) / a.cell_size)
     mesh = bridge.box_mesh(MPI.COMM_SELF, size, (1, counts), body=((-1, height), (2 * a.cell_size, size[1] + 1)))
     model = mpm.Model(bridge.background_mesh(*mesh), [mpm.LinearElastic(young=young, poisson=a.poisson)
                                                       for young in (a.young, a.stiff_young)])  # fmt: skip
