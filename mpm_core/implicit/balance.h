@@ -14,5 +14,6 @@ void balance(const VelocityField<G>& field, ImplicitStep<G>& step);
 /// ranks.
 /// @note Collective
 template <class G>
-TrialReport trial_report(const NodeExchange& exchange, const ImplicitStep<G>& step, const TrialCount<G::dim>& count);
+TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                         const TrialCount<G::dim>& count);
 } // namespace mpm::implicit

@@ -99,7 +99,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   for (std::size_t i = 0; i < step.forces.size(); ++i)
     field.nodes[i].internal = step.forces[i].internal;
   model.last.plastic = count.plastic;
-  const TrialReport report = trial_report(exchange, step, count);
+  const TrialReport report = trial_report(exchange, field, step, count);
   step.failure = report.failed > 0 ? shared_failure(exchange, count.failure) : std::nullopt;
   return report;
 }
