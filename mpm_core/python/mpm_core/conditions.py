@@ -39,9 +39,9 @@ class Conditions:
     ) -> list[Condition]:
         def checked() -> list[Condition]:
             given = np.array(vector, dtype=object)
-            free = np.array([whole and value is None for value in given.ravel()])
+            free = np.array([whole and value is None for value in given.ravel()]).reshape(given.shape)
             values = floats(name, np.where(free, 0.0, given).tolist(), (self.mesh.dim,))
-            components = [None if is_free else float(value) for is_free, value in zip(free, values)]
+            components = [None if is_free else float(value) for is_free, value in zip(free, values, strict=True)]
             return [(tag, whole, components) for tag in self.mesh.tags_of("facet", facet_tag)]
 
         new = collectively(self.comm, checked)

@@ -19,6 +19,8 @@ def seeded(dim, rests=False):
     model.traction(2, (1e3, 2e3, 3e3)[:dim])
     if rests:
         model.rest(where=lambda x: x[:, 0] < 0.5)
+    model.add_water(porosity=0.4, conductivity=1e-4)
+    model._core.split_phases()  # the water's own mass and velocity, which explicit runs give it
     rng = np.random.default_rng(5)
     for name in ("velocity", "stress", "deviatoric_strain", "state", "initial_position"):
         model.particles.set(name, rng.random(getattr(model.particles, name).shape))
