@@ -90,7 +90,7 @@ class Body(PoreWater, RestingCells, AbsorbingSides):
         """Number of repartitions of the background mesh since the model was made."""
         self._first_mesh = mesh  # kept, since it may own the communicator
         self._left_imbalance = 1.0  # by the last partition
-        self.particles = Particles(self._core)
+        self.particles = Particles(self._core, self.geometry)
         """The particles on this rank."""
 
     cuts = renamed("cuts", "repartitions")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._core import InputError
+from ._core import Geometry, InputError
 from .mesh import floats
 from .views import particle_mesh, particle_table, particles_text, plot_particles
 
@@ -28,8 +28,9 @@ class Particles:
         >>> model.particles[low].stress.mean(axis=0)
     """
 
-    def __init__(self, core: Any, rows: NDArray[np.int64] | None = None) -> None:
+    def __init__(self, core: Any, geometry: Geometry, rows: NDArray[np.int64] | None = None) -> None:
         self._core = core
+        self._geometry = geometry
         self._rows = rows
 
     def __repr__(self) -> str:
@@ -48,7 +49,7 @@ class Particles:
             InputError: rows of another shape or dtype, or a row that does not exist, also when the attribute is read later.
         """
         self._require_all("choosing rows")
-        return Particles(self._core, self._core.row_numbers(np.asarray(rows)))
+        return Particles(self._core, self._geometry, self._core.row_numbers(np.asarray(rows)))
 
     def find(self, ids: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int64]:
         """The row of each of some particles, by their numbers, shape (m,); -1 for those that are not on this rank."""
@@ -152,7 +153,7 @@ class Particles:
             axes: matplotlib axes to draw into, three-dimensional ones in 3D; new ones by default.
 
         Returns:
-            The axes. In two dimensions each particle is a circle as wide as the square of its volume.
+            The axes. In two dimensions each particle is a circle as wide as the square of its area.
 
         Raises:
             InputError: no such field or component; the message lists them.
@@ -161,7 +162,8 @@ class Particles:
         Example:
             >>> model.particles.plot("stress_yy").set_title("after a second")
         """
-        return plot_particles(self, name, axes)
+        per_radian = self._geometry == Geometry.AXISYMMETRIC
+        return plot_particles(self, name, axes, self.volume / self.position[:, 0] if per_radian else self.volume)
 
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.

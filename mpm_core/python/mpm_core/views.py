@@ -117,8 +117,8 @@ def _plotted(particles: Particles, name: str) -> tuple[np.ndarray, str]:
     raise InputError(f"name is {name!r}, expected a field or a component of it: {', '.join(sorted(units))}")
 
 
-def plot_particles(particles: Particles, name: str, axes: Any) -> Any:
-    """See `Particles.plot`."""
+def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray) -> Any:
+    """See `Particles.plot`; areas in two dimensions [m^2]."""
     import matplotlib.pyplot as plt
     from matplotlib.collections import EllipseCollection
 
@@ -131,7 +131,7 @@ def plot_particles(particles: Particles, name: str, axes: Any) -> Any:
         drawn = axes.scatter(*position.T, c=values, s=2)
         axes.set_zlabel("z [m]")
     else:
-        size = np.sqrt(particles.volume)
+        size = np.sqrt(area)
         drawn = EllipseCollection(
             size, size, np.zeros(len(size)), units="xy", offsets=position, offset_transform=axes.transData, array=values
         )
