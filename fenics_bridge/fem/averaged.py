@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from dolfinx import fem, la
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenics_bridge import compat
 from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.mesh.background import global_numbers
+from fenics_bridge.types import Law
+from mpm_core import _core
+
+LITTLE_DILATION = 0.1
+"""tan(psi) / tan(phi) below which forces are not averaged; soil with little dilation carries too little with averaged forces,
+soil with more of it without them (docs/fem.md)"""
 
 
 class AveragedKinematics:
@@ -21,18 +29,27 @@ class AveragedKinematics:
     theta_i over a cell's nodes, the in-plane normal strains are raised by (thetabar_c - theta_c) / d; all three of them,
     with d = 3, in 3D and in axisymmetric bodies, whose hoop strain is that at the centroid.
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
-    transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is. (Particles
-    do the same in small displacements, and average strains only in motion; see the theory.)
+    transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is.
+
+    Soil with friction whose flow hardly dilates is an exception. Forces that are averaged do not feel pressures that alternate
+    from cell to cell, and where flow does not change the volume a mechanism would pass through the cells of low pressure. So in
+    cells of such soil the forces are those of the stress itself, by the transpose of the plain strains.
 
     Args:
         increment: displacement function of degree 1 whose strain is taken.
         points: the quadrature points.
         constraints: the boundary conditions.
+        laws: the laws, by number; see `follow`.
         geometry: plane strain, axial symmetry or a solid.
     """
 
     def __init__(
-        self, increment: fem.Function, points: Any, constraints: Any, geometry: Geometry | None = None
+        self,
+        increment: fem.Function,
+        points: Any,
+        constraints: Any,
+        laws: Sequence[Law],
+        geometry: Geometry | None = None,
     ) -> None:
         self._increment, self._points, self._constraints = increment, points, constraints
         self._space, comm = increment.function_space, increment.function_space.mesh.comm
@@ -54,16 +71,36 @@ class AveragedKinematics:
         self._strain = _matrix(
             comm, (size, self._n_dofs), np.repeat(dofs, points.size, axis=0), _strain_rows(gradients, radii)
         )
-        self._strain.axpy(1.0, part.matMult(spread))
+        self._plain, self._spread = self._strain.copy(), part.matMult(spread)
+        self._strain.axpy(1.0, self._spread)
         components = points.size * cell[:, None] + np.arange(points.size)
         self._columns = np.repeat(components, points.size, axis=0)
         self._tangent = _matrix(comm, (size, size), self._columns, 1.0)
-        # PETSc's triple product would add up what ranks send in the order in which it arrives.
-        self._transposed = self._strain.transpose(PETSc.Mat())
+        self._averaged: NDArray[np.bool_] | None = None
         self._change: PETSc.Mat | None = None
-        self._stiffness: PETSc.Mat | None = None
         self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
         self._held = self._held_dofs()
+        self.follow(laws)
+
+    def follow(self, laws: Sequence[Law]) -> None:
+        """Average forces as the laws ask for: in all cells but those of frictional soil with little dilation. Collective.
+
+        Args:
+            laws: the laws, by number.
+        """
+        of_law = np.array([_core.associated_fraction(law) < LITTLE_DILATION for law in laws])
+        averaged = ~of_law[np.maximum(self._points.material, 0)]
+        same = self._averaged is not None and np.array_equal(averaged, self._averaged)
+        if self._space.mesh.comm.allreduce(same, MPI.LAND):
+            return
+        self._averaged = averaged
+        operator, rows = self._spread.copy(), self._spread.createVecLeft()
+        rows.array[:] = np.repeat(averaged, self._points.size)
+        operator.diagonalScale(L=rows)
+        operator.axpy(1.0, self._plain)
+        # PETSc's triple product would add up what ranks send in the order in which it arrives.
+        self._transposed = operator.transpose(PETSc.Mat())
+        self._stiffness: PETSc.Mat | None = None
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""
@@ -76,7 +113,7 @@ class AveragedKinematics:
         """Nodal forces of a stress (n, S) as a vector (`dolfinx.la`), ghosts up to date. Collective."""
         forces, weighted = self._strain.createVecs()
         weighted.array[:] = (self._volumes[:, None] * stress).ravel()
-        self._strain.multTranspose(weighted, forces)
+        self._transposed.mult(weighted, forces)
         self._forces.array[: self._n_dofs] = forces.array_r
         compat.forward(self._forces)
         return self._forces

@@ -149,6 +149,8 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
     steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
     above = [step for step in steps if step.value > curve[-1][0]]
     failures = [step for step in above if step.report.outcome == "failure"]
+    if not above:
+        return _unlimited(steps, np.array(curve), mechanism)
     last = min(failures or above, key=lambda step: step.value)
     agree(
         comm,
@@ -164,12 +166,36 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
         failed=last.report.outcome == "failure",
         reason=last.report.reason,
         carried=last.report.carried,
-        residual=max(step.report.residuals[-1] for step in steps if step.converged),
-        missing=max(step.report.missing for step in steps if step.converged),
+        **_accepted(steps),
         curve=np.array(curve),
         mechanism=mechanism,
         steps=steps,
     )
+
+
+def _unlimited(steps, curve, mechanism):
+    """The result where every step found equilibrium: a lower bound only."""
+    reason = f"equilibrium at every value up to {curve[-1, 0]:.3g}: the body may not be able to fail in this way"
+    return Collapse(
+        curve[-1, 0],
+        math.inf,
+        False,
+        reason,
+        math.nan,
+        **_accepted(steps),
+        curve=curve,
+        mechanism=mechanism,
+        steps=steps,
+    )
+
+
+def _accepted(steps):
+    """What was accepted on the way as equilibrium."""
+    reports = [step.report for step in steps if step.converged]
+    return {
+        "residual": max(report.residuals[-1] for report in reports),
+        "missing": max(report.missing for report in reports),
+    }
 
 
 def _largest(function, comm, dim):

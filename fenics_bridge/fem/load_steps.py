@@ -15,6 +15,8 @@ from fenics_bridge.fem.equilibration import EquilibriumReport
 from fenics_bridge.fem.loads import Load
 
 _MOST_STEPS = 1000
+FAR = 1e6
+"""Way in first steps beyond which a value without a bound has shown no failure"""
 
 
 class LoadStep(NamedTuple):
@@ -48,7 +50,7 @@ def advance(
     Args:
         equilibrate: function of the value that returns an EquilibriumReport.
         start: value at the start, in equilibrium.
-        end: value to reach; infinite to go on up to failure.
+        end: value to reach; infinite to go on up to failure, or until the value is `FAR` first steps away.
         first_step: size of the first step, in the units of the value. Two easy steps in a row double it, a step without
             equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
         tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end.
@@ -60,7 +62,8 @@ def advance(
     steps: list[LoadStep] = []
     value, easy, failed_at, undecided = start, 0, math.inf, False
     control = StepControl(math.inf, min(first_step, end - start))
-    while value < end and len(steps) < _MOST_STEPS:
+    limit = min(end, start + FAR * first_step) if math.isinf(end) else end
+    while value < limit and len(steps) < _MOST_STEPS:
         smallest = tolerance * max(abs(value), first_step)
         size = control.length = min(control.length, 0.5 * (failed_at - value))
         if size < smallest:

@@ -50,8 +50,7 @@ class QuasiStatic(PointFunctions):
         degree: degree of the displacement: 1, 2 or, for triangles, 4. Collapse loads by triangles of degree 4 are the most
             accurate for their number of nodes, above all of undrained and axisymmetric bodies (Sloan and Randolph 1982, IJNAMG
             6, 47-76).
-        nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1. Not for soil with friction, little
-            cohesion and no dilation, whose surface then fails too early; degree 2 and 4 do not have this limit.
+        nmd: average volumetric strains over nodes (nodal mixed discretisation), for degree 1; see `averaged`.
         options_prefix: prefix of the PETSc options of the linear solver.
         cell_tags: tags of the cells; needed where laws or unit weights are given by cell tag.
         solver: tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice.
@@ -123,8 +122,10 @@ class QuasiStatic(PointFunctions):
     def _assemble(self, constraints):
         """The Body that a step changes, with the present points and the given constraints. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
-        kinematics: type = AveragedKinematics if self._nmd else Kinematics
-        self._kinematics = kinematics(self.increment, self.points, constraints, self.geometry)
+        parts = self.increment, self.points, constraints
+        self._kinematics: Any = (
+            AveragedKinematics(*parts, self.laws, self.geometry) if self._nmd else Kinematics(*parts, self.geometry)
+        )
         linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
@@ -258,14 +259,22 @@ class QuasiStatic(PointFunctions):
         forces = self._loads.forces(load), self._loads.forces(self.load)
         solver = replace(self.solver, **options)
         self.points.duration = duration
-        report = find_equilibrium(self._body, self._materials.laws(law), *forces, load.displacement, solver)
+        laws = self._materials.laws(law)
+        self._follow(laws)
+        report = find_equilibrium(self._body, laws, *forces, load.displacement, solver)
         self.points.duration = np.inf
         self.converged = report.converged
         if report.converged:
             self.points.time += duration if np.isfinite(duration) else 0.0
             self.load, self.law = self._loads.resolved(load), law
             return report
+        self._follow(self.laws)
         return replace(report, reason=explained(self, report.reason, load))
+
+    def _follow(self, laws):
+        """Let averaged forces follow the laws. Collective."""
+        if self._nmd:
+            self._kinematics.follow(laws)
 
     def solve(
         self,

@@ -1,3 +1,4 @@
+#include "materials/laws/association.h"
 #include "materials/laws/strength_reduction.h"
 #include "mesh/mesh.h"
 #include "python/bindings.h"
@@ -191,6 +192,8 @@ void bind_laws(py::module_& m)
   m.def(
       "reduced_strength", [](const Law& law, double factor) { return reduced_strength(law, factor); }, py::arg("law"),
       py::arg("factor"));
+  m.def(
+      "associated_fraction", [](const Law& law) { return associated_fraction(law); }, py::arg("law"));
   m.def("cell_sizes",
         py::vectorize([](double volume, int dim) { return dim == 2 ? cell_size<2>(volume) : cell_size<3>(volume); }),
         py::arg("volumes"), py::arg("dim"));

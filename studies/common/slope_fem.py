@@ -34,8 +34,8 @@ def add_ground_option(parser: argparse.ArgumentParser) -> None:
 def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Options ``--elements`` and ``--equilibrium``."""
     add_choice(parser, "--elements", "P2", ("P1", "P1-averaged", "P2", "P4"),
-               "linear triangles, the same with averaged volumetric strains (not for soil with little cohesion and no dilation), "
-               "quadratic ones, or those of degree 4, which are the most accurate for their number of nodes")  # fmt: skip
+               "linear triangles, the same with averaged volumetric strains, quadratic ones, or those of degree 4, "
+               "which are the most accurate for their number of nodes")  # fmt: skip
     add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
                "what is accepted: an out-of-balance force of 1e-8 of the forces at work by Newton's method and 1e-5 by "
                "relaxation, or, as in practice, that 1 % of the stress is missing in cells that yield")  # fmt: skip

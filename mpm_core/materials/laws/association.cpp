@@ -1,33 +1,47 @@
 #include "materials/laws/association.h"
 
+#include <cmath>
+#include <limits>
+#include <numbers>
+
 namespace mpm::materials
 {
 namespace
 {
-bool non_associated(const LinearElastic&) { return false; }
-bool non_associated(const CamClay&) { return false; }
-bool non_associated(const ExternalLaw&) { return true; }
-bool non_associated(const Umat&) { return true; }
-bool non_associated(const MohrCoulomb& law) { return law.dilation_angle < law.friction_angle; }
-bool non_associated(const DruckerPrager& law) { return law.dilation < law.friction; }
-bool non_associated(const ViscoplasticMohrCoulomb& law) { return non_associated(law.inviscid); }
-bool non_associated(const SofteningMohrCoulomb& law) { return non_associated(law.peak); }
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-// The pressure of its water is most of what averages change, and its strength does not depend on that.
-bool non_associated(const Undrained&) { return false; }
-
-bool non_associated(const Heterogeneous& law);
-bool non_associated(const Hencky& law);
-
-template <class... L>
-bool non_associated(const std::variant<L...>& law)
+double fraction(const LinearElastic&) { return 1; }
+double fraction(const CamClay&) { return 1; }
+double fraction(const ExternalLaw&) { return unknown; }
+double fraction(const Umat&) { return unknown; }
+double fraction(const MohrCoulomb& law)
 {
-  return std::visit([](const auto& one) { return non_associated(one); }, law);
+  constexpr double degree = std::numbers::pi / 180;
+  const bool less = law.dilation_angle < law.friction_angle;
+  return less ? std::tan(degree * law.dilation_angle) / std::tan(degree * law.friction_angle) : 1;
 }
 
-bool non_associated(const Heterogeneous& law) { return non_associated(law.law); }
-bool non_associated(const Hencky& law) { return non_associated(law.law); }
+double fraction(const DruckerPrager& law) { return law.dilation < law.friction ? law.dilation / law.friction : 1; }
+double fraction(const ViscoplasticMohrCoulomb& law) { return fraction(law.inviscid); }
+double fraction(const SofteningMohrCoulomb& law) { return fraction(law.peak); }
+
+// The pressure of its water is most of what averages change, and its strength does not depend on that.
+double fraction(const Undrained&) { return 1; }
+
+double fraction(const Heterogeneous& law);
+double fraction(const Hencky& law);
+
+template <class... L>
+double fraction(const std::variant<L...>& law)
+{
+  return std::visit([](const auto& one) { return fraction(one); }, law);
+}
+
+double fraction(const Heterogeneous& law) { return fraction(law.law); }
+double fraction(const Hencky& law) { return fraction(law.law); }
 } // namespace
 
-bool is_non_associated(const Law& law) { return non_associated(law); }
+double associated_fraction(const Law& law) { return fraction(law); }
+
+bool is_non_associated(const Law& law) { return !(fraction(law) >= 1); }
 } // namespace mpm::materials

@@ -69,6 +69,16 @@ def test_strip_footing(friction_angle, factor, tolerance):
     assert fewer < 0.7 * nodes and abs(quartic - factor) < abs(quadratic - factor)
 
 
+def test_soil_that_cannot_fail_has_no_factor_of_safety_but_a_lower_bound():
+    """Clay that is confined on all sides takes any weight in compression, whatever its strength."""
+    domain, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
+    clay = mpm.tresca(young=1e6, poisson=0.3, shear_strength=10e3)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)]
+    result = bridge.factor_of_safety(bridge.QuasiStatic(domain, clay, sides, supports), weight(20e3))
+    assert not result.failed and result.value > 1e4 and result.failed_at == np.inf
+    assert "may not be able to fail" in result.reason
+
+
 def test_slope_that_cannot_stand_is_refused():
     with pytest.raises(bridge.InputError, match="start.*mechanism.*smaller start"):
         bridge.factor_of_safety(slope_model(), weight(80e3), start=1.0)
