@@ -18,8 +18,8 @@ from .stage_plots import StageFiles, stage_picture
 
 def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
     """Options of a site that is built in stages: its file, by default one of `meshes/`, its cells and elements."""
-    meaning = "linear triangles, as the particles have them, or quadratic ones"
-    add_site_file(parser, site, "soils, supports and stages", (elements, ("P1", "P2"), meaning))
+    meaning = "linear triangles, as the particles have them, quadratic ones, or those of degree 4"
+    add_site_file(parser, site, "soils, supports and stages", (elements, ("P1", "P2", "P4"), meaning))
 
 
 def carry_out(
