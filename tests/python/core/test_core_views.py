@@ -77,7 +77,9 @@ def test_circles_of_a_half_section_have_the_area_of_the_particles_in_it():
     model.seed(density=2000.0, per_cell=3)
     (circles,) = model.particles.plot("position_x").collections
     areas = (2 * circles._widths) ** 2
-    assert areas.sum() == pytest.approx(np.prod(np.ptp(model.mesh.points, axis=0)), rel=1e-3)  # volumes per radian are r A
+    assert areas.sum() == pytest.approx(
+        np.prod(np.ptp(model.mesh.points, axis=0)), rel=1e-3
+    )  # volumes per radian are r A
 
 
 def test_a_picture_of_a_solid_is_three_dimensional():
