@@ -114,7 +114,7 @@ def main(arguments: list[str] | None = None) -> int:
     if scene is not None:
         pictures["imbalance"] = lambda: save_history(
             folder / "imbalance.png", np.array(first.time), {name: run.imbalance for name, run in runs.items()},
-            "Load imbalance: maximum over mean particles per rank [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
+            "Load imbalance (maximum over mean) [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
         page = Page(movies=[Movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
                     captions={"imbalance": "Load imbalance: maximum over mean number of particles per rank"})  # fmt: skip
         print(f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
