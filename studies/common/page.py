@@ -13,8 +13,7 @@ import numpy as np
 
 from .movie import Movie
 from .options import Options
-from .report import Report, name_and_unit, save_report, shown
-from .report_sections import Section
+from .report import Report, Section, name_and_unit, save_report, shown
 
 STARTED = time.time()
 """Files that are older do not belong to this run."""

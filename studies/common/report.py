@@ -1,26 +1,26 @@
 """The page of a run: one HTML file that opens without a network, with a player for the particles, curves, figures, parameters.
 
-The page's own program lies in ``report_page/``; it and all data are written into the file. Numbers of the player are rounded to
-one part in 65,534 of their range.
+The template and the program of the page lie in ``report_page/``; both and all data are written into the file. The numbers that
+the player shows are rounded to one part in 65,534 of their range.
 """
 
 from __future__ import annotations
 
 import base64
-import html
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import jinja2
 import matplotlib
 import numpy as np
+from markupsafe import Markup
 
 from .files import expendable
 from .movie import Movie, packed
 from .parameters import Parameter
 from .plots import colour_limits
-from .report_sections import Section, figures_html, sections_html
 
 PAGE = Path(__file__).parent / "report_page"
 SCRIPTS = ("data.js", "view.js", "player.js", "curves.js", "main.js")
@@ -38,6 +38,27 @@ SPECIAL = {
     "plastic_fraction": ("Fraction of particles that yield", "-"),
     "unbalanced_ratio": ("Out-of-balance ratio", "-"),
 }  # fmt: skip
+
+
+@dataclass
+class Section:
+    """One part of a page.
+
+    Args:
+        title: heading.
+        text: paragraphs, separated by empty lines.
+        columns: names of the table's columns.
+        rows: texts, one for each column; numbers are set to the right.
+        wrong: numbers of the rows that are marked.
+        figures: PNG files with captions; those that could not be drawn are left out.
+    """
+
+    title: str
+    text: str = ""
+    columns: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    wrong: Sequence[int] = ()
+    figures: Mapping[Path, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -79,23 +100,17 @@ def save_report(path: Path, report: Report) -> None:
     """
     # "</" would end the script element that the data stand in.
     data = json.dumps(_data(report), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-    filled = {
-        "title": html.escape(report.title),
-        "subtitle": html.escape(report.subtitle),
-        "facts": "".join(
-            f"<li><b>{html.escape(v)}</b><span>{html.escape(k)}</span></li>" for k, v in report.facts.items()
-        ),
-        "figures": _figures(report.figures),
-        "sections": sections_html(report.sections),
-        "tables": _tables(report.parameters, report.results),
-        "footer": html.escape(report.footer),
-        "style": _part("page.css"),
-        "script": "\n".join(_part(name) for name in SCRIPTS),
-        "data": data,
-    }
-    page = _part("page.html")
-    pieces = page.split("{{")
-    text = pieces[0] + "".join(filled[name] + rest for name, rest in (piece.split("}}", 1) for piece in pieces[1:]))
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(PAGE), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"shown": shown, "name_and_unit": name_and_unit, "png": _png}
+    environment.tests["numeric"] = _is_number
+    text = environment.get_template("page.html").render(
+        report=report,
+        style=Markup(_part("page.css")),
+        script=Markup("\n".join(map(_part, SCRIPTS))),
+        data=Markup(data),
+    )
     with expendable(path) as aside:
         aside.write_text(text, encoding="utf-8")
 
@@ -204,29 +219,13 @@ def _curves(title: str, table: Mapping[str, np.ndarray]) -> dict:
 # --- what stands on the page as it is --------------------------------------------------------------------------------
 
 
-def _figures(figures: Mapping[Path, str]) -> str:
-    return f"<section><h2>Figures</h2>{figures_html(figures)}</section>" if figures else ""
+def _png(path: Path) -> str | None:
+    """A picture as text; None where there is none."""
+    return _base64(path.read_bytes()) if path.exists() else None
 
 
-def _tables(parameters: Sequence[Parameter], results: Mapping[str, object]) -> str:
-    first = "".join(
-        f'<tr><td class="name">{html.escape(p.name)}</td>{_value(p.value, p.unit)}<td>{html.escape(p.meaning)}</td></tr>'
-        for p in parameters
-    )
-    named = {key: name_and_unit(key) for key in results}
-    second = "".join(
-        f"<tr><td>{html.escape(name)}</td>{_value(results[key], unit)}</tr>" for key, (name, unit) in named.items()
-    )
-    tables = {"Parameters": first, "Results": second}
-    parts = "".join(f"<div><h2>{name}</h2><table>{rows}</table></div>" for name, rows in tables.items() if rows)
-    return f'<section class="tables">{parts}</section>' if parts else ""
-
-
-def _value(value: object, unit: str) -> str:
-    text = shown(value)
-    # Only what is short may keep a column from becoming narrow.
-    kind = "number" if len(text) < 18 else "long"
-    return f'<td class="{kind}">{html.escape(text)}</td><td>{"" if unit == "-" else f"[{html.escape(unit)}]"}</td>'
+def _is_number(text: str) -> bool:
+    return text.lstrip("≤≥= −-")[:1].isdigit() or text == "–"
 
 
 def shown(value: object) -> str:

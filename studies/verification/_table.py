@@ -11,8 +11,7 @@ from pathlib import Path
 
 from _case import Result
 from common.parameters import Parameter
-from common.report import Report, save_report
-from common.report_sections import Section
+from common.report import Report, Section, save_report
 from common.summary import versions
 from PIL import Image
 
