@@ -36,6 +36,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do what the command line says; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words:
+        parser().print_help(sys.stderr)
+        return 2
     runs = words[:1] == ["run"]
     a = parser().parse_args(words[:1] if runs else words)
     try:
@@ -76,8 +79,11 @@ def run_study(words: list[str]) -> int:
     script = find.study_path(words[0])
     if script is None:
         raise ValueError(f"there is no study '{words[0]}', expected one of these, or the path of a script:\n{listed()}")
-    if importlib.util.find_spec("dolfinx") is None:
-        raise ValueError(f"{sys.executable} cannot import dolfinx, which studies need; see docs/guide/installation.md")
+    for name in ("dolfinx", "h5py"):
+        if importlib.util.find_spec(name) is None:
+            raise ValueError(
+                f"{sys.executable} cannot import {name}, which studies need; see docs/guide/installation.md"
+            )
     return run(script, words[1:], ranks)
 
 

@@ -49,6 +49,15 @@ def test_recipe_needs_what_pip_needs(recipe):
     assert {re.split(r"[>=<]", need)[0] for need in wanted} <= needs
 
 
+def test_pip_brings_no_hdf5_beside_that_of_dolfinx():
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    wanted = [
+        *project["dependencies"],
+        *(need for extra in project["optional-dependencies"].values() for need in extra),
+    ]
+    assert not {"h5py", "netcdf4", "tables"} & {re.split(r"[>=<]", need)[0].lower() for need in wanted}
+
+
 def test_dockerfile_names_files_and_options_that_there_are():
     dockerfile = text("packaging/Dockerfile")
     options = set(re.findall(r"-D(TALUS_\w+)=", dockerfile))

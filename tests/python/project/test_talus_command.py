@@ -31,6 +31,12 @@ def talus(folder, *words, **more):
                           timeout=120, env={**ENVIRONMENT, **more})  # fmt: skip
 
 
+def test_without_a_command_it_prints_its_help(tmp_path):
+    refused = talus(tmp_path)
+    assert refused.returncode == 2 and refused.stdout == ""
+    assert refused.stderr.startswith("usage: talus") and "begin a study of your own" in refused.stderr
+
+
 @pytest.fixture
 def begun(tmp_path):
     """A folder with a new study."""
