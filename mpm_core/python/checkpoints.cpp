@@ -1,6 +1,5 @@
 #include "model/state.h"
 #include "parallel/agreement.h"
-#include "parallel/fingerprint.h"
 #include "parallel/redistribution.h"
 #include "python/bindings.h"
 #include "python/checkpoint_checks.h"
@@ -193,7 +192,6 @@ void bind(py::module_& m)
   m.def("checkpoint_arrays", &checkpoint_arrays<G>);
   m.def("checkpoint_widths", &checkpoint_widths<G>);
   m.def("restore", &restore<G>);
-  m.def("mesh_fingerprint", [](const Model<G>& model) { return mesh_fingerprint(model.exchange.comm, model.mesh); });
 }
 } // namespace
 

@@ -18,7 +18,7 @@ from .collective import collectively
 from .collisions import set_collisions
 from .contact import require_surfaces, set_contacts
 from .description import parsed
-from .fingerprint import fingerprint
+from .fingerprint import fingerprint, mesh_fingerprint
 from .step_control import StepControl
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def _description(model: Model) -> dict[str, Any]:
         "dimension": model.mesh.dim,
         "geometry": model.geometry.name,
         "velocity_fields": model._velocity_fields,
-        "mesh": f"fingerprint {_core.mesh_fingerprint(core):016x}",
+        "mesh": f"fingerprint {mesh_fingerprint(model.mesh):016x}",
         "materials": [_material(law) for law in model.laws],
         "gravity": list(core.gravity),
         "gravity_ramp": core.gravity_ramp,

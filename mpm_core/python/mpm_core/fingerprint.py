@@ -1,4 +1,4 @@
-"""A text that differs between any two objects written in Python: their loaded code and their values.
+"""A text that differs between any two objects written in Python, by their loaded code and their values; a number for a mesh.
 
 Loaded code rather than source: the file may have changed since, and a class typed at a prompt has none. Code of libraries
 counts by its name.
@@ -11,9 +11,14 @@ import hashlib
 import sys
 import sysconfig
 import types
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
 
 _LIBRARIES = tuple(
     {sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")} | {"/usr/lib/python3"}
@@ -161,3 +166,32 @@ def _names(code: types.CodeType) -> set[str]:
     """Names that code uses, and code within it."""
     inner = [_names(constant) for constant in code.co_consts if isinstance(constant, types.CodeType)]
     return set(code.co_names).union(*inner)
+
+
+def mesh_fingerprint(mesh: Mesh) -> int:
+    """A hash of points, cells, tags and numbers of a mesh; it does not depend on the partition. Collective."""
+    n = mesh.owned_cells
+    nodes = np.zeros(len(mesh.points), np.uint64)
+    for x in mesh.points.T:
+        nodes = _scrambled(nodes ^ _words(x + 0.0))  # + 0.0 makes one zero of the two
+    corners = _scrambled(nodes)[mesh.cells[:n]]
+    facets = _scrambled(_words(mesh._core.facet_tags[:n].astype(np.int64)))
+    # Sums, because neither the order of cells nor that of a cell's vertices is the same on all partitions.
+    cells = (corners + _scrambled(nodes[mesh.cells[:n]] ^ facets)).sum(axis=1, dtype=np.uint64)
+    cells = _scrambled(cells ^ _words(mesh.cell_tags[:n].astype(np.int64)))
+    cells = _scrambled(cells ^ _scrambled(_words(mesh.global_cells[:n])))
+    total = np.empty(1, np.uint64)
+    mesh.comm.Allreduce(cells.sum(keepdims=True, dtype=np.uint64), total, MPI.SUM)
+    return int(total[0])
+
+
+def _words(values: NDArray[Any]) -> NDArray[np.uint64]:
+    return np.ascontiguousarray(values).view(np.uint64)
+
+
+def _scrambled(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Words each of whose bits depends on all bits of the given one (splitmix64; Steele, Lea & Flood 2014)."""
+    z = z + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
