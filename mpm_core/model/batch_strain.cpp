@@ -21,14 +21,14 @@ inline void prefetch(const T& object)
   for (std::size_t at = 0; at < sizeof(T); at += 64)
     __builtin_prefetch(bytes + at);
 }
-} // namespace
 
-template <class G, int D>
+/// The motions of the runs of a batch.
+/// @param velocity_of  what vertex k of a cell strains it with; a callable (Index, int) -> Vector<D>
+template <class G, class VelocityOf, int D = G::dim>
 void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                  const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+                  const PassOptions& options, const Batch& batch, VelocityOf&& velocity_of, BatchScratch<D>& scratch)
 {
   const auto change = [&](Index i) -> const Vector<D>& { return field.velocity_change[i]; };
-  const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const Index cell = runs[r].cell;
@@ -38,12 +38,20 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
       prefetch(mesh.shapes[next]);
       prefetch(field.moments[next]);
     }
-    AffineField<D> fields[]{affine_field<D>(mesh, cell, change), affine_field<D>(mesh, cell, velocity)};
-    if (field.has_light_nodes) [[unlikely]]
-      fields[1] = affine_field_of_vertices<D>(mesh.shapes[cell],
-                                              [&](int k) { return velocity_of_vertex(mesh, field, cell, k); });
-    scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, fields[0], scaled<D>(fields[1], options.dt)};
+    const AffineField<D> velocity =
+        affine_field_of_vertices<D>(mesh.shapes[cell], [&](int k) { return velocity_of(cell, k); });
+    scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, affine_field<D>(mesh, cell, change),
+                                           scaled<D>(velocity, options.dt)};
   }
+}
+} // namespace
+
+template <class G, int D>
+void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
+                  const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
+{
+  with_velocity_of_vertices(
+      mesh, field, [&](auto&& velocity_of) { find_motions(mesh, field, runs, options, batch, velocity_of, scratch); });
 }
 
 namespace

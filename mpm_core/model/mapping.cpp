@@ -38,21 +38,22 @@ double mean_of(const Working<G>& stress)
   double sum = 0;
   for (int k : normal_component<G>)
     sum += stress[k];
-  return sum / G::n_normal;
+  return sum * (1.0 / G::n_normal);
 }
 
 /// Averages over nodes the mean stress times volume of filled cells.
 /// @post integration.mean_stress_of_cell has what was averaged, for `change_by_averaging`
-template <class G, class StressOf>
+/// @param integral_of  mean stress times volume of a cell; a callable Index -> double
+template <class G, class IntegralOf>
 void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
-                         StressOf&& stress_of)
+                         IntegralOf&& integral_of)
 {
   field.mean_stress.resize(mesh.points.size());
   auto& own = field.integration.mean_stress_of_cell; // kept for what follows, since moments are far apart in memory
   own.resize(static_cast<std::size_t>(mesh.owned_cells));
   const auto volume_of = [&](Index c) { return own[c].volume = integrated_volume(mesh, field, c); };
-  const auto integral_of = [&](Index c, double) { return own[c].value = mean_of<G>(stress_of(c)); };
-  average_over_nodes(mesh, field.part, volume_of, integral_of, exchange, field.mean_stress);
+  const auto keep_integral = [&](Index c, double) { return own[c].value = integral_of(c); };
+  average_over_nodes(mesh, field.part, volume_of, keep_integral, exchange, field.mean_stress);
 }
 
 /// By how much averaging changes the mean stress times volume of a filled cell.
@@ -63,14 +64,15 @@ double change_by_averaging(const Mesh<D>& mesh, const VelocityField<G>& field, I
   return volume * mean_of_nodes<D>(mesh.cells[cell], field.mean_stress) - integral;
 }
 
-/// The fraction of averaging in each cell, the least of its soils; none where all are averaged in full.
+/// The fraction of averaging in each cell, the least of its soils; one for all cells where all laws have the same.
 template <class G, int D = G::dim>
 void find_averaged_fractions(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field)
 {
   CellIntegration<D>& integration = field.integration;
   const auto& by_law = integration.averaged_by_law;
   integration.averaged_of_cell.clear();
-  if (std::ranges::all_of(by_law, [](double fraction) { return fraction == 1; }))
+  integration.averaged_everywhere = by_law.front();
+  if (std::ranges::all_of(by_law, [&](double fraction) { return fraction == by_law.front(); }))
     return;
   integration.averaged_of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
   for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
@@ -86,15 +88,9 @@ void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const 
                              VelocityField<G>& field)
 {
   find_averaged_fractions(mesh, runs, field);
-  const auto& fraction = field.integration.averaged_of_cell;
-  const auto stress_of = [&](Index c)
-  {
-    Working<G> stress = integrated_stress(mesh, field, c);
-    for (double& component : stress)
-      component *= fraction.empty() ? 1 : fraction[c];
-    return stress;
-  };
-  average_mean_stress<G>(mesh, exchange, field, stress_of);
+  average_mean_stress<G>(
+      mesh, exchange, field,
+      [&](Index c) { return averaged_fraction(field.integration, c) * mean_of<G>(integrated_stress(mesh, field, c)); });
 }
 } // namespace
 
@@ -205,26 +201,31 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
   const bool known = !field.integration.averaged_by_law.empty();
   const auto volume_of = [&](Index c)
   { return known ? field.integration.mean_stress_of_cell[c].volume : integrated_volume(mesh, field, c); };
-  const auto strain_of = [&](Index c, double volume)
-  {
-    double divergence = 0;
-    for (int k = 0; k <= D; ++k)
-    {
-      const Vector<D> v = velocity_of_vertex(mesh, field, c, k);
-      divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
-      if constexpr (G::has_hoop)
-        divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
-    }
-    return dt * divergence * volume;
-  };
-  average_over_nodes(mesh, field.part, volume_of, strain_of, exchange, field.volumetric_strain);
+  with_velocity_of_vertices(mesh, field,
+                            [&](auto&& velocity_of)
+                            {
+                              const auto strain_of = [&](Index c, double volume)
+                              {
+                                double divergence = 0;
+                                for (int k = 0; k <= D; ++k)
+                                {
+                                  const Vector<D>& v = velocity_of(c, k);
+                                  divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
+                                  if constexpr (G::has_hoop)
+                                    divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
+                                }
+                                return dt * divergence * volume;
+                              };
+                              average_over_nodes(mesh, field.part, volume_of, strain_of, exchange,
+                                                 field.volumetric_strain);
+                            });
 }
 
 template <class G, int D>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress)
 {
-  average_mean_stress<G>(mesh, exchange, field, [&](Index c) -> const Working<G>& { return stress[c]; });
+  average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(stress[c]); });
   for (Index c : field.part.cells)
   {
     if (field.integration.mean_stress_of_cell[c].volume == 0)

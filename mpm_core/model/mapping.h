@@ -50,6 +50,18 @@ inline Vector<G::dim> velocity_of_vertex(const Mesh<G::dim>& mesh, const Velocit
   return field.velocity[node];
 }
 
+/// Calls work with `velocity_of_vertex`, a callable (cell, k) -> Vector<D>, decided once for all cells on whether the
+/// field may have light nodes.
+template <class G, class Work>
+inline void with_velocity_of_vertices(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Work&& work)
+{
+  using Velocity = Vector<G::dim>;
+  if (field.has_light_nodes) [[unlikely]]
+    work([&](Index cell, int k) -> Velocity { return velocity_of_vertex(mesh, field, cell, k); });
+  else
+    work([&](Index cell, int k) -> const Velocity& { return field.velocity[mesh.cells[cell][k]]; });
+}
+
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.
 template <class G>
 void find_start_velocity(VelocityField<G>& field);
@@ -75,15 +87,21 @@ template <class G, int D = G::dim>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
 
+/// The fraction of nodal mixed discretisation in a cell.
+template <int D>
+inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)
+{
+  return integration.averaged_of_cell.empty() ? integration.averaged_everywhere : integration.averaged_of_cell[cell];
+}
+
 /// Volumetric strain of a cell after nodal mixed discretisation.
 /// @param own  of the cell before
 /// @pre average_strains has been called for the field
 template <class G, int D = G::dim>
 double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, double own)
 {
-  const auto& fraction = field.integration.averaged_of_cell;
   const double mean = mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain);
-  return fraction.empty() ? mean : own + fraction[cell] * (mean - own);
+  return own + averaged_fraction(field.integration, cell) * (mean - own);
 }
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.

@@ -35,8 +35,9 @@ struct CellIntegration
   /// By law: fraction of nodal mixed discretisation in a cell with its soil alone, of its strains and, by their
   /// transpose, of its forces. Empty where strains are averaged in full, and forces not.
   std::vector<double> averaged_by_law;
+  double averaged_everywhere = 1;              ///< the fraction in all cells, where all laws have the same
+  std::vector<double> averaged_of_cell;        ///< per owned cell: the least of its soils; empty where as above
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
-  std::vector<double> averaged_of_cell;        ///< per owned cell: the least of its soils; empty as above
   std::vector<std::array<double, 2>> fills;    ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
   std::vector<DualStress<D>> dual_cells, dual_nodes; ///< with dual domains, as are the mean gradients of nodes
