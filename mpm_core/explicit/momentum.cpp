@@ -12,11 +12,11 @@ void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt,
   {
     const NodeSums<D>& node = field.nodes[i];
     const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
+    const Vector<D> residual = unbalanced_force<D>(node, gravity);
     for (int a = 0; a < D; ++a)
     {
-      const double residual = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-      const double drag = local_damping(damping, residual, node.mass * field.start_velocity[i][a], dt);
-      field.acceleration[i][a] = (residual - drag) * per_mass;
+      const double drag = local_damping(damping, residual[a], node.mass * field.start_velocity[i][a], dt);
+      field.acceleration[i][a] = (residual[a] - drag) * per_mass;
     }
   }
   for (const Support<D>& support : field.supports)
@@ -66,12 +66,9 @@ struct NodeWork
 template <class G, int D = G::dim>
 inline NodeWork<D> work_of_node(const VelocityField<G>& field, Index i, const Vector<G::dim>& gravity, double dt)
 {
-  NodeWork<D> work;
+  NodeWork<D> work{external_force<D>(field.nodes[i], gravity), {}};
   for (int a = 0; a < D; ++a)
-  {
-    work.external[a] = field.nodes[i].traction[a] + field.nodes[i].mass * gravity[a];
     work.displacement[a] = 0.5 * dt * (field.start_velocity[i][a] + field.velocity[i][a]);
-  }
   return work;
 }
 

@@ -8,11 +8,11 @@ std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const
 {
   std::vector<Vector<D>> external(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
-    for (int a = 0; a < D; ++a)
-    {
-      const double load = nodes[i].traction[a] + nodes[i].mass * gravity[a];
-      external[i][a] = load_fraction == 1 ? load : nodes[i].internal[a] + load_fraction * (load - nodes[i].internal[a]);
-    }
+  {
+    external[i] = external_force<D>(nodes[i], gravity);
+    for (int a = 0; a < D && load_fraction != 1; ++a)
+      external[i][a] = nodes[i].internal[a] + load_fraction * (external[i][a] - nodes[i].internal[a]);
+  }
   return external;
 }
 

@@ -83,16 +83,6 @@ int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const I
   return facets;
 }
 
-/// What is left of the forces at a node, and would accelerate it.
-template <int D>
-Vector<D> residual_of(const NodeSums<D>& node, const Vector<D>& gravity)
-{
-  Vector<D> residual;
-  for (int a = 0; a < D; ++a)
-    residual[a] = node.traction[a] + node.mass * gravity[a] - node.internal[a];
-  return residual;
-}
-
 /// Adds entries for the nodes of the sides beside one free field, or of those of the incoming wave.
 /// @throws InputError on all ranks: a side without soil
 /// @note Collective
@@ -221,7 +211,7 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
   for_each_node<D>(field.dashpots,
                    [&](std::span<DashpotNode<D>> entries)
                    {
-                     const Vector<D> residual = residual_of<D>(field.nodes[entries[0].node], gravity);
+                     const Vector<D> residual = unbalanced_force<D>(field.nodes[entries[0].node], gravity);
                      for (int a = 0; a < D; ++a)
                        entries[0].held[a] = -residual[a];
                    });
@@ -240,7 +230,7 @@ void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity,
                      NodeSums<D>& node = field.nodes[i];
                      if (is_light(field, i))
                        return;
-                     const Vector<D> residual = residual_of<D>(node, gravity);
+                     const Vector<D> residual = unbalanced_force<D>(node, gravity);
                      const Vector<D> found =
                          acceleration<G, D>(entries, beside, node.mass, dt, residual, field.start_velocity[i]);
                      for (int a = 0; a < D; ++a)

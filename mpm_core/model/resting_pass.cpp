@@ -24,14 +24,6 @@ struct RestingScratch
   alignas(64) double strain[n_stress<D>][batch_size + lanes];
 };
 
-/// Entries of a column side by side; beyond a batch there are those of the next cells.
-inline Lanes entries(const double* column)
-{
-  Lanes numbers;
-  std::memcpy(&numbers, column, sizeof(Lanes));
-  return numbers;
-}
-
 /// Gradient of the displacement over dt of `lanes` cells.
 template <class G, int D = G::dim>
 std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>& field, double dt, std::size_t first)
@@ -51,7 +43,7 @@ std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>
     {
       const Lanes relative = dt * (at(k + 1) - u);
       for (int b = 0; b < D; ++b)
-        gradient[a][b] += relative * entries(&field.resting.gradient[k * D + b][first]);
+        gradient[a][b] += relative * load(&field.resting.gradient[k * D + b][first]);
     }
   }
   return gradient;
@@ -68,7 +60,7 @@ void change_rows(const std::array<double*, N>& columns, Index first, Index last,
     change(piece, static_cast<std::size_t>(i - first));
     for (std::size_t k = 0; k < N; ++k)
       if (count == lanes)
-        std::memcpy(columns[k] + i, &piece[k], sizeof(Lanes));
+        store(piece[k], columns[k] + i);
       else
         for (int l = 0; l < count; ++l)
           columns[k][i + l] = piece[k][l];
@@ -115,11 +107,11 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
     for (int k = 0; k < S; ++k)
     {
       increment[k] = strain.increment[stress_component<D>[k]];
-      std::memcpy(scratch.strain[stress_component<D>[k]] + i, &increment[k], sizeof(Lanes));
+      store(increment[k], scratch.strain[stress_component<D>[k]] + i);
     }
-    std::memcpy(scratch.volumetric + i, &strain.volumetric, sizeof(Lanes));
+    store(strain.volumetric, scratch.volumetric + i);
     for (int k = 0; k < D * D; ++k)
-      std::memcpy(scratch.gradient[k] + i, &gradient[k / D][k % D], sizeof(Lanes));
+      store(gradient[k / D][k % D], scratch.gradient[k] + i);
     work_before += work<G>(piece, piece[S], increment, batch.last - batch.first - static_cast<Index>(i));
     turn<D>(piece, strain.rotation);
     piece[S] *= 1 + strain.volumetric;
@@ -138,7 +130,7 @@ void add_forces(const std::array<Lanes, n_symmetric<D>>& stress, std::size_t fir
   for (int k = 0; k < D; ++k)
     for (int b = 0; b < D; ++b)
     {
-      const Lanes gradient = entries(&resting.gradient[k * D + b][first]);
+      const Lanes gradient = load(&resting.gradient[k * D + b][first]);
       for (int a = 0; a < D; ++a)
         force[k + 1][a] += stress[symmetric_index<D>(a, b)] * gradient;
     }
@@ -174,7 +166,7 @@ double integrate_batch(const Particles<D>& particles, const Batch& batch, const 
     std::array<Lanes, S> increment, stress;
     for (int k = 0; k < S; ++k)
     {
-      increment[k] = entries(scratch.strain[stress_component<D>[k]] + i);
+      increment[k] = load(scratch.strain[stress_component<D>[k]] + i);
       stress[k] = piece[k] * piece[S];
     }
     work_after += work<G>(piece, piece[S], increment, count);

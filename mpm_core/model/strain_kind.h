@@ -32,11 +32,8 @@ inline double half_work(const double (&stress)[n_stress<D>][batch_size], const B
   {
     const LaneMask mine = number < static_cast<std::int64_t>(runs - r); // the lanes beyond hold what was there before
     for (std::size_t k = 0; k < G::n_working; ++k)
-    {
-      Lanes of_runs;
-      std::memcpy(&of_runs, stress[k] + r, sizeof(Lanes));
-      sum += mine ? of_runs * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
-    }
+      sum +=
+          mine ? transfer::load(stress[k] + r) * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
   }
   return 0.5 * transfer::sum(sum);
 }

@@ -27,6 +27,17 @@ using LaneMask [[gnu::vector_size(lanes * sizeof(double))]] = std::int64_t;
 /// How many particles ahead memory is asked for: some more than a batch, whose columns are read one after another.
 inline constexpr int particles_ahead = 320;
 
+/// The entries of a column from here on.
+inline Lanes load(const double* column)
+{
+  Lanes numbers;
+  std::memcpy(&numbers, column, sizeof(Lanes));
+  return numbers;
+}
+
+/// Writes them there.
+inline void store(const Lanes& numbers, double* column) { std::memcpy(column, &numbers, sizeof(Lanes)); }
+
 /// Entries of N columns
 template <std::size_t N>
 using Piece = std::array<Lanes, N>;
@@ -37,7 +48,7 @@ inline Piece<N> load(const std::array<T*, N>& columns, Index first)
 {
   Piece<N> piece;
   for (std::size_t k = 0; k < N; ++k)
-    std::memcpy(&piece[k], columns[k] + first, sizeof(Lanes));
+    piece[k] = load(columns[k] + first);
   return piece;
 }
 
@@ -71,10 +82,10 @@ inline void change_lanes(const std::array<double*, N>& columns, Index first, Ind
           columns[k][first + l] = piece[k][l];
     return;
   }
-  const auto store = [&columns](const Piece<N>& piece, Index to)
+  const auto store_piece = [&columns](const Piece<N>& piece, Index to)
   {
     for (std::size_t k = 0; k < N; ++k)
-      std::memcpy(columns[k] + to, &piece[k], sizeof(Lanes));
+      store(piece[k], columns[k] + to);
   };
   Piece<N> tail = load(columns, last - lanes);
   Index i = first;
@@ -85,12 +96,12 @@ inline void change_lanes(const std::array<double*, N>& columns, Index first, Ind
       for (std::size_t k = 0; k < N; ++k)
         __builtin_prefetch(columns[k] + i + particles_ahead, 1);
     change(piece);
-    store(piece, i);
+    store_piece(piece, i);
   }
   if (i == last)
     return;
   change(tail);
-  store(tail, last - lanes);
+  store_piece(tail, last - lanes);
 }
 
 /// Calls `add(piece, mine)` on the entries [first, last) of the columns, piece by piece, each entry being `mine` once.

@@ -20,6 +20,26 @@ struct NodeSums
   Vector<D> traction; ///< the part of f_ext,i (15) that boundary particles carry
 };
 
+/// f_ext of a node under gravity [m/s2], with the tractions and the weight.
+template <int D>
+inline Vector<D> external_force(const NodeSums<D>& node, const Vector<D>& gravity)
+{
+  Vector<D> force;
+  for (int a = 0; a < D; ++a)
+    force[a] = node.traction[a] + node.mass * gravity[a];
+  return force;
+}
+
+/// f_ext - f_int of a node under gravity [m/s2]
+template <int D>
+inline Vector<D> unbalanced_force(const NodeSums<D>& node, const Vector<D>& gravity)
+{
+  Vector<D> force = external_force<D>(node, gravity);
+  for (int a = 0; a < D; ++a)
+    force[a] -= node.internal[a];
+  return force;
+}
+
 /// f_int of vertex k of a cell: B^T sum V_p sigma_p, from the sum and the gradient of its shape function
 template <class G, int D = G::dim>
 inline Vector<D> internal_force(const Working<G>& stress, const CellShape<D>& shape, int k)
