@@ -206,12 +206,8 @@ void add_squares(const VelocityField<G>& field, SumsOf&& sums_of, std::span<cons
     const NodeSums<D> node = sums_of(i);
     if (!owned[i] || is_light(field, static_cast<Index>(i)))
       continue;
-    Vector<D> external, unbalanced;
-    for (int a = 0; a < D; ++a)
-    {
-      external[a] = node.traction[a] + node.mass * gravity[a];
-      unbalanced[a] = external[a] - node.internal[a];
-    }
+    const Vector<D> external = external_force<D>(node, gravity);
+    Vector<D> unbalanced = unbalanced_force<D>(node, gravity);
     if (support != field.supports.end() && support->node == static_cast<Index>(i))
     {
       Support<D> held = *support;
@@ -267,20 +263,29 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
 }
 
 template <class G>
-double critical_time_step(const Model<G>& model)
+CriticalParticle critical_particle(const Model<G>& model)
 {
   constexpr int D = G::dim;
-  double squared = std::numeric_limits<double>::infinity();
+  CriticalParticle found;
   for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
     for (const Run& run : points.runs)
     {
       const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
       const double modulus = p_wave_modulus(points.laws[run.material]);
-      double fastest = 0;
       for (Index p = run.first; p < run.last; ++p)
-        fastest = std::max(fastest, wave_squared(model, p, modulus));
-      squared = std::min(squared, h * h / fastest);
+      {
+        const double squared = h * h / wave_squared(model, p, modulus);
+        if (squared < found.squared_time)
+          found = {p, h, squared};
+      }
     }
+  return found;
+}
+
+template <class G>
+double critical_time_step(const Model<G>& model)
+{
+  double squared = critical_particle(model).squared_time;
   MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
   return std::sqrt(squared);
 }
@@ -293,6 +298,7 @@ double pic_fraction_of_step(double fraction, double dt, double critical)
 #define INSTANTIATE(G)                                                                                                 \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
   template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
+  template CriticalParticle critical_particle(const Model<G>&);                                                        \
   template double critical_time_step(const Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -263,6 +263,13 @@ void bind_model(py::module_& m, const std::string& suffix)
              prepare(model);
              return critical_time_step(model);
            })
+      .def("critical_particle",
+           [](M& model)
+           {
+             prepare(model);
+             const CriticalParticle found = critical_particle(model);
+             return std::tuple(found.particle, found.altitude, std::sqrt(found.squared_time));
+           })
       .def("out_of_balance",
            [](M& model, const Vector<D>& gravity)
            {

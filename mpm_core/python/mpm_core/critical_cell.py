@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ._core import InputError
 
 if TYPE_CHECKING:
-    from .mesh import Mesh
     from .model import Model
 
 
@@ -24,7 +20,7 @@ class CriticalCell(NamedTuple):
     altitude: float
     """Smallest altitude h_min of the cell [m]"""
     wave_speed: float
-    """Speed c_d of the compression wave (17) [m/s]"""
+    """Speed c_d of the compression wave (17) [m/s]; of the fast wave where water has its own velocity"""
     material: int
     """Number of the law"""
     time_step: float
@@ -40,29 +36,16 @@ def critical_cell(model: Model) -> CriticalCell:
     Note:
         Collective; the answer is the same on all ranks.
     """
-    p, mesh, comm = model.particles, model.mesh, model.comm
-    found = None
-    if len(p):
-        modulus = np.array([law.p_wave_modulus for law in model.laws])[p.material]
-        speed = np.sqrt(modulus * p.volume / p.mass)
-        cells, where = np.unique(p.cell, return_inverse=True)
-        altitude = _altitudes(mesh, cells)[where]
-        k = int(np.argmin(altitude / speed))
-        found = CriticalCell(
-            int(mesh.global_cells[p.cell[k]]), tuple(map(float, mesh.points[mesh.cells[p.cell[k]]].mean(axis=0))),
-            float(altitude[k]), float(speed[k]), int(p.material[k]), float(altitude[k] / speed[k]),
-        )  # fmt: skip
-    of_ranks = [cell for cell in comm.allgather(found) if cell is not None]
+    k, altitude, time_step = model._core.critical_particle()
+    found, p, mesh = None, model.particles, model.mesh
+    if k >= 0:
+        cell = p.cell[k]
+        centre = tuple(map(float, mesh.points[mesh.cells[cell]].mean(axis=0)))
+        number, material = int(mesh.global_cells[cell]), int(p.material[k])
+        found = CriticalCell(number, centre, altitude, altitude / time_step, material, time_step)
+    of_ranks = [cell for cell in model.comm.allgather(found) if cell is not None]
     if not of_ranks:
         raise InputError(
             "the model has no particles, expected some before asking for the cell of the critical time step"
         )
     return min(of_ranks, key=lambda cell: (cell.time_step, cell.number))
-
-
-def _altitudes(mesh: Mesh, cells: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Smallest altitude of some cells [m]: one over the largest gradient of their shape functions."""
-    corners = mesh.points[mesh.cells[cells]]
-    gradients = np.linalg.inv(corners[:, 1:] - corners[:, :1])  # a column for each node but the first
-    first = -gradients.sum(axis=2, keepdims=True)
-    return 1 / np.linalg.norm(np.concatenate([first, gradients], axis=2), axis=1).max(axis=1)

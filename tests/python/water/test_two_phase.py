@@ -277,3 +277,5 @@ def test_the_step_is_that_of_the_fast_wave():
     list(model.explicit(1e-9))
     altitude = 0.05 / np.sqrt(2)  # of a square of 0.05 m cut in two
     assert model.critical_time_step() == pytest.approx(altitude / waves.fast, rel=1e-6)
+    found = mpm.critical_cell(model)
+    assert (found.altitude, found.wave_speed) == pytest.approx((altitude, waves.fast), rel=1e-6)
