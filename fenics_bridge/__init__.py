@@ -30,6 +30,7 @@ from fenics_bridge.mesh.names import name_tags, names_of
 from fenics_bridge.mesh.slope_mesh import BASE, CREST, EMPTY, LEFT, RIGHT, SLOPE, SOIL, TOP, slope_mesh
 from fenics_bridge.mesh.soil import soil_mesh
 from fenics_bridge.transfer.comparison import Difference, compare
+from fenics_bridge.transfer.far_field import FarField
 from fenics_bridge.transfer.handover import Handover, initialise
 from fenics_bridge.transfer.particle_safety import ParticleSafety, particle_safety
 from fenics_bridge.transfer.particle_site import ParticleSite, apply_supports
@@ -37,8 +38,8 @@ from fenics_bridge.transfer.particle_site import ParticleSite, apply_supports
 # fmt: off
 __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
-    "ElasticSolution", "EquilibriumReport", "FemSite", "Geometry", "Handover", "InputError", "Load", "LoadStep", "LogSpiral",
-    "MixedQuasiStatic", "ParticleSafety", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage",
+    "ElasticSolution", "EquilibriumReport", "FarField", "FemSite", "Geometry", "Handover", "InputError", "Load", "LoadStep",
+    "LogSpiral", "MixedQuasiStatic", "ParticleSafety", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage",
     "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "box_mesh",
     "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",
     "factor_of_safety", "fixed", "flat_normal", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky",

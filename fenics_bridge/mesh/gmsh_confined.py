@@ -14,6 +14,7 @@ import sys
 import threading
 from pathlib import Path
 
+import gmsh  # noqa: F401  # loaded at once: it starts programs, which are forbidden later
 import gmsh_reader  # type: ignore[import]  # beside this file, which is started as a script
 import numpy as np
 

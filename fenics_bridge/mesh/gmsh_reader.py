@@ -6,8 +6,10 @@ Nothing of this package is imported here, so that such a process starts quickly 
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import re
 import signal
+import sys
 
 import numpy as np
 
@@ -22,8 +24,18 @@ def _own_ctrl_c():
         signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
 
 
-with _own_ctrl_c():
-    import gmsh
+def _imported_when_used(name):
+    """Module that is loaded when one of its attributes is first used: gmsh takes a fifth of a second."""
+    spec = importlib.util.find_spec(name) if name not in sys.modules else None
+    if spec is None or spec.loader is None:
+        return importlib.import_module(name)
+    spec.loader = importlib.util.LazyLoader(spec.loader)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+gmsh = _imported_when_used("gmsh")
 
 _SIMPLEX = {2: "triangles", 3: "tetrahedra"}
 _GMSH_SIMPLEX = {1: 1, 2: 2, 3: 4}  # dimension -> element type of the linear simplex in gmsh

@@ -96,16 +96,6 @@ def _checked(height, angle, crest, cell_size, runout, headroom, depth):
     return height, crest, crest + slope_length, cell_size, runout, headroom, depth
 
 
-def _multiple(name, value, cell_size):
-    count = round(value / cell_size)
-    if abs(count * cell_size - value) > 1e-9 * value:
-        raise InputError(
-            f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
-            "needs; use kind='gmsh'"
-        )
-    return count
-
-
 def _crossed(height, crest, base, size, runout, headroom, depth):
     _require_multiple("height", height, size)
     _require_multiple("crest", crest, size)

@@ -6,6 +6,7 @@
 #include "materials/laws/association.h"
 #include "model/absorbing.h"
 #include "model/contacts.h"
+#include "model/far_field.h"
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
@@ -254,9 +255,18 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
 {
   std::array<double, 3> squares{};
   for (const VelocityField<G>& field : model.fields)
-    add_squares(
-        field, [&](std::size_t i) { return has_two_phases(model) ? sums_of_phases(model, i) : field.nodes[i]; },
-        model.exchange.owned, gravity, squares);
+  {
+    std::vector<Vector<G::dim>> beyond(field.nodes.size());
+    add_far_field_forces<G::dim>(field.far_field, gravity, beyond);
+    const auto sums_of = [&](std::size_t i)
+    {
+      NodeSums<G::dim> node = has_two_phases(model) ? sums_of_phases(model, i) : field.nodes[i];
+      for (int a = 0; a < G::dim; ++a)
+        node.traction[a] += beyond[i][a];
+      return node;
+    };
+    add_squares(field, sums_of, model.exchange.owned, gravity, squares);
+  }
   MPI_Allreduce(MPI_IN_PLACE, squares.data(), 3, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   const double acting = squares[1] > 0 ? squares[1] : squares[2];
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;

@@ -6,10 +6,9 @@ namespace mpm::implicit
 {
 template <class G, int D>
 void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
-                              CooEntries& entries)
+                              BlockEntries& entries)
 {
-  Writer writer(entries);
-  writer.expect(step.cells.size() * (D + 1) * (D + 1) * D);
+  BlockSum sum(entries, {system.unknowns, 1}, system.number);
   for (Index c : step.cells)
   {
     for (int k = 0; k <= D; ++k)
@@ -17,18 +16,20 @@ void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, 
       Vector<D> force = product<D>(projector(system, mesh.cells[c][k]),
                                    internal_force<G>(step.tangents[c].by_volumetric, mesh.shapes[c], k));
       for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
+      {
+        double* block = sum.next(mesh.cells[c][k], mesh.cells[c][l]);
         for (int a = 0; a < D; ++a)
-          writer.add(D * system.number[mesh.cells[c][k]] + a, system.number[mesh.cells[c][l]], force[a] / (D + 1));
+          block[a] += force[a] / (D + 1);
+      }
     }
   }
 }
 
 template <class G, int D>
 void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitSystem<D>& system,
-                               CooEntries& entries)
+                               BlockEntries& entries)
 {
-  Writer writer(entries);
-  writer.expect(system.cells.size() * (D + 1) * (D + 1) * D);
+  BlockSum sum(entries, {1, system.unknowns}, system.number);
   for (Index c : system.cells)
     for (int k = 0; k <= D; ++k)
     {
@@ -38,19 +39,18 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
       {
         const Index other = mesh.cells[c][l];
         const Vector<D> change = product<D>(projector(system, other), dilation_gradient<G>(mesh.shapes[c], l));
+        double* block = sum.next(node, other);
         for (int b = 0; b < D; ++b)
-          writer.add(system.number[node], D * system.number[other] + b, weight * change[b]);
+          block[b] += weight * change[b];
       }
     }
 }
 
 template <class G, int D>
 void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
-                         CooEntries& by_displacement, CooEntries& by_strain)
+                         BlockEntries& by_displacement, BlockEntries& by_strain)
 {
-  Writer displacement(by_displacement), strain(by_strain);
-  displacement.expect(step.cells.size() * (D + 1) * (D + 1) * D);
-  strain.expect(step.cells.size() * (D + 1) * (D + 1));
+  BlockSum displacement(by_displacement, {1, system.unknowns}, system.number), strain(by_strain, {1, 1}, system.number);
   for (Index c : step.cells)
   {
     const CellTangent<G>& tangent = step.tangents[c];
@@ -65,10 +65,11 @@ void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const
       change = product<D>(projector(system, other), change);
       for (int k = 0; k <= D; ++k)
       {
-        const GlobalIndex row = system.number[mesh.cells[c][k]];
+        const Index row = mesh.cells[c][k];
+        double* block = displacement.next(row, other);
         for (int b = 0; b < D; ++b)
-          displacement.add(row, D * system.number[other] + b, change[b]);
-        strain.add(row, system.number[other], tangent.mean_by_volumetric / ((D + 1) * (D + 1)));
+          block[b] += change[b];
+        *strain.next(row, other) += tangent.mean_by_volumetric / ((D + 1) * (D + 1));
       }
     }
   }
@@ -76,11 +77,11 @@ void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const
 
 #define INSTANTIATE(G)                                                                                                 \
   template void volumetric_force_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,   \
-                                         CooEntries&);                                                                 \
+                                         BlockEntries&);                                                               \
   template void volumetric_strain_entries(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitSystem<G::dim>&, \
-                                          CooEntries&);                                                                \
+                                          BlockEntries&);                                                              \
   template void mean_stress_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, const ImplicitSystem<G::dim>&,        \
-                                    CooEntries&, CooEntries&);
+                                    BlockEntries&, BlockEntries&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

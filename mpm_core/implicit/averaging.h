@@ -11,16 +11,16 @@ namespace mpm::implicit
 /// ...
 template <class G, int D = G::dim>
 void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
-                              CooEntries& entries);
+                              BlockEntries& entries);
 
 /// ... and G = d theta / du, the nodes' averaged volumetric strain; the product has the two-ring stencil.
 template <class G, int D = G::dim>
 void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitSystem<D>& system,
-                               CooEntries& entries);
+                               BlockEntries& entries);
 
 /// Where mean stresses are averaged as well, J gains G^T (L + H G), with these L = d q / du and H = d q / d theta: q_i
 /// is what the nodes' averaged volumetric strains work against, the cells' means of V sigma, shared among their nodes.
 template <class G, int D = G::dim>
 void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
-                         CooEntries& by_displacement, CooEntries& by_strain);
+                         BlockEntries& by_displacement, BlockEntries& by_strain);
 } // namespace mpm::implicit

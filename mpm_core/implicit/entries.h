@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// Entries of the matrices of an implicit step, in coordinate (COO) form.
+/// Entries of the matrices of an implicit step: blocks between nodes.
 
 #include "implicit/system.h"
 
@@ -8,66 +8,109 @@
 
 namespace mpm::implicit
 {
-/// Entries that are added up where rows and columns repeat. Rows may be another rank's.
-struct CooEntries
+/// Blocks of a matrix between nodes. Rows may be another rank's.
+struct BlockEntries
 {
-  std::vector<GlobalIndex> rows, columns;
-  std::vector<double> values;
+  std::array<int, 2> shape{};                    ///< rows and columns of a block
+  std::vector<std::array<GlobalIndex, 2>> nodes; ///< numbers of the nodes of row and column of each block
+  std::vector<double> values;                    ///< of the blocks, row by row
+  std::vector<Index> targets;                    ///< the block that each contribution is added to, in their order
 };
 
-/// Writes the entries of a matrix anew, in order; rows and columns only the first time.
-class Writer
+/// Sums contributions to the blocks of a matrix. The first time it makes the blocks; later times, when the same
+/// contributions come in the same order, it only looks up where they go.
+class BlockSum
 {
 public:
-  explicit Writer(CooEntries& entries) : _entries(entries), _places(entries.rows.empty()) {}
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
-
-  /// Takes memory for more entries; must come before they are added.
-  void expect(std::size_t more)
+  /// @param numbers  of this rank's nodes in the system
+  BlockSum(BlockEntries& entries, std::array<int, 2> shape, std::span<const GlobalIndex> numbers)
+      : _entries(entries), _numbers(numbers), _known(!entries.targets.empty())
   {
-    const std::size_t size = _next + more;
-    grow(_entries.values, size);
-    if (!_places)
-      return;
-    grow(_entries.rows, size);
-    grow(_entries.columns, size);
+    entries.shape = shape;
+    std::ranges::fill(entries.values, 0.0);
+  }
+  BlockSum(const BlockSum&) = delete;
+  BlockSum& operator=(const BlockSum&) = delete;
+
+  /// The block between two nodes to which the next contribution is to be added; valid until the next call.
+  double* next(Index row, Index column)
+  {
+    if (!_known)
+      _entries.targets.push_back(find_or_make(row, _numbers[column]));
+    return target();
   }
 
-  void add(GlobalIndex row, GlobalIndex column, double value)
+  /// The same for nodes by their numbers, of which this rank may not have either; each contribution has its own block.
+  double* next_apart(GlobalIndex row, GlobalIndex column)
   {
-    _entries.values[_next] = value;
-    if (_places)
-    {
-      _entries.rows[_next] = row;
-      _entries.columns[_next] = column;
-    }
-    ++_next;
+    if (!_known)
+      _entries.targets.push_back(make(row, column));
+    return target();
   }
 
 private:
-  template <class T>
-  static void grow(std::vector<T>& column, std::size_t size)
+  std::size_t size() const { return static_cast<std::size_t>(_entries.shape[0]) * _entries.shape[1]; }
+
+  double* target() { return &_entries.values[static_cast<std::size_t>(_entries.targets[_next++]) * size()]; }
+
+  Index make(GlobalIndex row, GlobalIndex column)
   {
-    if (size > column.capacity())
-      column.reserve(size + size / 4); // cells come first and are most: what follows needs no other copy
-    column.resize(std::max(size, column.size()));
+    _entries.nodes.push_back({row, column});
+    _entries.values.resize(_entries.values.size() + size());
+    _following.push_back(none);
+    return static_cast<Index>(_entries.nodes.size()) - 1;
   }
 
-  CooEntries& _entries;
-  bool _places;
+  Index find_or_make(Index row, GlobalIndex column)
+  {
+    if (static_cast<std::size_t>(row) >= _first.size())
+      _first.resize(row + 1, none);
+    Index last = none;
+    for (Index block = _first[row]; block != none; block = _following[block])
+    {
+      if (_entries.nodes[block][1] == column)
+        return block;
+      last = block;
+    }
+    const Index made = make(_numbers[row], column);
+    (last == none ? _first[row] : _following[last]) = made;
+    return made;
+  }
+
+  BlockEntries& _entries;
+  std::span<const GlobalIndex> _numbers;
+  bool _known;
   std::size_t _next = 0;
+  std::vector<Index> _first, _following; ///< the first block of each row, and of each block the next one of its row
 };
 
-/// Writes the tangent as D x D blocks between nodes: numbers the nodes, and projects supported directions out.
+/// Rows and columns of the values of `entries`, in their order; negative where a node is not in the system.
+inline std::array<std::vector<GlobalIndex>, 2> places(const BlockEntries& entries)
+{
+  std::array<std::vector<GlobalIndex>, 2> found;
+  const auto [rows, columns] = entries.shape;
+  for (auto& place : found)
+    place.reserve(entries.values.size());
+  for (const auto [row, column] : entries.nodes)
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < columns; ++j)
+      {
+        found[0].push_back(rows * row + i);
+        found[1].push_back(columns * column + j);
+      }
+  return found;
+}
+
+/// Sums the tangent: D x D blocks between nodes, whose supported directions are projected out; where water flows, with
+/// a row and a column for pressures.
 template <int D>
-class BlockWriter
+class TangentSum
 {
 public:
-  BlockWriter(const ImplicitSystem<D>& system, CooEntries& entries) : _system(system), _writer(entries) {}
-
-  /// Takes memory for more blocks; must come before they are added.
-  void expect(std::size_t more) { _writer.expect(more * D * D); }
+  TangentSum(const ImplicitSystem<D>& system, BlockEntries& entries)
+      : _system(system), _sum(entries, {system.unknowns, system.unknowns}, system.number)
+  {
+  }
 
   /// Adds P_row block P_column.
   void add(Index row, Index column, const Matrix<D>& block)
@@ -80,14 +123,21 @@ public:
 
   void add_unprojected(Index row, Index column, const Matrix<D>& block)
   {
-    const GlobalIndex first_row = place(row, 0), first_column = place(column, 0);
+    double* sum = _sum.next(row, column);
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
-        _writer.add(first_row + i, first_column + j, block[i][j]);
+        sum[place(i, j)] += block[i][j];
   }
 
-  /// Takes memory for more blocks with pressures; must come before they are added.
-  void expect_coupled(std::size_t more) { _writer.expect(more * (2 * D + 1)); }
+  /// Adds P_row block P_column between nodes of the border of a far field, of which other ranks may have either.
+  void add_numbered(const BorderNode<D>& row, const BorderNode<D>& column, const Matrix<D>& block)
+  {
+    const Matrix<D> projected = product<D>(row.projector, product<D>(block, column.projector));
+    double* sum = _sum.next_apart(row.number, column.number);
+    for (int i = 0; i < D; ++i)
+      for (int j = 0; j < D; ++j)
+        sum[place(i, j)] += projected[i][j];
+  }
 
   /// Adds the forces by the pressure of a column, P_row `forces`; the volume of water of a row by the displacement of
   /// a column, `volumes` P_column; and that by its pressure.
@@ -95,24 +145,22 @@ public:
   {
     const Vector<D> f = product<D>(projector(_system, row), forces);
     const Vector<D> v = product<D>(projector(_system, column), volumes); // P is symmetric
+    double* sum = _sum.next(row, column);
     for (int i = 0; i < D; ++i)
     {
-      _writer.add(place(row, i), place(column, D), f[i]);
-      _writer.add(place(row, D), place(column, i), v[i]);
+      sum[place(i, D)] += f[i];
+      sum[place(D, i)] += v[i];
     }
-    _writer.add(place(row, D), place(column, D), by_pressure);
+    sum[place(D, D)] += by_pressure;
   }
 
-  /// Takes memory for more entries of pressures alone; must come before they are added.
-  void expect_pressures(std::size_t more) { _writer.expect(more); }
-
   /// Adds the volume of water of a row by the pressure of a column.
-  void add_pressure(Index row, Index column, double value) { _writer.add(place(row, D), place(column, D), value); }
+  void add_pressure(Index row, Index column, double value) { _sum.next(row, column)[place(D, D)] += value; }
 
 private:
-  GlobalIndex place(Index node, int component) const { return _system.unknowns * _system.number[node] + component; }
+  int place(int i, int j) const { return _system.unknowns * i + j; }
 
   const ImplicitSystem<D>& _system;
-  Writer _writer;
+  BlockSum _sum;
 };
 } // namespace mpm::implicit

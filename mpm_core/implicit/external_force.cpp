@@ -1,18 +1,22 @@
 #include "implicit/external_force.h"
 
+#include "model/far_field.h"
+
 namespace mpm::implicit
 {
-template <int D>
-std::vector<Vector<D>> external_forces(std::span<const NodeSums<D>> nodes, const Vector<D>& gravity,
-                                       double load_fraction)
+template <class G>
+std::vector<Vector<G::dim>> external_forces(const VelocityField<G>& field, const Vector<G::dim>& gravity,
+                                            double load_fraction)
 {
+  constexpr int D = G::dim;
+  const auto& nodes = field.nodes;
   std::vector<Vector<D>> external(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
-  {
     external[i] = external_force<D>(nodes[i], gravity);
-    for (int a = 0; a < D && load_fraction != 1; ++a)
+  add_far_field_forces<D>(field.far_field, gravity, external);
+  for (std::size_t i = 0; i < nodes.size() && load_fraction != 1; ++i)
+    for (int a = 0; a < D; ++a)
       external[i][a] = nodes[i].internal[a] + load_fraction * (external[i][a] - nodes[i].internal[a]);
-  }
   return external;
 }
 
@@ -25,9 +29,8 @@ void add_external_forces(const ImplicitStep<G>& step, std::span<const unsigned c
       forces[i].external = step.external[i];
 }
 
-template std::vector<Vector<2>> external_forces<2>(std::span<const NodeSums<2>>, const Vector<2>&, double);
-template std::vector<Vector<3>> external_forces<3>(std::span<const NodeSums<3>>, const Vector<3>&, double);
 #define INSTANTIATE(G)                                                                                                 \
+  template std::vector<Vector<G::dim>> external_forces(const VelocityField<G>&, const Vector<G::dim>&, double);        \
   template void add_external_forces(const ImplicitStep<G>&, std::span<const unsigned char>,                            \
                                     std::vector<NodalForces<G::dim>>&);
 INSTANTIATE(PlaneStrain)

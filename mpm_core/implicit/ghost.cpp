@@ -1,7 +1,5 @@
 #include "implicit/ghost.h"
 
-#include <algorithm>
-
 namespace mpm::implicit
 {
 template <class G, int D>
@@ -27,13 +25,8 @@ void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step
 }
 
 template <class G, int D>
-void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+void add_ghost_entries(const ImplicitStep<G>& step, TangentSum<D>& tangent)
 {
-  std::size_t rows = 0;
-  for (const GhostFacet<D>& facet : step.ghosts)
-    rows +=
-        static_cast<std::size_t>(std::ranges::count_if(facet.fraction, [](double fraction) { return fraction != 0; }));
-  tangent.expect(rows * (D + 2));
   for (const GhostFacet<D>& facet : step.ghosts)
   {
     const double factor =
@@ -53,7 +46,7 @@ void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_ghost_forces(const VelocityField<G>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);  \
-  template void add_ghost_entries(const ImplicitStep<G>&, BlockWriter<G::dim>&);
+  template void add_ghost_entries(const ImplicitStep<G>&, TangentSum<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -13,5 +13,5 @@ void add_ghost_forces(const VelocityField<G>& field, const ImplicitStep<G>& step
 /// Their derivatives by u: rows of the nodes to whose forces this rank adds; the same from both sides of a rank
 /// boundary.
 template <class G, int D = G::dim>
-void add_ghost_entries(const ImplicitStep<G>& step, BlockWriter<D>& tangent);
+void add_ghost_entries(const ImplicitStep<G>& step, TangentSum<D>& tangent);
 } // namespace mpm::implicit

@@ -4,6 +4,7 @@
 #include "implicit/averaging.h"
 #include "implicit/balance.h"
 #include "implicit/external_force.h"
+#include "implicit/far_field.h"
 #include "implicit/ghost.h"
 #include "implicit/inertia.h"
 #include "implicit/internal_force.h"
@@ -15,8 +16,10 @@
 #include "implicit/supported.h"
 #include "implicit/trial.h"
 #include "model/cell_change.h"
+#include "model/far_field.h"
 #include "model/mapping.h"
 #include "model/particle_pass.h"
+#include "model/resting_nodes.h"
 
 #include <algorithm>
 #include <utility>
@@ -33,7 +36,9 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
                      " velocity fields, expected one in implicit steps");
   prepare(model);
   VelocityField<G>& field = model.fields.front();
-  const auto points = material_points(model);
+  step.runs = model.order.runs;
+  step.runs.insert(step.runs.end(), field.resting.runs.begin(), field.resting.runs.end());
+  const auto points = points_of(model, step);
   step.options = options;
   step.time = model.time;
   step.length = dt;
@@ -54,8 +59,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   begin_first_stage(field, step);
   start_pore_water(model, step);
   step.forces.assign(field.nodes.size(), {});
-  step.external =
-      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_fraction);
+  step.external = external_forces(field, gravity_at(model, model.time + step.dt), step.options.load_fraction);
 }
 
 template <class G>
@@ -64,8 +68,7 @@ void start_second_stage(Model<G>& model, ImplicitStep<G>& step)
   VelocityField<G>& field = model.fields.front();
   begin_second_stage(field, step);
   impose_supports(step, field);
-  step.external =
-      external_forces<G::dim>(field.nodes, gravity_at(model, model.time + step.dt), step.options.load_fraction);
+  step.external = external_forces(field, gravity_at(model, model.time + step.dt), step.options.load_fraction);
 }
 
 // --- Trial and residual: r = f_ext - f_int(u) - ghost penalty - inertia (I2), (I3)
@@ -80,7 +83,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   update(step.halos.nodes, field.velocity);
   if (step.options.nmd)
     average_strains(mesh, exchange, field, step.dt); // (T6)
-  const auto count = try_stresses(mesh, material_points(model), field, tangents, step);
+  const auto count = try_stresses(mesh, points_of(model, step), field, tangents, step);
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
   if (step.pore.flows)
@@ -88,6 +91,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);
+  add_border_forces(exchange, field, step, step.forces);
   add_internal_forces(mesh, step, step.forces);
   add_pore_forces(mesh, step, step.forces);
   add_ghost_forces(field, step, step.forces);
@@ -110,10 +114,11 @@ template <class G, int D>
 void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
                   const ImplicitSystem<D>& system, TangentEntries& tangent)
 {
-  BlockWriter<D> stiffness(system, tangent.stiffness);
+  TangentSum<D> stiffness(system, tangent.stiffness);
   add_internal_entries(mesh, step, stiffness);
   add_ghost_entries(step, stiffness);
   add_inertia_entries(field, step, system.owned, stiffness);
+  add_border_entries(field.far_field, system, stiffness);
   add_support_entries(system, stiffness);
   add_pore_entries(mesh, step, stiffness);
   if (!step.options.nmd)
@@ -141,11 +146,12 @@ double pic_fraction(const Model<G>& model, const ImplicitStep<G>& step)
   return pic_fraction_of_step(step.options.pic, step.dt, critical);
 }
 
-/// Makes the particles those of the step's start again.
+/// Makes the particles and their energies those of the step's start again.
 template <class G>
-void undo(Model<G>& model, const Particles<G::dim>& start)
+void undo(Model<G>& model, const Particles<G::dim>& start, const EnergyBook& energy)
 {
   model.particles = start;
+  model.energy = energy;
   model.migration.migrating.clear();
   model.migration.outflow.clear();
   model.migration.far_partners.clear();
@@ -176,25 +182,29 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const double pic = pic_fraction(model, step);
   find_velocity_change(field, pic, step.dt);
   const auto start = model.particles;
+  const EnergyBook energy = model.energy;
   update_pore_water(model, step);
   particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step),
                         options.hold_positions}); // (18), (20), stresses
   agree_on_failure(model);
   if (model.failure)
   {
-    undo(model, start);
+    undo(model, start, energy);
     return false;
   }
   add_work(field, step, model.exchange.owned, model.totals);
+  move_border(model.exchange, step.dt, field);
   if (model.water)
-    add_inflow(model.mesh, step, model.exchange.owned, *model.water);
+    add_flow(model.mesh, field, step, model.exchange.owned, *model.water, model.totals);
   model.last.dt = step.dt;
   model.energy.ahead = 0; // velocities and stresses are of one time
   migrate_particles(model);
+  update_resting_rows(model);
+  make_resting_cells(model.mesh, model.particles, field);
   model.time += step.dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
-  if (options.quasi_static) // without inertia, what the loads do beyond the stresses' work goes nowhere
+  if (options.quasi_static && !step.pore.flows) // what the loads do beyond the stresses' work goes nowhere
     start_energy_balance(model);
   map_to_nodes_again(model);
   return true;

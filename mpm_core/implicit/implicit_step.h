@@ -50,17 +50,16 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
 /// K + K_p G + G^T (L + H G).
 struct TangentEntries
 {
-  CooEntries stiffness;             ///< K = d (f_int + ghost penalty + inertia) / du at constant averaged strain
-  CooEntries volumetric_force;      ///< K_p
-  CooEntries volumetric_strain;     ///< G
-  CooEntries mean_stress;           ///< L
-  CooEntries mean_stress_by_strain; ///< H
+  BlockEntries stiffness;             ///< K = d (f_int + ghost penalty + inertia) / du at constant averaged strain
+  BlockEntries volumetric_force;      ///< K_p
+  BlockEntries volumetric_strain;     ///< G
+  BlockEntries mean_stress;           ///< L
+  BlockEntries mean_stress_by_strain; ///< H
 };
 
 /// The tangent of the residual (I4).
 /// @pre the step's tangents belong to the iterate
-/// @post the order of the entries is always the same for the same system; rows and columns are filled when they are
-/// empty
+/// @post the order of the entries is always the same for the same system, as long as `tangent` is not emptied
 template <class G, int D = G::dim>
 void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
                   const ImplicitSystem<D>& system, TangentEntries& tangent);

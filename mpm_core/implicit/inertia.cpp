@@ -39,9 +39,8 @@ void add_inertia_forces(const VelocityField<G>& field, const ImplicitStep<G>& st
 
 template <class G, int D>
 void add_inertia_entries(const VelocityField<G>& field, const ImplicitStep<G>& step, std::span<const Index> owned,
-                         BlockWriter<D>& tangent)
+                         TangentSum<D>& tangent)
 {
-  tangent.expect(owned.size());
   for (Index node : owned)
   {
     Matrix<D> block{};
@@ -68,7 +67,7 @@ template std::vector<double> shear_frequencies<3>(std::span<const double>, std::
   template void add_inertia_forces(const VelocityField<G>&, const ImplicitStep<G>&, std::span<const unsigned char>,    \
                                    std::vector<NodalForces<G::dim>>&);                                                 \
   template void add_inertia_entries(const VelocityField<G>&, const ImplicitStep<G>&, std::span<const Index>,           \
-                                    BlockWriter<G::dim>&);
+                                    TangentSum<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

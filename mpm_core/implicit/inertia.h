@@ -22,7 +22,7 @@ void add_inertia_forces(const VelocityField<G>& field, const ImplicitStep<G>& st
 /// same entries.
 template <class G, int D = G::dim>
 void add_inertia_entries(const VelocityField<G>& field, const ImplicitStep<G>& step, std::span<const Index> owned,
-                         BlockWriter<D>& tangent);
+                         TangentSum<D>& tangent);
 
 /// omega of each node [rad/s]: that of its oscillation in shear against its neighbours, sqrt(sum_p V_p G |grad N|^2 /
 /// m) (T5). The yielding soil slides by shear, and of the oscillations at the mesh's scale those in shear are slowest.

@@ -46,9 +46,8 @@ Matrix<D> cell_block(const CellTangent<G>& tangent, const CellShape<D>& shape, i
 } // namespace
 
 template <class G, int D>
-void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent)
 {
-  tangent.expect(step.cells.size() * (D + 1) * (D + 1));
   for (Index c : step.cells)
     for (int k = 0; k <= D; ++k)
       for (int l = 0; l <= D; ++l)
@@ -57,7 +56,7 @@ void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Bloc
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_internal_forces(const Mesh<G::dim>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);   \
-  template void add_internal_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, BlockWriter<G::dim>&);
+  template void add_internal_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -13,5 +13,5 @@ void add_internal_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::
 /// d f_int / du, at constant averaged volumetric strain with nodal mixed discretisation.
 /// @pre the step's tangents belong to the iterate
 template <class G, int D = G::dim>
-void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent);
+void add_internal_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent);
 } // namespace mpm::implicit

@@ -1,6 +1,7 @@
 #include "implicit/pore_update.h"
 
 #include "base/eigen.h"
+#include "implicit/pore_water.h"
 
 #include <cmath>
 
@@ -78,9 +79,12 @@ void grow_pores(Particles<D>& particles, Index first, Index last, double growth,
   }
 }
 
+/// @returns work that compresses the water, by the trapezoidal rule
 template <int D>
-void add_increments(Particles<D>& particles, const Run& run, const Vector<D>& centre, const CellPressure<D>& pressure)
+double add_increments(Particles<D>& particles, double modulus, const Run& run, const Vector<D>& centre,
+                      const CellPressure<D>& pressure)
 {
+  double work = 0;
   for (Index p = run.first; p < run.last; ++p)
   {
     double increment = pressure.increment;
@@ -89,8 +93,11 @@ void add_increments(Particles<D>& particles, const Run& run, const Vector<D>& ce
       increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
       particles.pressure_gradient[a][p] = pressure.at_end[a];
     }
+    const double mean = particles.pore_pressure[0][p] + 0.5 * increment;
+    work += particles.volume[p] * particles.porosity[0][p] / modulus * mean * increment;
     particles.pore_pressure[0][p] += increment;
   }
+  return work;
 }
 } // namespace
 
@@ -103,8 +110,9 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
   for (const Run& run : model.order.runs)
   {
     if (step.pore.flows)
-      add_increments<G::dim>(model.particles, run, mesh.shapes[run.cell].centre,
-                             cell_pressure(mesh, model.fields.front(), step, run.cell));
+      model.energy.stress_work +=
+          add_increments<G::dim>(model.particles, model.water->modulus, run, mesh.shapes[run.cell].centre,
+                                 cell_pressure(mesh, model.fields.front(), step, run.cell));
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,
                          model.water->kozeny_carman);
@@ -112,24 +120,37 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
 }
 
 template <class G>
-void add_inflow(const Mesh<G::dim>& mesh, const ImplicitStep<G>& step, std::span<const unsigned char> owned,
-                PoreWater& water)
+void add_flow(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+              std::span<const unsigned char> owned, PoreWater& water, Totals& totals)
 {
   const auto& pore = step.pore;
   if (!pore.flows)
     return;
-  for (std::size_t i = 0; i < pore.content.size(); ++i)
+  const auto enter = [&](double content, Index node)
+  {
+    water.inflow += content;
+    totals.external_work += content * end_pressure(pore, node, step.dt);
+  };
+  for (Index i = 0; i < static_cast<Index>(pore.content.size()); ++i)
     if (owned[i] && pore.held[i])
-      water.inflow += pore.content[i];
+      enter(pore.content[i], i);
   for (Index c : step.cells)
-    for (const auto& row : pore.cells[c].outflow)
-      for (std::size_t l = 0; l < row.size(); ++l)
-        water.inflow -= row[l] * end_pressure(pore, mesh.cells[c][l], step.dt);
+  {
+    const auto& nodes = mesh.cells[c];
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      for (std::size_t l = 0; l < nodes.size(); ++l)
+        enter(-pore.cells[c].outflow[k][l] * end_pressure(pore, nodes[l], step.dt), nodes[k]);
+    const auto drive = driving_gradient(mesh, field, step, c);
+    const auto weight = water_weight(mesh, field, step, c);
+    totals.external_work -= pore.cells[c].flux * dot<G::dim>(drive, weight);
+    totals.drag_work += pore.cells[c].flux * dot<G::dim>(drive, drive);
+  }
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template void update_pore_water(Model<G>&, const ImplicitStep<G>&);                                                  \
-  template void add_inflow(const Mesh<G::dim>&, const ImplicitStep<G>&, std::span<const unsigned char>, PoreWater&);
+  template void add_flow(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitStep<G>&,                         \
+                         std::span<const unsigned char>, PoreWater&, Totals&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

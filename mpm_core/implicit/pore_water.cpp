@@ -1,53 +1,54 @@
 #include "implicit/pore_water.h"
-
-#include <algorithm>
-
 namespace mpm::implicit
 {
-namespace
+template <class G>
+Vector<G::dim> water_weight(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                            Index cell)
 {
-/// Acceleration of a cell's water: that of its particles, less gravity.
-template <class G, int D = G::dim>
-Vector<D> relative_acceleration(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
-                                Index cell)
-{
-  Vector<D> acceleration;
-  for (int a = 0; a < D; ++a)
-    acceleration[a] = -step.pore.gravity[a];
-  if (step.options.quasi_static)
-    return acceleration;
-  const double volume = volume_of(step.pore.cells[cell]);
-  for (int k = 0; k <= D; ++k)
+  constexpr int D = G::dim;
+  Vector<D> weight = step.pore.gravity;
+  const PoreCell<D>& pore = step.pore.cells[cell];
+  const double per_volume = step.options.quasi_static ? 0 : 1 / (volume_of(pore) * step.stage.dt);
+  for (int k = 0; k <= D && !step.options.quasi_static; ++k)
     for (int a = 0; a < D; ++a)
     {
       const Index node = mesh.cells[cell][k];
-      const double gained = end_velocity(step, field, node, a) - step.stage.start[node][a];
-      acceleration[a] += step.pore.cells[cell].mean[k] / volume * gained / step.stage.dt;
+      weight[a] -= pore.mean[k] * per_volume * (end_velocity(step, field, node, a) - step.stage.start[node][a]);
     }
-  return acceleration;
+  for (double& component : weight)
+    component *= step.pore.density;
+  return weight;
 }
 
-/// Gradient of the pressure at the end less what the weight and the inertia of the water balance [Pa/m].
-template <class G, int D = G::dim>
-Vector<D> driving_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step, Index cell)
+template <class G>
+Vector<G::dim> driving_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                                Index cell)
 {
-  Vector<D> gradient = relative_acceleration(mesh, field, step, cell);
-  for (double& component : gradient)
-    component *= step.pore.density;
+  constexpr int D = G::dim;
+  const Vector<D> weight = water_weight(mesh, field, step, cell);
+  Vector<D> gradient;
+  for (int a = 0; a < D; ++a)
+    gradient[a] = -weight[a];
   for (int k = 0; k <= D; ++k)
   {
-    const Index node = mesh.cells[cell][k];
-    const double pressure = end_pressure(step.pore, node, step.dt);
+    const double pressure = end_pressure(step.pore, mesh.cells[cell][k], step.dt);
     for (int a = 0; a < D; ++a)
       gradient[a] += pressure * mesh.shapes[cell].gradient[k][a];
   }
   return gradient;
 }
 
-template <int D>
-double volume_strain(const CellStrain<D>& strain)
+namespace
 {
-  return strain.increment[0] + strain.increment[1] + strain.increment[2]; // also where volumes do not change
+/// Of the cell itself, whose vertices average it: also with nodal mixed discretisation, and where volumes do not
+/// change.
+template <class G, int D = G::dim>
+double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double dt, Index cell)
+{
+  double strain = 0;
+  for (int k = 0; k <= D; ++k)
+    strain += dt * dot<D>(dilation_gradient<G>(mesh.shapes[cell], k), field.velocity[mesh.cells[cell][k]]);
+  return strain;
 }
 
 template <class G, int D = G::dim>
@@ -98,10 +99,11 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
     const PoreCell<D>& cell = pore.cells[c];
     const auto& nodes = mesh.cells[c];
     const Vector<D> drive = driving_gradient(mesh, field, step, c);
+    const double dilation = volume_strain(mesh, field, step.dt, c);
     for (int k = 0; k <= D; ++k)
     {
       double& content = pore.content[nodes[k]];
-      content += cell.mean[k] * volume_strain(step.strains[c]);
+      content += cell.mean[k] * dilation;
       content += cell.flux * dot<D>(mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
         content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]] +
@@ -116,7 +118,7 @@ namespace
 {
 /// Derivatives of the water balance of vertex k of a cell by displacement and pressure of vertex l; see (W4).
 template <class G, int D = G::dim>
-void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, int k, int l, BlockWriter<D>& tangent)
+void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, int k, int l, TangentSum<D>& tangent)
 {
   const PoreStep<D>& pore = step.pore;
   const PoreCell<D>& cell = pore.cells[c];
@@ -143,14 +145,9 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, i
 
 /// The ghost penalty of the pressures.
 template <class G, int D = G::dim>
-void add_ghost_pressures(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+void add_ghost_pressures(const ImplicitStep<G>& step, TangentSum<D>& tangent)
 {
   const PoreStep<D>& pore = step.pore;
-  std::size_t rows = 0;
-  for (const GhostFacet<D>& facet : step.ghosts)
-    rows +=
-        static_cast<std::size_t>(std::ranges::count_if(facet.fraction, [](double fraction) { return fraction != 0; }));
-  tangent.expect_pressures(rows * (D + 2));
   for (std::size_t f = 0; f < step.ghosts.size(); ++f)
   {
     const GhostFacet<D>& facet = step.ghosts[f];
@@ -166,11 +163,10 @@ void add_ghost_pressures(const ImplicitStep<G>& step, BlockWriter<D>& tangent)
 } // namespace
 
 template <class G, int D>
-void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent)
+void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent)
 {
   if (!step.pore.flows)
     return;
-  tangent.expect_coupled(step.cells.size() * (D + 1) * (D + 1));
   for (Index c : step.cells)
     for (int k = 0; k <= D; ++k)
       for (int l = 0; l <= D; ++l)
@@ -189,9 +185,12 @@ void impose_pressures(double dt, PoreStep<D>& pore)
 template void impose_pressures(double, PoreStep<2>&);
 template void impose_pressures(double, PoreStep<3>&);
 #define INSTANTIATE(G)                                                                                                 \
+  template Vector<G::dim> water_weight(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitStep<G>&, Index);   \
+  template Vector<G::dim> driving_gradient(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitStep<G>&,       \
+                                           Index);                                                                     \
   template void add_pore_forces(const Mesh<G::dim>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);       \
   template void find_water_balance(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);     \
-  template void add_pore_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, BlockWriter<G::dim>&);
+  template void add_pore_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

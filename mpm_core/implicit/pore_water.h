@@ -21,15 +21,26 @@ template <class G, int D = G::dim>
 void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces);
 
 /// `pore.content` of the iterate: zero at the solution where no pressure is prescribed.
-/// @pre the step's strains belong to the iterate
 /// @note Collective
 template <class G, int D = G::dim>
 void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
                         ImplicitStep<G>& step);
 
+/// Gradient of the pressure at the end less what the weight and the inertia of the water balance, grad p - rho_w (g -
+/// a) of a cell [Pa/m].
+template <class G>
+Vector<G::dim> driving_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                                Index cell);
+
+/// rho_w (g - a), the part of it that the soil's motion says: weight and inertia of the water in a unit of volume
+/// [N/m3].
+template <class G>
+Vector<G::dim> water_weight(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                            Index cell);
+
 /// The blocks of displacement and pressure, of pressure and displacement, and of pressures alone.
 template <class G, int D = G::dim>
-void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, BlockWriter<D>& tangent);
+void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent);
 
 /// Makes the iterate have the prescribed pressures.
 template <int D>

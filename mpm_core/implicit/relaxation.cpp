@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace mpm::implicit
 {
@@ -38,6 +39,24 @@ double stiffness_row(const CellShape<D>& shape, int k, const ElasticModuli& modu
     largest = std::max(largest, sum);
   }
   return cell_volume<G>(shape) * largest;
+}
+
+/// Adds the largest sum over a row of |K dt| of the far field at this rank's nodes of its border.
+template <int D>
+void add_border_rows(const FarField<D>& far, double dt, std::vector<double>& rows)
+{
+  const auto width = static_cast<std::ptrdiff_t>(far.size * D);
+  for (std::size_t k = 0; k < far.nodes.size(); ++k)
+  {
+    double largest = 0;
+    for (int a = 0; a < D; ++a)
+    {
+      const auto row = far.stiffness.begin() + (static_cast<std::ptrdiff_t>(k) * D + a) * width;
+      largest = std::max(largest, std::accumulate(row, row + width, 0.0,
+                                                  [](double sum, double entry) { return sum + std::abs(entry); }));
+    }
+    rows[static_cast<std::size_t>(far.nodes[k])] += dt * largest;
+  }
 }
 
 /// Bound on the rows of |J| = |dr/dv| at each node [N s/m].
@@ -78,6 +97,7 @@ std::vector<double> tangent_rows(const Mesh<D>& mesh, const MaterialPoints<D>& p
       rows[facet.nodes[k]] +=
           facet.fraction[k] * std::abs(facet.jump[k]) * sum * (facet.stiffness * step.dt + facet.mass * inertia);
   }
+  add_border_rows(field.far_field, step.dt, rows);
   sum_shared(exchange, rows.data(), 1);
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] += step.options.quasi_static
@@ -181,7 +201,7 @@ template <class G, int D>
 Relaxation<D> start_relaxation(Model<G>& model, ImplicitStep<G>& step, RelaxationKind kind)
 {
   Relaxation<D> relaxation{
-      kind, tangent_rows(model.mesh, material_points(model), model.exchange, model.fields.front(), step), {}, {}, {}};
+      kind, tangent_rows(model.mesh, points_of(model, step), model.exchange, model.fields.front(), step), {}, {}, {}};
   for (double& mass : relaxation.mass)
     mass *= margin * mass_fraction(kind);
   relaxation.rate.assign(model.mesh.points.size(), {});

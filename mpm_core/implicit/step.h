@@ -4,6 +4,7 @@
 
 #include "implicit/ghost_facets.h"
 #include "implicit/pore_step.h"
+#include "model/material_points.h"
 #include "transfer/cell_strain.h"
 
 #include <limits>
@@ -122,8 +123,16 @@ struct ImplicitStep
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts
   std::optional<Failure<D>> failure; ///< of the last trial, where it failed
   std::vector<Index> cells;          ///< filled cells of this rank
+  std::vector<Run> runs;             ///< of particles, and the rows of resting cells
   std::vector<unsigned char> active; ///< per node: 1 where a filled cell touches it
 };
+
+/// The particles and resting cells that a step strains.
+template <class G, int D = G::dim>
+MaterialPoints<D> points_of(const Model<G>& model, const ImplicitStep<G>& step)
+{
+  return {model.particles, step.runs, model.laws};
+}
 
 /// Duration that laws are given [s]
 template <class G>

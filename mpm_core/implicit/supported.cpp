@@ -1,7 +1,5 @@
 #include "implicit/supported.h"
 
-#include <algorithm>
-
 namespace mpm::implicit
 {
 template <class G>
@@ -13,13 +11,11 @@ void impose_supports(const ImplicitStep<G>& step, VelocityField<G>& field)
 }
 
 template <int D>
-void add_support_entries(const ImplicitSystem<D>& system, BlockWriter<D>& tangent)
+void add_support_entries(const ImplicitSystem<D>& system, TangentSum<D>& tangent)
 {
-  const auto is_supported = [&](Index node) { return system.support[node] != none; };
-  tangent.expect(static_cast<std::size_t>(std::ranges::count_if(system.owned, is_supported)));
   for (Index node : system.owned)
   {
-    if (!is_supported(node))
+    if (system.support[node] == none)
       continue;
     Matrix<D> block = projector(system, node);
     for (int i = 0; i < D; ++i)
@@ -29,8 +25,8 @@ void add_support_entries(const ImplicitSystem<D>& system, BlockWriter<D>& tangen
   }
 }
 
-template void add_support_entries(const ImplicitSystem<2>&, BlockWriter<2>&);
-template void add_support_entries(const ImplicitSystem<3>&, BlockWriter<3>&);
+template void add_support_entries(const ImplicitSystem<2>&, TangentSum<2>&);
+template void add_support_entries(const ImplicitSystem<3>&, TangentSum<3>&);
 #define INSTANTIATE(G) template void impose_supports(const ImplicitStep<G>&, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

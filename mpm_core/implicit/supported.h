@@ -12,5 +12,5 @@ void impose_supports(const ImplicitStep<G>& step, VelocityField<G>& field);
 
 /// Supported directions in the tangent: their corrections are zero, by the equations s (1 - P) du = 0.
 template <int D>
-void add_support_entries(const ImplicitSystem<D>& system, BlockWriter<D>& tangent);
+void add_support_entries(const ImplicitSystem<D>& system, TangentSum<D>& tangent);
 } // namespace mpm::implicit

@@ -33,6 +33,39 @@ void set_supports(std::span<const Support<D>> supports, std::size_t nodes, Impli
     system.projectors.push_back(projector_of(supports[s]));
   }
 }
+
+/// Numbers and projectors of the nodes on the border of the far field, from the ranks that have them.
+/// @throws RunError on all ranks: a node without soil
+/// @note Collective where there is a far field
+template <int D>
+std::vector<BorderNode<D>> border_nodes(const NodeExchange& exchange, const FarField<D>& far,
+                                        const ImplicitSystem<D>& system)
+{
+  constexpr std::size_t width = 1 + D * D;
+  std::vector<double> sums(far.size * width, 0.0); // numbers from 1; whole numbers are exact
+  for (std::size_t k = 0; k < far.nodes.size(); ++k)
+  {
+    double* const entry = &sums[far.numbers[k] * width];
+    entry[0] = static_cast<double>(system.number[far.nodes[k]] + 1);
+    const Matrix<D> p = projector(system, far.nodes[k]);
+    for (int a = 0; a < D; ++a)
+      std::copy_n(p[a].begin(), D, entry + 1 + a * D);
+  }
+  if (far.size > 0)
+    MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, exchange.comm);
+  std::vector<BorderNode<D>> border(far.size);
+  for (std::size_t k = 0; k < border.size(); ++k)
+  {
+    const double* const entry = &sums[k * width];
+    if (entry[0] < 1)
+      throw RunError("the soil has left node " + std::to_string(k) +
+                     " of the border of the far field, which holds where soil stays beside it only");
+    border[k].number = static_cast<GlobalIndex>(entry[0]) - 1;
+    for (int a = 0; a < D; ++a)
+      std::copy_n(entry + 1 + a * D, D, border[k].projector[a].begin());
+  }
+  return border;
+}
 } // namespace
 
 template <class G, int D>
@@ -71,6 +104,7 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
     system.diagonal[i] = sums[i][1];
   }
   set_supports<D>(field.supports, sums.size(), system);
+  system.border = border_nodes(exchange, field.far_field, system);
   return changed;
 }
 

@@ -10,6 +10,14 @@
 
 namespace mpm::implicit
 {
+/// A node on the border of the far field, which any rank may have.
+template <int D>
+struct BorderNode
+{
+  GlobalIndex number;  ///< in the system
+  Matrix<D> projector; ///< its P
+};
+
 /// The nodes of the system.
 template <int D>
 struct ImplicitSystem
@@ -21,12 +29,14 @@ struct ImplicitSystem
   std::vector<Index> support;               ///< per node: its support, or `none`
   std::vector<Matrix<D>> projectors;        ///< P = 1 - sum d d^T of each support
   std::vector<double> diagonal;             ///< per node: elastic stiffness, the scale of its entries [N/m]
+  std::vector<BorderNode<D>> border;        ///< all nodes of the border of the far field
   GlobalIndex total = 0;                    ///< nodes over all ranks
   int unknowns = D;                         ///< of each node
 };
 
 /// Numbers the active nodes of the step: consecutive on each rank.
 /// @returns whether nodes or cells differ on any rank from what the system had before
+/// @throws RunError on all ranks: the soil has left a node on the border of the far field
 /// @note Collective
 template <class G, int D = G::dim>
 bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const ImplicitStep<G>& step,

@@ -29,6 +29,9 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
   {
     const Vector<D> w = at<D>(particles.water_velocity.columns, p);
     kinetic += 0.5 * particles.water_mass[0][p] * dot<D>(w, w);
+  }
+  if (model.water && particles.pore_pressure.present)
+  {
     const double pressure = particles.pore_pressure[0][p];
     of_water = 0.5 * particles.volume[p] * particles.porosity[0][p] * pressure * pressure / model.water->modulus;
   }

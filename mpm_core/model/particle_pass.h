@@ -12,7 +12,7 @@ struct PassOptions
   double dt;           ///< [s]
   bool move;           ///< velocities (18) and positions (20)
   bool stress;         ///< strain increment and stress update
-  double pic_fraction; ///< fraction of the grid's velocity in the particle's, 0 is FLIP
+  double pic_fraction; ///< PIC fraction: part of the nodal velocity in the particle's, 0 is FLIP
   bool nmd;            ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
   double law_dt;       ///< duration of the increment for laws [s]; infinite where they are given all time
   bool small = false;  ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing

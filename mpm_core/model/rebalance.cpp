@@ -6,15 +6,18 @@
 namespace mpm::model
 {
 template <class G, int D>
-void set_partition(Model<G>& model, const Mesh<D>& mesh)
+void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalIndex> owners)
 {
   prepare(model); // so that ranks agree on which columns there are
-  std::vector<GlobalIndex> cells;
+  std::vector<GlobalIndex> cells, ranks;
   for (Index cell : model.particles.cell)
+  {
     cells.push_back(model.mesh.global_cells[cell]);
+    ranks.push_back(owners[static_cast<std::size_t>(cell)]);
+  }
   model.mesh = mesh;
   model.exchange = make_node_exchange(mesh, model.exchange.comm);
-  redistribute<D>(mesh, model.exchange, cells, model.particles);
+  redistribute<D>(mesh, model.exchange, cells, ranks, model.particles);
   for (VelocityField<G>& field : model.fields)
     field = {};
   for (Contact<D>& contact : model.contacts)
@@ -26,7 +29,7 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh)
   map_to_nodes(model);
 }
 
-template void set_partition(Model<PlaneStrain>&, const Mesh<2>&);
-template void set_partition(Model<Axisymmetric>&, const Mesh<2>&);
-template void set_partition(Model<Solid>&, const Mesh<3>&);
+template void set_partition(Model<PlaneStrain>&, const Mesh<2>&, std::span<const GlobalIndex>);
+template void set_partition(Model<Axisymmetric>&, const Mesh<2>&, std::span<const GlobalIndex>);
+template void set_partition(Model<Solid>&, const Mesh<3>&, std::span<const GlobalIndex>);
 } // namespace mpm::model

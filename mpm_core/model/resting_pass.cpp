@@ -103,6 +103,8 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
     CellStrain<D, Lanes> strain = strain_increment<D>(gradient, 1);
     if (options.nmd)
       set_volumetric<G>(strain, averaged_strains(mesh, field, batch.first_run + i, strain.volumetric));
+    if (options.small)
+      make_small<D>(strain);
     std::array<Lanes, S> increment;
     for (int k = 0; k < S; ++k)
     {
@@ -200,7 +202,8 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   model.energy.ahead += 0.5 * integrate_batch<G>(model.particles, batch, scratch, field.resting);
 }
 
-/// Stresses and volumes in the moments of resting cells, for what is averaged or integrated over whole cells.
+/// Stresses and volumes in the moments of resting cells, for what is averaged or integrated over whole cells, and where
+/// rows do not move.
 template <class G, int D = G::dim>
 void update_moments(const Particles<D>& particles, VelocityField<G>& field)
 {
@@ -236,7 +239,7 @@ void resting_pass(Model<G>& model, const PassOptions& options)
       pass_batch(model, options, batch, scratch);
       r = batch.last_run;
     }
-    if (options.nmd || field.integration.kind != Integration::particles)
+    if (options.nmd || options.small || field.integration.kind != Integration::particles)
       update_moments(model.particles, field);
   }
 }

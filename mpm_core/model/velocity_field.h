@@ -4,6 +4,7 @@
 
 #include "transfer/dashpots.h"
 #include "transfer/dual_domain.h"
+#include "transfer/far_field.h"
 #include "transfer/nodal_mixed_discretisation.h"
 #include "transfer/nodes.h"
 #include "transfer/resting.h"
@@ -70,6 +71,7 @@ struct VelocityField
   std::vector<DashpotNode<D>> dashpots;      ///< of its absorbing sides, by rising node
   IncomingWave<D> incoming;                  ///< through them
   std::vector<FreeField<D>> free_fields;     ///< beside them
+  FarField<D> far_field;                     ///< elastic ground beyond a border; in implicit steps
   std::vector<Vector<D>> start_velocity;     ///< v_i at the start of the step
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it

@@ -1,5 +1,6 @@
 #include "parallel/halo.h"
 
+#include "parallel/lists.h"
 #include "parallel/migration.h"
 
 #include <algorithm>
@@ -17,30 +18,6 @@ std::array<Index, D + 1> corners_by_number(const Mesh<D>& mesh, Index cell)
   std::sort(nodes.begin(), nodes.end(), [&](Index a, Index b) { return mesh.global_nodes[a] < mesh.global_nodes[b]; });
   return nodes;
 }
-
-/// Sends each rank a list of numbers and returns the lists that came, by rank.
-std::map<int, std::vector<GlobalIndex>> exchange_lists(const std::map<int, std::vector<GlobalIndex>>& lists,
-                                                       MPI_Comm comm)
-{
-  int size;
-  MPI_Comm_size(comm, &size);
-  std::vector<int> send(static_cast<std::size_t>(size), 0), receive(send);
-  for (const auto& [rank, list] : lists)
-    send[static_cast<std::size_t>(rank)] = static_cast<int>(list.size());
-  MPI_Alltoall(send.data(), 1, MPI_INT, receive.data(), 1, MPI_INT, comm);
-  std::map<int, std::vector<GlobalIndex>> came;
-  std::vector<MPI_Request> requests;
-  for (int rank = 0; rank < size; ++rank)
-    if (const int n = receive[static_cast<std::size_t>(rank)])
-    {
-      came[rank].resize(static_cast<std::size_t>(n));
-      MPI_Irecv(came[rank].data(), n, MPI_INT64_T, rank, 3, comm, &requests.emplace_back());
-    }
-  for (const auto& [rank, list] : lists)
-    MPI_Isend(list.data(), static_cast<int>(list.size()), MPI_INT64_T, rank, 3, comm, &requests.emplace_back());
-  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
-  return came;
-}
 } // namespace
 
 template <int D>
@@ -54,28 +31,32 @@ Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm)
       known[node] = true;
 
   std::map<int, Halo::Link> cells, nodes;
-  std::map<int, std::vector<GlobalIndex>> cells_asked, corners_asked;
+  int size = 1;
+  MPI_Comm_size(comm, &size);
+  std::vector<std::vector<GlobalIndex>> cells_asked(static_cast<std::size_t>(size)), corners_asked(cells_asked);
   for (Index c = mesh.owned_cells; c < mesh.n_cells(); ++c)
   {
     const int owner = mesh.cell_owners[c];
     cells[owner].take.push_back(c);
-    cells_asked[owner].push_back(mesh.global_cells[c]);
+    cells_asked[static_cast<std::size_t>(owner)].push_back(mesh.global_cells[c]);
     const auto corners = corners_by_number(mesh, c);
     for (int k = 0; k <= D; ++k)
       if (!known[corners[k]])
       {
         known[corners[k]] = true;
         nodes[owner].take.push_back(corners[k]);
-        corners_asked[owner].push_back(mesh.global_cells[c] * (D + 1) + k);
+        corners_asked[static_cast<std::size_t>(owner)].push_back(mesh.global_cells[c] * (D + 1) + k);
       }
   }
   const auto numbers = owned_cell_numbers(mesh);
-  for (const auto& [rank, asked] : exchange_lists(cells_asked, comm))
-    for (GlobalIndex cell : asked)
+  const auto cells_given = exchanged(cells_asked, comm), corners_given = exchanged(corners_asked, comm);
+  for (int rank = 0; rank < size; ++rank)
+  {
+    for (GlobalIndex cell : cells_given[static_cast<std::size_t>(rank)])
       cells[rank].give.push_back(numbers.at(cell));
-  for (const auto& [rank, asked] : exchange_lists(corners_asked, comm))
-    for (GlobalIndex corner : asked)
+    for (GlobalIndex corner : corners_given[static_cast<std::size_t>(rank)])
       nodes[rank].give.push_back(corners_by_number(mesh, numbers.at(corner / (D + 1)))[corner % (D + 1)]);
+  }
   for (auto& [rank, link] : cells)
     halos.cells.links.push_back({rank, std::move(link.give), std::move(link.take)});
   for (auto& [rank, link] : nodes)

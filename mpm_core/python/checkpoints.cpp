@@ -126,38 +126,28 @@ std::vector<Table> tables_of(std::vector<Table> tables, const py::dict& arrays)
 }
 
 /// Puts particles into their cells, on the ranks that own them.
-/// @throws RunError on all ranks
 /// @note Collective
 template <class G, int D = G::dim>
-void place(const Model<G>& model, const std::vector<GlobalIndex>& cells, bool same_parts, const std::string& path,
+void place(const Model<G>& model, const std::vector<GlobalIndex>& cells, const py::object& owners,
            Particles<D>& particles)
 {
-  if (same_parts)
-  {
-    const auto numbers = owned_cell_numbers(model.mesh);
-    for (std::size_t p = 0; p < cells.size(); ++p)
-      particles.cell[p] = numbers.at(cells[p]);
-    return;
-  }
-  try
-  {
-    redistribute<D>(model.mesh, model.exchange, cells, particles);
-  }
-  catch (const RunError& error)
-  {
-    throw RunError("cannot read /particles/cell in " + path + ": " + error.what());
-  }
+  if (!owners.is_none())
+    return redistribute<D>(model.mesh, model.exchange, cells, values<std::int64_t>(owners.cast<py::array>()),
+                           particles);
+  const auto numbers = owned_cell_numbers(model.mesh);
+  for (std::size_t p = 0; p < cells.size(); ++p)
+    particles.cell[p] = numbers.at(cells[p]);
 }
 
 /// Replaces particles and state of a model by those of a file, after all have been checked.
 /// @param particles   fields of all that the file has; of this rank, or of an equal part where the partition is another
 /// @param ranks       of this rank; of all ranks of the file where the partition is another
-/// @param same_parts  whether each rank has the cells that the same rank of the file had particles in
+/// @param owners      rank that owns the cell of each of these particles; None where the partition is that of the file
 /// @throws RunError on all ranks, with path, array and reason; the model is then as before
 /// @note Collective
 template <class G, int D = G::dim>
-void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, const py::dict& ranks, bool same_parts,
-             const std::string& path)
+void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, const py::dict& ranks,
+             const py::object& owners, const std::string& path)
 {
   const auto agree = [&](const Refusal& refusal)
   {
@@ -169,7 +159,7 @@ void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, 
   const std::vector<Table> cell_tables = tables_of(empty_cell_state(model), cells),
                            rank_tables = tables_of(rank_state(model), ranks);
   agree(refusal);
-  place(model, numbers, same_parts, path, restored);
+  place(model, numbers, owners, restored);
   check_positions(refusal, model.mesh, restored);
   for (const Table& table : rank_tables)
     check_totals(refusal, table);
@@ -180,7 +170,7 @@ void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, 
       refusal.note("/cells/" + table.name, "the particles have no traction");
   }
   agree(refusal);
-  if (same_parts)
+  if (owners.is_none())
     restore_same(model, std::move(restored), rank_tables, cell_tables);
   else
     restore_other(model, std::move(restored), rank_tables);

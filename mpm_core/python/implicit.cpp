@@ -31,7 +31,18 @@ py::dict as_dict(const Implicit<G>& implicit, const TrialReport& report)
                   "failed"_a = report.failed, "reason"_a = failure ? failure_text(implicit.model, *failure) : "");
 }
 
-py::tuple places(const CooEntries& entries) { return py::make_tuple(copied(entries.rows), copied(entries.columns)); }
+/// Binds a matrix of the tangent: rows and columns of its entries, and their values.
+template <class G>
+void bind_matrix(py::class_<Implicit<G>>& bound, const std::string& name, BlockEntries TangentEntries::*matrix)
+{
+  bound.def((name + "_places").c_str(),
+            [matrix](const Implicit<G>& i)
+            {
+              const auto [rows, columns] = places(i.tangent.*matrix);
+              return py::make_tuple(copied(rows), copied(columns));
+            });
+  bound.def((name + "_values").c_str(), [matrix](const Implicit<G>& i) { return copied((i.tangent.*matrix).values); });
+}
 
 /// Vectors at this rank's nodes of the system, each followed by a number where pressures are unknowns.
 template <class G>
@@ -89,12 +100,12 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
 {
   using I = Implicit<G>;
   using Release = py::call_guard<py::gil_scoped_release>;
-  py::class_<I>(m, ("ImplicitStep" + suffix).c_str())
-      .def(py::init(
-               [](Model<G>& model) {
-                 return I{model, {}, {}, {}, {}};
-               }),
-           py::keep_alive<1, 2>())
+  py::class_<I> bound(m, ("ImplicitStep" + suffix).c_str());
+  bound.def(py::init(
+                [](Model<G>& model) {
+                  return I{model, {}, {}, {}, {}};
+                }),
+            py::keep_alive<1, 2>())
       .def(
           "start",
           [](I& i, const ImplicitOptions& options, double dt)
@@ -161,17 +172,12 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           "iterate",
           [](const I& i)
           { return unknowns<G>(i, i.model.fields.front().velocity, i.step.pore.rate, 1 / i.step.pore.unit); },
-          &set_unknowns<G>)
-      .def("stiffness_places", [](const I& i) { return places(i.tangent.stiffness); })
-      .def("stiffness_values", [](const I& i) { return copied(i.tangent.stiffness.values); })
-      .def("volumetric_force_places", [](const I& i) { return places(i.tangent.volumetric_force); })
-      .def("volumetric_force_values", [](const I& i) { return copied(i.tangent.volumetric_force.values); })
-      .def("volumetric_strain_places", [](const I& i) { return places(i.tangent.volumetric_strain); })
-      .def("volumetric_strain_values", [](const I& i) { return copied(i.tangent.volumetric_strain.values); })
-      .def("mean_stress_places", [](const I& i) { return places(i.tangent.mean_stress); })
-      .def("mean_stress_values", [](const I& i) { return copied(i.tangent.mean_stress.values); })
-      .def("mean_stress_by_strain_places", [](const I& i) { return places(i.tangent.mean_stress_by_strain); })
-      .def("mean_stress_by_strain_values", [](const I& i) { return copied(i.tangent.mean_stress_by_strain.values); });
+          &set_unknowns<G>);
+  bind_matrix(bound, "stiffness", &TangentEntries::stiffness);
+  bind_matrix(bound, "volumetric_force", &TangentEntries::volumetric_force);
+  bind_matrix(bound, "volumetric_strain", &TangentEntries::volumetric_strain);
+  bind_matrix(bound, "mean_stress", &TangentEntries::mean_stress);
+  bind_matrix(bound, "mean_stress_by_strain", &TangentEntries::mean_stress_by_strain);
 }
 } // namespace
 

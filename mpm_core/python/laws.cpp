@@ -17,13 +17,15 @@ void bind_soils(py::module_& m)
   bind_law<ViscoplasticMohrCoulomb>(
       m, "ViscoplasticMohrCoulomb",
       "Mohr-Coulomb whose stress may exceed the strength for a while (Perzyna, Duvaut and Lions).",
-      R"(The overstress relaxes in relaxation_time, so that in steady shear without friction the shear stress is the cohesion plus
-the viscosity times the rate. Quasi-static finite elements without a duration, and Model.equilibrate, end without overstress.)")
+      R"(The overstress relaxes in relaxation_time, so that in steady shear without friction the shear stress is the
+cohesion plus the viscosity times the rate. Quasi-static finite elements without a duration, and Model.equilibrate,
+end without overstress.)")
       .def_property_readonly("relaxation_time", &relaxation_time, "Time in which the overstress relaxes [s]");
   bind_law<CamClay>(
       m, "CamClay", "Modified Cam-Clay with pressure-dependent elasticity.",
-      R"(The state log_preconsolidation is ln of the preconsolidation pressure over that of the start, attraction included in both:
-set it for points that begin with another one. The modulus for the time step is that of twice the preconsolidation.)");
+      R"(The state variable log_preconsolidation is the logarithm of the preconsolidation pressure over its initial
+value, attraction included in both; set it for points with another initial value. The time step follows from the
+modulus at twice the preconsolidation pressure.)");
 }
 
 void bind_softening(py::module_& m)
@@ -38,10 +40,10 @@ void bind_softening(py::module_& m)
   };
   bind_law<L>(
       m, "SofteningMohrCoulomb", "Mohr-Coulomb whose strength falls with the accumulated plastic deviatoric strain.",
-      R"(In a cell of size h the strength falls over softening_strain * reference_length / h, so that the energy that a band
-dissipates does not depend on the mesh. The state band_strain is the plastic strain that a band as wide as reference_length would
-have; the strength follows from it. The state cohesion_deviation is the relative deviation of a point's cohesion from the
-law's.)",
+      R"(In a cell of size h the strength falls over softening_strain * reference_length / h, so that the energy that
+a band dissipates does not depend on the mesh. The state band_strain is the plastic strain that a band as wide as
+reference_length would have; the strength follows from it. The state cohesion_deviation is the relative deviation of a
+point's cohesion from the law's.)",
       with_parts)
       .def("softened", &softened, py::arg("band_strain"), py::arg("cohesion_deviation") = 0.0,
            "The perfectly plastic law that holds at some states")
@@ -93,9 +95,9 @@ void bind_heterogeneous(py::module_& m)
   };
   bind_law<Heterogeneous>(
       m, "Heterogeneous", "A law of which some parameters differ from point to point.",
-      R"(Each parameter that varies has a state, NAME_difference, with what a point's value exceeds the law's number by. Give points
-their values by Model.set_parameter, and finite elements by QuasiStatic.set_parameter. No point may be stiffer than the law's
-numbers say, since these bound the time step.)",
+      R"(Each parameter that varies has a state variable NAME_difference: the value of a point less that of the law.
+Set the values by Model.set_parameter, and in finite elements by QuasiStatic.set_parameter. No point may be stiffer
+than the values of the law, since these limit the time step.)",
       with_parts)
       .def_readonly("law", &Heterogeneous::law)
       .def_readonly("varying", &Heterogeneous::varying)
@@ -107,15 +109,16 @@ void bind_wrappers(py::module_& m)
 {
   bind_law<Hencky>(m, "Hencky",
                    "A law between Kirchhoff stress and logarithmic strain, for strains that are not small.",
-                   "The state log_volume is ln of the volume over that of the start.",
+                   "The state variable log_volume is the logarithm of the volume over the initial volume.",
                    [](const Parts& parts) {
                      return Hencky{parts.get<LawList<Heterogeneous>>("law", "a law, but neither Hencky nor Undrained")};
                    })
       .def_readonly("law", &Hencky::law);
   bind_law<Undrained>(
       m, "Undrained", "A saturated soil that does not drain, in effective stresses.",
-      R"(Points carry the total stress; the state excess_pore_pressure [Pa], positive in compression, is what the effective stress
-exceeds it by (tension positive). Where there is a steady pore pressure, stresses are less that one.)",
+      R"(The stress of points is the total stress. The state variable excess_pore_pressure [Pa], positive in
+compression, is the effective less the total stress (tension positive). A steady pore pressure is not part of these
+stresses.)",
       [](const Parts& parts) {
         return Undrained{parts.get<LawList<Heterogeneous, Hencky>>("skeleton", "a law, but not Undrained"), 0, 0};
       })
@@ -147,8 +150,9 @@ void bind_umat(py::module_& m)
 {
   bind_law<Umat>(
       m, "Umat", "A law given as an Abaqus UMAT in a shared library.",
-      R"(NDI is 3, NSHR 1 in plane strain and 3 in three dimensions. DTIME is one and DROT the identity: the stress has been rotated
-with the material already. Laws that depend on rate, temperature or the deformation gradient cannot be used. PNEWDT below
+      R"(NDI is 3, NSHR 1 in plane strain and 3 in three dimensions. TIME, DTIME, CELENT, DFGRD0 and DFGRD1 have the
+values of the point; DTIME is one where loading is infinitely slow, CELENT is one where there is no cell. DROT is the
+identity, because the stress has already been rotated with the material. Temperature is not supported. PNEWDT below
 one counts as a failure.)",
       &loaded_umat)
       .def_readonly("properties", &Umat::properties)

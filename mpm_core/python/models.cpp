@@ -4,6 +4,7 @@
 #include "explicit/two_phase_step.h"
 #include "mesh/search.h"
 #include "model/absorbing.h"
+#include "model/far_field.h"
 #include "model/mapping.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
@@ -247,7 +248,25 @@ void bind_model(py::module_& m, const std::string& suffix)
                  for (const auto& [damping, stiffness, held, displacement, free_field, area, is_rigid] : found->second)
                    dashpots.push_back({i, damping, stiffness, held, displacement, free_field, area, is_rigid});
            })
-      .def("set_partition", &set_partition<G>)
+      .def("set_partition", [](M& model, const Mesh<D>& mesh, const py::array& owners)
+           { set_partition(model, mesh, values<std::int64_t>(owners)); })
+      .def("unbalanced_at",
+           [](M& model, const std::vector<GlobalIndex>& nodes)
+           { return unbalanced_at(model, nodes, gravity_at(model, model.time)); })
+      .def("set_far_field",
+           [](M& model, const std::vector<GlobalIndex>& nodes, const py::array& stiffness, const py::array& mass,
+              const py::array& held, const py::array& displacement)
+           {
+             const auto n = static_cast<py::ssize_t>(nodes.size());
+             check_array<double>("stiffness", stiffness, {n * D, n * D});
+             check_array<double>("mass", mass, {n, D, D});
+             check_array<double>("held", held, {n, D});
+             check_array<double>("displacement", displacement, {n, D});
+             set_far_field(model, nodes, values<double>(stiffness), values<double>(mass), values<double>(held),
+                           values<double>(displacement));
+           })
+      .def_property_readonly("far_field_displacement",
+                             [](const M& model) { return copied(model.fields.front().far_field.displacement); })
       .def_readwrite("water", &M::water)
       .def_readwrite("outflow_tags", &M::outflow_tags)
       .def_readwrite("gravity", &M::gravity)
@@ -335,6 +354,12 @@ void bind_model(py::module_& m, const std::string& suffix)
              check_array<std::uint8_t>("chosen", chosen, {static_cast<py::ssize_t>(model.mesh.owned_cells)});
              prepare(model);
              convert_cells(model, values<std::uint8_t>(chosen));
+           })
+      .def("convert_failing",
+           [](M& model, const Conversion& conversion)
+           {
+             prepare(model);
+             convert_failing(model, conversion);
            })
       .def_property_readonly("has_resting_cells", [](const M& model) { return model.particles.resting.present; })
       .def_property_readonly("converted_cells", [](const M& model) { return model.totals.converted_cells; })

@@ -172,14 +172,13 @@ void bind_python_law(py::module_& m)
   tangent is None in the explicit scheme.
 - state_names: names of the state variables, optional.
 
-Where update has a further parameter `increment`, it is given an object with the attributes time [s], dt [s], cell_size [m],
+If update has a further parameter `increment`, it receives an object with the attributes time [s], dt [s], cell_size [m],
 shape (n,) or None, and deformation, shape (n, D, D) or None: the time at the start, the duration (infinite where loading is
-slow without limit), the sizes of the points' cells, and the increment of the deformation gradient, where None stands for
+infinitely slow), the sizes of the points' cells, and the increment of the deformation gradient, where None stands for
 1 + strain increment.
 
-A point fails where its stress or a state of it is not finite afterwards: so a law tells that it found no solution there.
-An exception in update is a failure of all its points; they are then tried one by one, and the first exception of a law
-is printed.)",
+A law that has no solution at a point sets its stress or a state variable to NaN; the point then fails. An exception in
+update is a failure of all its points; they are then tried one by one, and the first exception of a law is printed.)",
                         [](const Parts& parts) { return python_law(parts.get<py::object>("law", "an object")); })
       .def_property_readonly(
           "law",

@@ -98,16 +98,22 @@ class _Watched(mpm.Newton):
     krylov: list[int] = []
 
     def solver(self, comm: MPI.Comm, dim: int) -> Any:
-        solver = super().solver(comm, dim)
-        solve = solver.solve
+        return _Watching(super().solver(comm, dim), self.krylov)
 
-        def noted(*arguments: Any) -> Any:
-            solution = solve(*arguments)
-            self.krylov.extend(solution.linear_iterations)
-            return solution
 
-        solver.solve = noted
-        return solver
+class _Watching:
+    """Its solver."""
+
+    def __init__(self, solver: Any, krylov: list[int]) -> None:
+        self._solver, self._krylov = solver, krylov
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._solver, name)
+
+    def solve(self, *arguments: Any) -> Any:
+        solution = self._solver.solve(*arguments)
+        self._krylov.extend(solution.linear_iterations)
+        return solution
 
 
 def rows(kind: Any, cells: int, soil: Any, nmd: bool, loads: list[float]) -> list[dict[str, Any]]:

@@ -43,6 +43,9 @@ def test_a_wet_slide_is_the_same_on_any_partition(comm, owners_of):
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-10)
     assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-10)
     assert model.water_inflow() != 0
+    for name in ("external_work", "drag_work", "stress_work", "stored_energy", "unexplained_energy"):
+        assert getattr(report, name) == pytest.approx(getattr(expected, name), rel=1e-8), name
+    assert report.drag_work > 0
 
 
 def consolidating_bank(comm, owners_of=bands):
@@ -55,11 +58,14 @@ def consolidating_bank(comm, owners_of=bands):
     return model
 
 
+@pytest.mark.parametrize("nmd", [False, True])
 @pytest.mark.parametrize("owners_of", [scattered, one_does_all])
-def test_a_bank_consolidates_alike_on_any_partition(comm, owners_of):
+def test_a_bank_consolidates_alike_on_any_partition(comm, owners_of, nmd):
     model, alone = consolidating_bank(comm, owners_of), consolidating_bank(MPI.COMM_SELF)
     for time in (2e3, 8e3):
-        report, expected = (list(one.implicit(time, dt=time / 4, quasi_static=True))[-1] for one in (model, alone))
+        report, expected = (
+            one.implicit(time, dt=time / 4, quasi_static=True, nmd=nmd).last() for one in (model, alone)
+        )
         assert report.iterations == expected.iterations
         assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-10)
     assert alone.water_inflow() < -1e-3 * alone.water_volume()

@@ -70,3 +70,19 @@ def test_a_resting_cell_weighs_as_much_as_one_particle(comm):
     model.convert()
     assert model.report().mass == pytest.approx(before.mass, rel=1e-13)
     assert np.all(model.comm.allreduce(len(model.particles)) == 24 * 4 * 2 * 10)
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+@pytest.mark.parametrize("quasi_static", [False, True])
+def test_implicit_steps_turn_cells_into_particles_on_all_ranks_as_on_one(comm, owners_of, quasi_static):
+    models = steep_block(comm, owners_of), steep_block(MPI.COMM_SELF)
+    reports = []
+    for model in models:
+        model.set_gravity((0.0, -9.81 if not quasi_static else -3.0), ramp=0.1)
+        model.convert(where=lambda x: x[:, 0] < 0.3)
+        conversion = mpm.Conversion(displacement=2e-3 if quasi_static else 0.02, layers=1)
+        steps = model.implicit(0.1, dt=0.02, quasi_static=quasi_static, conversion=conversion)
+        reports.append([(r.resting_cells, r.converted_cells, r.particles) for r in steps])
+    assert reports[0] == reports[1]
+    assert reports[1][0] != reports[1][-1] and reports[1][-1][0] > 0
+    assert_same(*(all_by_id(model, FIELDS) for model in models))

@@ -34,7 +34,7 @@ struct CamClay
                      "preconsolidation pressure at the start, less the attraction"),
         parameter<L>("void_ratio", entry<&L::void_ratio>, "-", above<L>(0), "void ratio at the start"),
         parameter<L>("attraction", entry<&L::attraction>, "Pa", at_least<L>(0),
-                     "isotropic tension at which stiffness and strength vanish; without it a point at zero pressure "
+                     "isotropic tension at which stiffness and strength vanish; with 0 a point at zero pressure "
                      "has no stiffness, and its update fails",
                      0.0),
     };

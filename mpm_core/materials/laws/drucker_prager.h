@@ -32,7 +32,7 @@ struct DruckerPrager
         parameter<L>("dilation", entry<&L::dilation>, "-", up_to<L>("friction", entry<&L::friction>),
                      "slope of the plastic potential", 0.0),
         parameter<L>("tension_cutoff", entry<&L::tension_cutoff>, "Pa", or_infinite(at_least<L>(0)),
-                     "largest mean stress allowed; without effect from the apex upwards", unlimited),
+                     "tension cut-off: largest mean stress; without effect above the apex", unlimited),
     };
   }
 

@@ -19,7 +19,7 @@ struct Hencky
 
   static constexpr std::array<Parameter<Hencky>, 0> parameters() { return {}; }
   static constexpr std::array parts{
-      Part{"law", "any law but Undrained; it works on the Kirchhoff stress, and points carry the Cauchy stress"}};
+      Part{"law", "any law but Undrained; it computes the Kirchhoff stress, and particles have the Cauchy stress"}};
 
   bool operator==(const Hencky&) const = default;
 };

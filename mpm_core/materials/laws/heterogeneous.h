@@ -16,7 +16,7 @@ struct Heterogeneous
   double strength_factor = 1;       ///< what the strength of all points is divided by, for strength reduction
 
   static constexpr std::array<Parameter<Heterogeneous>, 0> parameters() { return {}; }
-  static constexpr std::array parts{Part{"law", "law of which parameters vary, one of numbers only"},
+  static constexpr std::array parts{Part{"law", "law whose parameters vary; all of them must be numbers"},
                                     Part{"varying", "names of the parameters that vary, a list"}};
 
   bool operator==(const Heterogeneous&) const = default;

@@ -33,7 +33,7 @@ struct MohrCoulomb
         parameter<L>("dilation_angle", entry<path..., &M::dilation_angle>, "degrees",
                      up_to<L>("friction_angle", friction), "dilation angle psi", 0.0),
         parameter<L>("tension_cutoff", entry<path..., &M::tension_cutoff>, "Pa", or_infinite(at_least<L>(0)),
-                     "largest principal stress allowed; without effect from the apex c cot(phi) upwards", unlimited),
+                     "tension cut-off: largest principal stress; without effect above the apex c cot(phi)", unlimited),
     };
   }
   static constexpr auto parameters() { return parameters_within<MohrCoulomb>(); }

@@ -32,12 +32,12 @@ struct SofteningMohrCoulomb
     constexpr auto friction = entry<&L::residual_friction_angle>;
     return std::array{
         parameter<L>("residual_cohesion", entry<&L::residual_cohesion>, "Pa",
-                     up_to<L>("peak.cohesion", entry<&L::peak, &MohrCoulomb::cohesion>), "cohesion in the end"),
+                     up_to<L>("peak.cohesion", entry<&L::peak, &MohrCoulomb::cohesion>), "residual cohesion"),
         parameter<L>("residual_friction_angle", friction, "degrees",
                      up_to<L>("peak.friction_angle", entry<&L::peak, &MohrCoulomb::friction_angle>),
-                     "friction angle in the end"),
+                     "residual friction angle"),
         parameter<L>("residual_dilation_angle", entry<&L::residual_dilation_angle>, "degrees",
-                     up_to<L>("residual_friction_angle", friction), "dilation angle in the end", 0.0),
+                     up_to<L>("residual_friction_angle", friction), "residual dilation angle", 0.0),
         parameter<L>("softening_strain", entry<&L::softening_strain>, "-", above<L>(0),
                      "plastic deviatoric strain over which the strength falls, in a band of the reference length"),
         parameter<L>("reference_length", entry<&L::reference_length>, "m", above<L>(0),

@@ -33,7 +33,7 @@ struct ViscoplasticMohrCoulomb
                       soil[4],
                       soil[5],
                       parameter<L>("viscosity", entry<&L::viscosity>, "Pa s", above<L>(0),
-                                   "shear stress above the strength per rate of plastic shear strain")};
+                                   "shear stress above the strength over the rate of plastic shear strain")};
   }
   static constexpr std::string_view name = "ViscoplasticMohrCoulomb";
   static constexpr std::array state_names{"plastic_strain"};

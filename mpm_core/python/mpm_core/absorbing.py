@@ -228,6 +228,6 @@ def _given(number: float | None) -> float:
 
 
 def refuse_absorbing(model: Any, what: str) -> None:
-    """Raises InputError where something does not know sides that absorb."""
+    """Raises InputError where something does not support sides that absorb."""
     if model._absorbing:
-        raise InputError(f"{what} does not know sides that absorb waves, see Model.absorb")
+        raise InputError(f"{what} does not support sides that absorb waves, see Model.absorb")

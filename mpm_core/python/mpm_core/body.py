@@ -14,6 +14,7 @@ from ._core import Geometry, InputError
 from .absorbing import AbsorbingSides
 from .checks import positive, renamed
 from .collective import collectively
+from .far_field import FarFields
 from .mesh import Mesh, Tag, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
 from .particles import Particles
@@ -44,7 +45,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body(PoreWater, RestingCells, AbsorbingSides):
+class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
     """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
@@ -79,6 +80,7 @@ class Body(PoreWater, RestingCells, AbsorbingSides):
         self._space_watch: SpaceWatch | None = None
         self._water_conditions = []
         self._absorbing, self._incoming = [], None
+        self._border = None
         self._free_fields, self._columns, self._tables = [], [], []
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._collisions: list[dict[str, Any]] = []
@@ -222,10 +224,10 @@ class Body(PoreWater, RestingCells, AbsorbingSides):
             unit: such as "Pa"; "-" without dimension.
             meaning: a sentence.
             components: numbers per particle.
-            initial: value of all particles there are, and of those to come.
+            initial: value of all particles, present and future.
 
         Raises:
-            InputError: a name that is taken or no word, no components, an initial value that is not finite.
+            InputError: a name that is already used or not a word, no components, an initial value that is not finite.
 
         Example:
             >>> model.add_field("first_yield", unit="s", meaning="Time at which the particle yielded first", initial=-1.0)

@@ -18,7 +18,9 @@ from .collective import collectively
 from .collisions import set_collisions
 from .contact import require_surfaces, set_contacts
 from .description import parsed
+from .far_field import require_border
 from .fingerprint import fingerprint, mesh_fingerprint
+from .rows import found
 from .step_control import StepControl
 
 if TYPE_CHECKING:
@@ -77,6 +79,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     here = _description(model)
     collectively(model.comm, lambda: _compare(name, there, here))
     collectively(model.comm, lambda: require_surfaces(model, there.get("contacts", [])))
+    collectively(model.comm, lambda: require_border(model, name, there.get("far_field")))
     with CheckpointFile(name, model.comm) as file:
         if there.get("cuts") and there["ranks"] == model.comm.size:
             _take_partition(model, file, name)
@@ -88,7 +91,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         before, water = _replace_contacts(model, *contacts), _water(model)
         _take_water(model, there.get("water"))
         try:
-            _core.restore(model._core, *_state(model, file), name)
+            _core.restore(model._core, *_state(model, file, name), name)
         except RunError:
             _replace_contacts(model, *before)
             _take_water(model, water)
@@ -106,8 +109,11 @@ def _take_partition(model: Model, file: CheckpointFile, path: str) -> None:
     partition.take_partition(model, numbers)
 
 
-def _state(model: Model, file: CheckpointFile) -> tuple[Arrays, Arrays, Arrays, bool]:
-    """Particles, cells and totals for `_core.restore`, and whether each rank has the cells of the same rank of the file."""
+def _state(model: Model, file: CheckpointFile, path: str) -> tuple[Arrays, Arrays, Arrays, NDArray[np.int64] | None]:
+    """Particles, cells and totals for `_core.restore`, and the rank that owns the cell of each of these particles.
+
+    None stands for the ranks where each rank owns the cells that the particles of the same rank of the file are in.
+    """
     comm, none = model.comm, np.empty(0, np.int64)
     columns = {
         field["name"]: Column(
@@ -126,10 +132,20 @@ def _state(model: Model, file: CheckpointFile) -> tuple[Arrays, Arrays, Arrays, 
             particles,
             file.cells(widths["cells"]),
             file.totals(widths["ranks"], slice(comm.rank, comm.rank + 1)),
-            True,
+            None,
         )
     equal_part = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
-    return file.particles(columns, equal_part), {}, file.totals(widths["ranks"], slice(0, n_ranks)), False
+    particles = file.particles(columns, equal_part)
+    own = _own_cells(model)
+    owners, _ = found(comm, own, np.arange(len(own)), particles["cell"])
+    collectively(comm, lambda: _require_owners(path, particles, owners), RunError)
+    return particles, {}, file.totals(widths["ranks"], slice(0, n_ranks)), np.ascontiguousarray(owners)
+
+
+def _require_owners(path: str, particles: Arrays, owners: NDArray[np.int64]) -> None:
+    for row in np.flatnonzero(owners < 0):
+        number, cell = particles["id"][row], particles["cell"][row]
+        raise RunError(f"cannot read /particles/cell in {path}: particle {number} is in cell {cell}, which no rank has")
 
 
 _Entries: TypeAlias = list[dict[str, Any]]
@@ -203,6 +219,7 @@ def _description(model: Model) -> dict[str, Any]:
         "collisions": model._collisions,
         "water": _water(model),
         "absorbing": model._absorbing_state(),
+        "far_field": model._border_state(),
         "implicit": None if model._control is None else vars(model._control),
     }
 
@@ -278,3 +295,4 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
     collectively(model.comm, lambda: core.set_supports(model._conditions))
     model._take_absorbing(there.get("absorbing"))
+    model._take_border_state(there.get("far_field"))

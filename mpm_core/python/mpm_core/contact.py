@@ -304,5 +304,5 @@ def refuse_contacts(model: Model, scheme: str) -> None:
     if model._contacts:
         kinds = ", ".join(entry["surface"]["kind"] for entry in model._contacts)
         raise InputError(
-            f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not know; use explicit()"
+            f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not support; use explicit()"
         )

@@ -142,6 +142,20 @@ def _is_water_condition(value: Any) -> bool:
     )
 
 
+def _is_border(value: Any) -> bool:
+    if value is None:
+        return True
+    if not (
+        isinstance(value, dict) and set(value) == {"marks", "held", "displacement"} and _are(_is_number, value["marks"])
+    ):
+        return False
+    n = value["marks"][0] if len(value["marks"]) == 3 else -1
+    return all(
+        isinstance(rows, list) and len(rows) == n and all(_are(_is_number, row) and len(row) in (2, 3) for row in rows)
+        for rows in (value["held"], value["displacement"])
+    )
+
+
 def _is_control(value: Any) -> bool:
     if value is None:
         return True
@@ -155,6 +169,7 @@ def _is_control(value: Any) -> bool:
 _OPTIONAL = (
     "added_fields",
     "contacts",
+    "far_field",
     "water",
     "geometry",
     "velocity_fields",
@@ -178,6 +193,7 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
     "contacts": (lambda v: _are(_is_contact, v), "a list of contacts with rigid surfaces"),
+    "far_field": (_is_border, "null, or forces and displacements of its border"),
     "water": (_is_water, "null, or the properties of the pore water"),
     "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),
     "velocity_fields": (lambda v: _are(_is_count, v), "a list of whole numbers from 0 on"),

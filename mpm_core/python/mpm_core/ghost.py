@@ -15,9 +15,9 @@ from ._core import InputError
 class GhostPenalty:
     """Penalty on the jump of gradients between partly filled cells and their neighbours.
 
-    Where the body's boundary cuts a cell, its outer nodes hang on a few particles, which makes the tangent nearly
-    singular. The penalty ties the gradient in such a cell to that of its neighbour (Burman 2010; in implicit MPM Coombs
-    2023). The penalty vanishes for affine motion, and where all cells of the body are filled.
+    Where the boundary of the body cuts a cell, the outer nodes of the cell depend on a few particles only, which makes the
+    tangent nearly singular. The penalty couples the gradient in such a cell to that of its neighbour (Burman 2010; in implicit
+    MPM Coombs 2023). The penalty vanishes for affine motion, and where all cells of the body are filled.
 
     Raises:
         InputError: a number below zero, or ``filled`` above one.

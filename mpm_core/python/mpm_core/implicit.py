@@ -165,6 +165,7 @@ def run_implicit(
     rebalance: float,
     energy_limit: float | None,
     accuracy: float | None,
+    conversion: Any,
 ) -> Iterator[ImplicitReport]:
     """Step to each of the times; yields a report there, and after every ``every_steps`` steps."""
     stepper = Stepper(model, solver, options, dt, accuracy)
@@ -176,7 +177,7 @@ def run_implicit(
 
     def report() -> ImplicitReport:
         now = stepper.report()
-        if model._core.water is None:  # the work of the water's flow is not among the energies
+        if not options.quasi_static:  # without inertia what a sudden load does beyond the stresses' work goes nowhere
             energy.look(now)
         return now
 
@@ -186,6 +187,8 @@ def run_implicit(
             if keep_balance(model, rebalance):
                 stepper.begin_anew()
             stepper.advance(until)
+            if conversion is not None:
+                model._core.convert_failing(conversion)
             if until - model.time <= close:
                 model._core.time = until
             ends = watch is not None and watch()

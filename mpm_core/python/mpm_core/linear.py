@@ -50,11 +50,11 @@ class Tangent:
         self._averaged = comm.allreduce(len(step.volumetric_force_values())) > 0
         self._product: PETSc.Mat | None = None
         if self._averaged:
-            self._force = coo_matrix(comm, (dofs, nodes), (dim, 1), step.volumetric_force_places())
-            self._strain = coo_matrix(comm, (nodes, dofs), (1, dim), step.volumetric_strain_places())
+            self._force = coo_matrix(comm, (dofs, nodes), (n, 1), step.volumetric_force_places())
+            self._strain = coo_matrix(comm, (nodes, dofs), (1, n), step.volumetric_strain_places())
         self._conjugate = comm.allreduce(len(step.mean_stress_values())) > 0
         if self._conjugate:
-            self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, dim), step.mean_stress_places())
+            self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, n), step.mean_stress_places())
             self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
         coupled = n > dim

@@ -22,6 +22,7 @@ from .explicit import (
     run_options,
     steps_between,
 )
+from .far_field import refuse_far_field
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
 from .mesh import floats
@@ -40,7 +41,7 @@ from .two_phase import begin_two_phases, refuse_two_phases
 from .views import model_text
 
 CONVERSION = Conversion()
-"""When resting cells turn into particles, unless a run says otherwise"""
+"""When resting cells turn into particles, unless a run is given other criteria"""
 
 
 class Model(Body):
@@ -48,13 +49,13 @@ class Model(Body):
 
     Args:
         mesh: the background mesh.
-        laws: one constitutive law, or several that seeding chooses by number.
+        laws: one constitutive law, or a list of laws; particles refer to them by number.
         geometry: what the mesh stands for: plane strain by default in two dimensions, `Geometry.AXISYMMETRIC` on
             request. In axial symmetry x is the radius; nodes on the axis x = 0 have no radial velocity; masses, forces and
             energies are per radian.
         velocity_fields: number of the velocity field of each law, from 0 without gaps; by default all particles move
-            with one. Bodies in different fields of one mesh do not see each other. Explicit runs only, where there are
-            several.
+            with one. Bodies in different fields of one mesh do not interact. With several fields, only explicit runs are
+            possible.
 
     Raises:
         InputError: no law, or something that is none; a geometry that the mesh cannot have, a node at a negative
@@ -72,12 +73,12 @@ class Model(Body):
     def save(self, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
         """Save the complete state: particles, loads, supports, time and totals.
 
-        The file is written aside as ``path.part``, flushed to the disk and renamed, so that a file of that name is whole at
-        all times, also when the run is killed.
+        The file is written as ``path.part``, flushed to the disk and renamed, so that a file with the name ``path`` is always
+        complete, even if the run is killed.
 
         Args:
             path: of the file, commonly ``NAME.h5``; the folder must exist.
-            notes: what JSON can hold, to be read again by `checkpoint_description`, for instance how the run was made.
+            notes: data that JSON can represent, for instance the options of the run; `checkpoint_description` returns them.
 
         Raises:
             InputError: notes that JSON cannot hold.
@@ -86,10 +87,10 @@ class Model(Body):
         checkpoint.save(self, path, notes)
 
     def restore(self, path: str | os.PathLike[str]) -> None:
-        """Take the state that ``save`` wrote; particles, loads and supports that the model has are replaced.
+        """Restore the state that ``save`` wrote; particles, loads and supports of the model are replaced.
 
-        On the same number of ranks (and partition) the run goes on as if it had never stopped, to the last bit; on another
-        one up to the order of sums.
+        On the same number of ranks (and partition) the run continues as if it had not been interrupted, to the last bit; on
+        another one it differs by the order of sums.
 
         Args:
             path: of the file. It must have been saved by a model with the same mesh and laws.
@@ -97,13 +98,13 @@ class Model(Body):
         Raises:
             InputError: a file of another mesh, of other laws or of another dimension.
             RunError: on all ranks, with path and reason: the file is not there, not a checkpoint, truncated, damaged or of an
-                unknown format. The model is as it was.
+                unknown format. The model does not change then.
         """
         checkpoint.restore(self, path)
 
     @property
     def resumed_dt(self) -> float | None:
-        """Longest step [s] of the implicit run that a restored checkpoint was taken from; None when it was of no such run."""
+        """Largest time step [s] of the implicit run that saved the restored checkpoint; None if there was no implicit run."""
         return None if self._resumed is None else self._resumed.longest
 
     # --- rigid surfaces ------------------------------------------------------------------------------------------
@@ -120,17 +121,17 @@ class Model(Body):
         centre: ArrayLike | None = None,
         penalty: float = 0.2,
     ) -> RigidContact:
-        """Let the particles touch a rigid surface, which does not depend on the mesh; explicit scheme only.
+        """Add contact of the particles with a rigid surface, which does not depend on the mesh; explicit scheme only.
 
         The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without tension, and resists
-        sliding with Coulomb friction and adhesion (docs/contact.md). It rests, moves as prescribed, or as a rigid body under
-        the forces on it.
+        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or moves as a rigid
+        body under the forces on it.
 
         Args:
-            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Polyline` or `Triangles`, where it is now; outside of all particles.
+            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Polyline` or `Triangles` at its present position, outside all particles.
             friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
             adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
-                there is none where the soil does not touch the surface, and no tension.
+                it acts only where the soil touches the surface, and does not resist tension.
             velocity: of the centre [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
                 before and after; at rest by default. Along axes in which a body is free, its initial velocity.
             spin: angular velocity about the centre [rad/s], counterclockwise in two dimensions and shape (3,) in three; or
@@ -139,11 +140,11 @@ class Model(Body):
             centre: centre of mass of a free body; the point about which the surface rotates and moments count [m], shape
                 (D,). By default the centre of a Disc, Sphere or Box, the middle of the extent of Triangles, and the first
                 point of the other surfaces.
-            penalty: stiffness beta in (0, 1], over what a mass that oscillates as fast as the time step allows would need; a
-                larger one lets particles penetrate less.
+            penalty: stiffness beta of the contact in (0, 1], relative to the largest one that the time step allows; with a
+                larger one particles penetrate less.
 
         Returns:
-            The surface's motion and what it feels, from here on.
+            Motion of the surface and forces on it, which follow the model.
 
         Raises:
             InputError: an argument out of its range, a surface of another dimension, or one that overlaps the soil, with the
@@ -222,19 +223,19 @@ class Model(Body):
         energy_limit: float | None = 0.2,
         conversion: Conversion | None = CONVERSION,
     ) -> Reports[Report]:
-        """Run the explicit scheme (16)-(20) of the paper; yields a report now and then and at the end.
+        """Run the explicit scheme (16)-(20) of the paper; yields reports at the given intervals and at the end.
 
         Args:
             until: time to reach [s].
             every: time between reports [s]; by default only at the end.
             every_steps: steps between reports, counted since the model was made.
-            since: time from which ``every`` counts [s]; by default the present. A run that goes on from a checkpoint gives
-                the start of the first run, so that it meets the same times to the last bit.
-            watch: called between steps, after every 32nd and before each report, on all ranks alike; the model may be
-                saved then. When it returns true (on all ranks), the run ends with a report.
+            since: time from which ``every`` counts [s]; by default the present. After a restart, give the start of the first
+                run, so that reports are at the same times to the last bit.
+            watch: function that is called after every 32nd step and before each report, on all ranks alike; it may save the
+                model. When it returns true (on all ranks), the run ends with a report.
             dt: time step [s]; by default ``courant`` times the critical one, which is updated as the soil changes.
             courant: alpha_c of (17), in (0, 1].
-            damping: local damping alpha, in [0, 1); none where a side lies beside a free field.
+            damping: local damping alpha, in [0, 1); it must be 0 with free fields beside the sides.
             rayleigh: damping of soil at small strains; see `Rayleigh`.
             pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
@@ -246,18 +247,20 @@ class Model(Body):
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
-            energy_limit: `Report.unexplained_fraction`, of the energy at work, at which the run ends with an error; None for
-                none. Above 0.01 there is an `EnergyWarning`.
-            conversion: when resting cells turn into particles (see ``rest``); None where only those do that a particle enters.
+            energy_limit: `Report.unexplained_fraction` at which the run ends with an error; None for no limit. Above 0.01
+                there is an `EnergyWarning`.
+            conversion: when resting cells turn into particles (see ``rest``); None if only those do that a particle enters.
 
         Raises:
             InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
-            RunError: a particle left the mesh, a value is not finite, a law failed; with the place. Energy does not add up.
+            RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; or the unexplained
+                energy reached its limit.
         """
+        refuse_far_field(self, "the explicit scheme")
         damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
         if damping and self._free_fields:
             raise InputError(
-                f"damping is {damping} with free fields beside the sides, which know rayleigh only; expected 0"
+                f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
             )
         begin_two_phases(self, integration, stress_update, damped)
         options, run, times, threshold, steps, limit = collectively(
@@ -298,6 +301,7 @@ class Model(Body):
         energy_limit: float | None = None,
         second_order: bool = False,
         accuracy: float | None = None,
+        conversion: Conversion | None = CONVERSION,
     ) -> Reports[ImplicitReport]:
         """Run the implicit scheme (section 3 of the paper) with steps far beyond the critical one.
 
@@ -305,44 +309,44 @@ class Model(Body):
 
         Args:
             until: time to reach [s].
-            dt: longest time step [s].
-            solver: what solves each step; Newton's method by default.
-            every: time between reports [s]; by default after each step.
+            dt: largest time step [s].
+            solver: solver of each step; Newton's method by default.
+            every: time between reports [s]; by default there is one after each step.
             every_steps: steps between reports, counted since the model was made.
             since: time from which ``every`` counts [s]; by default the present, see ``explicit``.
-            watch: called after each step, on all ranks alike; the model may be saved then. When it returns true (on all
-                ranks), the run ends with a report.
-            quasi_static: leave inertia out. Time then only drives loads and supports, and the particles end at rest.
-            damping: local damping alpha, in [0, 1). What it does to elastic oscillations that the step does not resolve
-                acts on the slide as a drag, as it does in the explicit scheme; not in quasi-static runs.
+            watch: function that is called after each step, on all ranks alike; it may save the model. When it returns true (on
+                all ranks), the run ends with a report.
+            quasi_static: leave inertia out. Loads and supports depend on time, and the particles are at rest at the end.
+            damping: local damping alpha, in [0, 1). Its effect on elastic oscillations that the step does not resolve
+                is a drag on the slide, as in the explicit scheme. Without effect in quasi-static runs.
             pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
                 the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
-            ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
-            small_displacements: change the particles' stresses but not their places and volumes, for quasi-static runs. With
+            ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+            small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs. With
                 ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
                 symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; checked before each step.
             energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
-            second_order: two stages to a step instead of backward Euler, the paper's: of second order in time, with hardly any
-                loss of energy in motion that the steps resolve (Alexander 1977). A step costs twice as much.
-            accuracy: for steps of second order, the displacement [m] by which a step may be wrong, root mean square over the
-                mass: steps are shortened, and grow, up to ``dt``, by an estimate of it. By default all are ``dt`` long.
+            second_order: use a method of second order in time with two stages per step (Alexander 1977) instead of backward
+                Euler, the paper's scheme. It hardly dissipates motion that the steps resolve; a step costs twice as much.
+            accuracy: for steps of second order, the permitted error of a step in displacement [m], as the root mean square
+                weighted by mass; an estimate of it determines the length of the steps, up to ``dt``. By default all are ``dt``.
+            conversion: when resting cells turn into particles, as for ``explicit``; looked at after each step.
 
         Raises:
             InputError: an argument out of its range.
-            RunError: a step of dt / 1024 did not converge either, or a particle left the mesh; with the reason. The
-                particles are as after the last step that converged.
+            RunError: a step of dt / 1024 did not converge, or a particle left the mesh; with the reason. The
+                particles have the state after the last step that converged.
         """
         refuse_contacts(self, "the implicit scheme")
-        refuse_resting(self, "the implicit scheme")
+        if self._core.water is not None:
+            refuse_resting(self, "the implicit scheme with pore water")
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()
         refuse_two_phases(self, "implicit()")
-        if nmd:
-            refuse_water(self, "nodal mixed discretisation")
         if second_order:
             refuse_water(self, "the scheme of second order")
         if isinstance(solver, Relaxation):
@@ -361,11 +365,12 @@ class Model(Body):
                 checked_accuracy(accuracy, second_order),
             ),
         )
+        core_conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
         reports = run_implicit(
             self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
-            energy_limit=limit, accuracy=wanted,
+            energy_limit=limit, accuracy=wanted, conversion=core_conversion,
         )  # fmt: skip
         return Reports(reports, "implicit", self, until)
 
@@ -380,25 +385,27 @@ class Model(Body):
         max_steps: int = 20,
         small_displacements: bool = False,
     ) -> ImplicitReport:
-        """Bring the particles to equilibrium under the present loads, by quasi-static steps of no duration.
+        """Bring the particles to equilibrium under the present loads, by quasi-static steps without duration.
 
-        Needed after an imported initial state, and after convection, where the particles' stresses no longer balance the
-        loads. Velocities become zero. The first step moves the particles, the others only change their stresses.
+        This is needed after an imported initial state, and after particles have moved to other cells, when their stresses
+        no longer balance the loads. Velocities become zero. The first step moves the particles, the others only change
+        their stresses.
 
         Args:
-            solver: what solves each step; Newton's method by default.
+            solver: solver of each step; Newton's method by default.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
-            ghost: remedy for nodes that carry hardly any mass; ``GhostPenalty()`` by default.
-            tolerance: |f_ext - f_int| / |f_ext| to reach, at nodes and particles as they are after a step.
+            ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
+            tolerance: out-of-balance ratio |f_ext - f_int| / |f_ext| to reach, in the state after a step.
             max_steps: largest number of steps.
-            small_displacements: change the particles' stresses but not their places and volumes; see ``implicit``.
+            small_displacements: change the particles' stresses but not their positions and volumes; see ``implicit``.
 
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
         refuse_contacts(self, "equilibrate()")
-        refuse_resting(self, "equilibrate()")
+        if self._core.water is not None:
+            refuse_resting(self, "equilibrate() with pore water")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
         options = collectively(

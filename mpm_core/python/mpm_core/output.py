@@ -175,8 +175,6 @@ class MeshOutput(Output):
 class ModelOutput:
     """Frames of a model's particles and of nodal fields on its background mesh; a context manager.
 
-    Values are written from where they are, without copies, and particles and mesh at the same time, by different ranks.
-
     Example:
         >>> with ModelOutput(model, "results/particles", "results/mesh") as output:
         ...     for report in model.explicit(1.0, every_steps=100):

@@ -166,7 +166,7 @@ class Particles:
         return plot_particles(self, name, axes, self.volume / self.position[:, 0] if per_radian else self.volume)
 
     def set(self, name: str, values: ArrayLike) -> None:
-        """Overwrite a field that the schedule says can be set, such as velocity, stress, state or traction.
+        """Overwrite a field that can be set according to `schedule`, such as velocity, stress, state or traction.
 
         Args:
             name: the field.

@@ -55,7 +55,7 @@ def repartition(body: Body) -> None:
     particles = np.bincount(body.particles.cell, minlength=mesh.owned_cells)
     parts = mesh._core.weighted_parts(1 + PARTICLE_WEIGHT * particles.astype(np.int64), address)
     first = sum(body.comm.allgather(mesh.owned_cells)[: body.comm.rank])
-    take_mesh(body, redistributed(mesh, parts, first + np.arange(mesh.owned_cells)))
+    take_mesh(body, redistributed(mesh, parts, first + np.arange(mesh.owned_cells)), parts)
     body._left_imbalance = imbalance(body)
 
 
@@ -71,18 +71,25 @@ def take_partition(body: Body, cells: NDArray) -> None:
     """Bring the model to a partition, given by the numbers of the cells that this rank is to own, in their order. Collective."""
     mesh, comm = body.mesh, body.comm
     ranks, order = found(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
-    take_mesh(body, redistributed(mesh, ranks, order))
+    take_mesh(body, redistributed(mesh, ranks, order), ranks)
 
 
-def take_mesh(body: Body, mesh: Mesh) -> None:
-    """Give the model its mesh under another partition, and update all that depends on it. Collective."""
-    absorbing = body._absorbing_state()
-    body._core.set_partition(mesh._core)
+def take_mesh(body: Body, mesh: Mesh, ranks: NDArray) -> None:
+    """Give the model its mesh under another partition, and update all that depends on it. Collective.
+
+    Args:
+        body: the model.
+        mesh: the mesh under the new partition.
+        ranks: rank there of each cell that this rank owns now.
+    """
+    absorbing, border = body._absorbing_state(), body._border_state()
+    body._core.set_partition(mesh._core, ranks.astype(np.int64))
     body._core.set_supports(body._conditions)
     body.mesh = mesh
     set_impervious(body)
     if absorbing:
         body._retake_absorbing(absorbing)
+    body._take_border_state(border)
     body.repartitions += 1
 
 

@@ -116,6 +116,8 @@ def solved(ksp: PETSc.KSP, right: PETSc.Vec, solution: PETSc.Vec) -> str:
 
     After a failure the solver must not be used again, see `new_solver`. Collective.
     """
+    # PETSc keeps what Python has dropped, matrices of earlier systems above all, until all ranks agree to free it.
+    PETSc.garbage_cleanup(ksp.comm)
     reason, iterations = 0, 0
     try:
         ksp.solve(right, solution)

@@ -274,5 +274,5 @@ def refuse_water(body: PoreWater, scheme: str) -> None:
     """Raises InputError where a scheme would leave the flow of the pore water out."""
     if body._core.water is not None:
         raise InputError(
-            f"the model has pore water, whose flow {scheme} does not know; use implicit() by Newton's method"
+            f"the model has pore water, whose flow {scheme} does not support; use implicit() by Newton's method"
         )

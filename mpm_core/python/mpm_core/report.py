@@ -29,7 +29,7 @@ class Report:
     kinetic_energy: float
     """Of the particles"""
     external_work: float
-    """Work of gravity, tractions and contact forces since the model was made"""
+    """Work of gravity, tractions, contact forces and of pressures where pore water enters, since the model was made"""
     internal_work: float
     """Work of the nodal forces of the stresses"""
     damping_work: float
@@ -37,9 +37,9 @@ class Report:
     support_work: float
     """Work of prescribed velocities"""
     drag_work: float
-    """Energy taken out by pore water that flows through the soil with a velocity of its own"""
+    """Energy taken out by pore water that flows through the soil"""
     stress_work: float
-    """Work of the particles' stresses on their strains: stored energy and plastic dissipation"""
+    """Work of the particles' stresses on their strains and on their water: stored energy and plastic dissipation"""
     stored_energy: float
     """Energy of the present elastic strains; NaN with a law that does not define it (Python, UMAT)"""
     plastic_work: float
@@ -49,9 +49,9 @@ class Report:
     nodal_kinetic_energy: float
     """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
     unexplained_energy: float
-    """External and support work, less damping work, PIC loss, stress work and the gain of kinetic energy: what the
+    """External and support work, less damping and drag work, PIC loss, stress work and the gain of kinetic energy: what the
     discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but
-    a step with inertia"""
+    a step with inertia or flow"""
     energy_scale: float
     """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy at the start
     and now"""
@@ -80,7 +80,7 @@ class Report:
     def is_quasi_static(self, tolerance: float = 1e-3) -> bool:
         """Whether the soil is at rest: the out-of-balance ratio and kinetic energy over external work are not above a tolerance.
 
-        Kinetic energy is not looked at where external forces have done no work.
+        Kinetic energy is not considered if external forces have done no work.
         """
         work = abs(self.external_work)
         return self.unbalanced_ratio <= tolerance and (work == 0 or self.kinetic_energy <= tolerance * work)

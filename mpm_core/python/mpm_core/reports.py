@@ -65,7 +65,7 @@ class Reports(Generic[R]):
     def __del__(self) -> None:
         if not getattr(self, "_begun", True):
             warnings.warn(
-                f"Model.{self._scheme}(...) made no step, since nothing asked for its reports: write "
+                f"Model.{self._scheme}(...) made no step, because its reports were not requested: write "
                 f"`for report in model.{self._scheme}(...)`, or model.{self._scheme}(...).last() to run to the end",
                 RuntimeWarning,
                 stacklevel=2,

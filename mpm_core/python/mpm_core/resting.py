@@ -1,4 +1,4 @@
-"""Cells that rest: finite elements of one material point, which turn into particles where the soil fails."""
+"""Resting cells: finite elements with one material point, which turn into particles where the soil fails."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ Where: TypeAlias = Callable[[NDArray[np.float64]], ArrayLike] | ArrayLike
 
 @dataclass(frozen=True)
 class Conversion:
-    """When resting cells turn into particles; checked every 32 steps of an explicit run.
+    """When resting cells turn into particles; checked every 32 steps of an explicit run, and after each implicit step.
 
     A cell that a particle enters turns into particles at once, whatever the criterion.
 
     Args:
-        plastic_strain: accumulated plastic deviatoric strain of a cell, or of a particle in it, above which it is to be
-            particles [-]. In a shear band it grows without bound, elsewhere it stays at the order of the elastic strains.
-        displacement: of a node since its cell began to rest, over the size h of the cell, above which the cell turns into
-            particles [-]. They are placed where the cell is, not where it has moved to, so that this much of a cell is the
-            largest error of their places.
+        plastic_strain: accumulated plastic deviatoric strain of a cell, or of a particle in it, above which the cell turns into
+        particles [-]. In a shear band it grows without bound, elsewhere it is of the order of the elastic strains.
+    displacement: displacement of a node since its cell became a resting cell, over the cell size h, above which the cell
+        turns into particles [-]. They are placed at the original position of the cell, so that this is the largest error
+        of their positions, over the cell size.
         layers: layers of cells around such a cell that turn into particles with it, so that a shear band grows in particles.
 
     Raises:
@@ -69,14 +69,14 @@ class RestingCells:
         return resting
 
     def rest(self, cell_tag: Tag | None = None, *, where: Where | None = None) -> int:
-        """Let cells rest: each becomes a linear finite element with one material point, instead of its particles.
+        """Turn cells into resting cells: each is a linear finite element with one material point, instead of its particles.
 
         A resting cell costs about as much as one particle. Its nodes are those of the particles around it, and it has their
         mass, so that waves pass from one to the other. It is for soil that hardly moves: a cell turns into particles where it
         fails (`Conversion`), which changes neither mass, momentum and force of the nodes nor the energy.
 
         Stress, state and all other values of a cell are the means of those of its particles. `particles` has one row for each
-        resting cell, at its centre, with the mass and volume of the cell; `particles.is_resting` tells them.
+        resting cell, at its centre, with the mass and volume of the cell; `particles.is_resting` marks these rows.
 
         Args:
             cell_tag: cells with this tag, or these tags, by number or name; all cells by default.
@@ -84,7 +84,7 @@ class RestingCells:
                 rank's own cells.
 
         Returns:
-            Number of cells that rest now, over all ranks.
+            Number of resting cells over all ranks.
 
         Raises:
             InputError: on all ranks: cells whose particles are not where `seed` placed them, or carry tractions; axial
@@ -105,7 +105,7 @@ class RestingCells:
             where: as for `rest`.
 
         Returns:
-            Number of cells that rest still, over all ranks.
+            Number of remaining resting cells over all ranks.
         """
         self._core.convert_cells(self._chosen(cell_tag, where))
         return self._count()
@@ -131,17 +131,17 @@ class RestingCells:
 
 
 def refuse_resting(model: Any, what: str) -> None:
-    """Raises InputError where something does not know resting cells. Collective."""
+    """Raises InputError where something does not support resting cells. Collective."""
     count = model.comm.allreduce(int(model.particles.is_resting.sum()))
     if count:
-        raise InputError(f"{what} does not know resting cells, of which the model has {count}; see Model.convert")
+        raise InputError(f"{what} does not support resting cells, of which the model has {count}; see Model.convert")
 
 
 def checked_conversion(model: Any, conversion: Conversion | None, integration: Any) -> Any:
     """The core's criterion; None where resting cells are to stay.
 
     Raises:
-        InputError: something else, or what resting cells do not know.
+        InputError: something else, or what resting cells do not support.
     """
     if conversion is not None and not isinstance(conversion, Conversion):
         raise InputError(f"conversion is {conversion!r}, expected a Conversion or None")

@@ -31,8 +31,8 @@ class FreeBody:
             and z at the start, or one number for all. By default that of a homogeneous solid Disc, Sphere or Box.
         axes: for each axis, whether the body moves freely along it; along the others, as the prescribed velocity says. All by
             default, in axial symmetry only y.
-        rotates: whether it rotates freely; else as the prescribed spin says. By default it does, but not in axial symmetry.
-        force: applied at its centre [N], shape (D,); or (times [s], forces (n, D)). The body's weight comes beside it.
+        rotates: whether it rotates freely; otherwise it has the prescribed spin. True by default, except in axial symmetry.
+        force: applied at its centre [N], shape (D,); or (times [s], forces (n, D)), in addition to the weight of the body.
     """
 
     mass: float
@@ -53,7 +53,7 @@ class Servo:
         force: that the body passes on to the soil [N], shape (D,); or (times [s], forces (n, D)). Entries of other axes are zero.
         speed: largest speed along each axis [m/s]; with it the body approaches the soil.
         axes: for each axis, whether it is controlled; by default those with a force other than zero. Along the others the body
-            moves as the prescribed velocity says.
+            moves with the prescribed velocity.
     """
 
     force: Velocity

@@ -45,7 +45,8 @@ def _nothing_acts(model: Model) -> str:
 
 
 def _nothing_holds(model: Model) -> str:
-    if model._conditions or model._contacts or model._absorbing or not np.any(model.gravity):
+    held = model._conditions or model._contacts or model._absorbing or model._border is not None
+    if held or not np.any(model.gravity):
         return ""
     return "nothing holds the particles, which fall freely: there is gravity and no boundary condition (model.fix, model.roller)"
 

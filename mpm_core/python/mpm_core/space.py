@@ -102,7 +102,7 @@ class SpaceWatch:
         return int(np.sum(masses >= LEAST_PART * masses.sum()))
 
     def look(self) -> None:
-        """Warn if the body has come apart, or has lost space. Collective."""
+        """Warn if the body has come apart, or takes up too little space. Collective."""
         if self._model.steps - self._steps < STEPS_BETWEEN:
             return
         self._steps = self._model.steps
@@ -113,16 +113,16 @@ class SpaceWatch:
             before, self._parts = self._parts, now
             warnings.warn(
                 f"the body is in {now} parts at t = {self._model.time:.6g} s, and was in {before}: particles moved apart "
-                "by more than a cell, so that no force acts between them. Unless the soil is to break, take more particles per "
-                "cell or larger cells",
+                "by more than a cell, so that no force acts between them. Unless the soil is meant to break, use more particles "
+                "per cell or larger cells",
                 RuntimeWarning,
                 stacklevel=5,
             )
         if volumes.filled < LEAST_FILLED * volumes.particles:
             warnings.warn(
                 f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
-                f"{self._model.time:.6g} s: they crowd in some cells, and space is lost. integration=MIXED keeps more of it "
-                "than PARTICLES",
+                f"{self._model.time:.6g} s: they crowd in some cells, and the body takes up too little space; this is less "
+                "with integration=MIXED than with PARTICLES",
                 RuntimeWarning,
                 stacklevel=5,
             )

@@ -49,4 +49,4 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
 def refuse_two_phases(model: Model, scheme: str) -> None:
     """Raises InputError after an explicit run, in which the water has a velocity of its own."""
     if model._core.has_two_phases:
-        raise InputError(f"the pore water has a velocity of its own since explicit(), which {scheme} does not know")
+        raise InputError(f"the pore water has a velocity of its own since explicit(), which {scheme} does not support")

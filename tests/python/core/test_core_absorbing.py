@@ -146,7 +146,7 @@ def test_a_run_with_absorbing_sides_goes_on_from_a_checkpoint(tmp_path):
         (lambda model: model.absorb(2, impedances=(1.0, -1.0)), r"impedances\[1\] is -1.0"),
         (lambda model: model.shake(mpm.Motion([0, 1], [0, 1]), (1, 0)), "no side absorbs"),
         (lambda model: model.absorb(2) or model.shake(3.0, (1, 0)), "motion is 3.0, expected a Motion"),
-        (lambda model: model.absorb(2) or list(model.implicit(1.0, dt=0.1)), "does not know sides that absorb"),
+        (lambda model: model.absorb(2) or list(model.implicit(1.0, dt=0.1)), "does not support sides that absorb"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused(use, message):

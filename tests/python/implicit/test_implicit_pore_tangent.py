@@ -13,7 +13,7 @@ PLASTIC = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=2e3, friction_angle=2
 DT = 0.02
 
 
-def started_step(dim, law, *, quasi_static, round=False, mixed=False):
+def started_step(dim, law, *, quasi_static, round=False, mixed=False, nmd=False, averaged=False):
     """A step of a box of which 0.6 are filled with wet soil: random velocities, stresses and pressures."""
     offset = [0.5 if round else 0.0] + [0.0] * (dim - 1)
     mesh = box([3 if dim == 2 else 2] * dim, shake=0.2, place=lambda x: x + offset)
@@ -33,6 +33,7 @@ def started_step(dim, law, *, quasi_static, round=False, mixed=False):
     options = _core.ImplicitOptions()
     options.quasi_static = quasi_static
     options.integration = mpm.Integration.MIXED if mixed else mpm.Integration.PARTICLES
+    options.nmd, options.average_stress = nmd, averaged
     step = getattr(_core, type(model._core).__name__.replace("Model", "ImplicitStep"))(model._core)
     step.start(options, DT)
     return step, rng
@@ -47,7 +48,19 @@ def free(step, dim, direction):
 
 
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
-@pytest.mark.parametrize("dim, options", [(2, {}), (2, {"round": True}), (2, {"mixed": True}), (3, {})], ids=str)
+@pytest.mark.parametrize(
+    "dim, options",
+    [
+        (2, {}),
+        (2, {"round": True}),
+        (2, {"mixed": True}),
+        (3, {}),
+        (2, {"nmd": True}),
+        (2, {"nmd": True, "averaged": True}),
+        (3, {"nmd": True}),
+    ],
+    ids=str,
+)
 @pytest.mark.parametrize("quasi_static", [True, False], ids=["quasi-static", "dynamic"])
 def test_tangent_is_the_derivative_of_the_residual(dim, options, law, quasi_static):
     step, rng = started_step(dim, law, quasi_static=quasi_static, **options)

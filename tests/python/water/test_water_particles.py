@@ -54,11 +54,12 @@ def test_a_loaded_column_consolidates_as_terzaghi_has_it(dim, cells, tolerance):
         assert column.base() == pytest.approx(terzaghi_base(factor), abs=tolerance)
 
 
+@pytest.mark.parametrize("nmd", [False, True])
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 0.1, 1.0, 10.0])
-def test_the_first_step_does_not_overshoot(ratio):
+def test_the_first_step_does_not_overshoot(ratio, nmd):
     column = Column(12)  # cells that are nearly squares
     dt = ratio * column.period / 12**2
-    list(column.model.implicit(dt, dt=dt, quasi_static=True, small_displacements=True))
+    list(column.model.implicit(dt, dt=dt, quasi_static=True, small_displacements=True, nmd=nmd))
     pressure = column.model.particles.pore_pressure / column.load
     assert pressure.max() <= 1 + 1e-6 and pressure.min() >= -1e-6
 
@@ -118,15 +119,16 @@ def test_soil_that_hardly_drains_is_the_undrained_one():
 # --- conservation -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("nmd", [False, True])
 @pytest.mark.parametrize("quasi_static", [True, False], ids=["quasi-static", "dynamic"])
-def test_the_pores_change_by_what_enters(quasi_static):
+def test_the_pores_change_by_what_enters(quasi_static, nmd):
     model = on_box((0.2, 1.0), (2, 10), ELASTIC)
     model.add_water(porosity=0.4, conductivity=1e-5, modulus=np.inf, kozeny_carman=True)
     model.hold_pore_pressure(TOP, 0.0)
     model.traction(TOP, (0.0, -500e3))
     model.set_gravity((0.0, -9.81))
     volume, entered = model.water_volume(), 0.0
-    for report in model.implicit(0.5, dt=0.05, quasi_static=quasi_static, solver=mpm.Newton(tolerance=1e-12)):
+    for report in model.implicit(0.5, dt=0.05, quasi_static=quasi_static, nmd=nmd, solver=mpm.Newton(tolerance=1e-12)):
         now, inflow = model.water_volume(), model.water_inflow()
         assert now - volume == pytest.approx(inflow - entered, abs=1e-10 * volume)
         assert report.iterations <= 6

@@ -1,0 +1,88 @@
+"""Soil that does not drain, by particles with pore water: bearing capacity and slopes are those of total stresses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+COHESION = 1e3
+CLAY = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=COHESION, friction_angle=0.0)
+UNDRAINED = mpm.Undrained(CLAY, water_modulus=2.2e9, porosity=0.4)
+FOOTING = Path(__file__).parents[3] / "meshes" / "footing.geo"
+AXIS, BASE, FAR, PRESSED = 1, 2, 3, 5
+SETTLED, HALF = 0.02, 0.5
+"""Of the footing [m], and half its width [m]"""
+
+
+def ground():
+    parameters = {"width": 4.0, "depth": 2.0, "edge_size": 0.03, "near_size": 0.12, "far_size": 0.6}
+    return bridge.read_mesh(FOOTING, MPI.COMM_WORLD, parameters=parameters)
+
+
+def bearing_capacity(law, *, nmd):
+    """Mean pressures below a footing over the cohesion, by particles, before and at the end of its settlement."""
+    model = mpm.Model(bridge.background_mesh(*ground()), law)
+    model.seed(density=2000.0, per_cell=1)
+    for tag in (AXIS, FAR):
+        model.roller(tag, (1, 0))
+    model.fix(BASE)
+    model.prescribe(PRESSED, (0.0, -SETTLED))
+    if law is CLAY:
+        model.add_water(porosity=0.4, conductivity=1e-17, modulus=2.2e9)
+    options = {"dt": 0.05, "quasi_static": True, "small_displacements": True, "nmd": nmd}
+    works = [0.0] + [report.support_work for report in model.implicit(1.0, every=0.05, **options)]
+    pressures = np.diff(works) / (0.05 * SETTLED * HALF * COHESION)
+    return pressures[10], pressures[-1]
+
+
+def quadratic_elements():
+    domain, _, facet_tags = ground()
+    supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE),
+                bridge.prescribed(PRESSED, (0.0, -SETTLED))]  # fmt: skip
+    model = bridge.QuasiStatic(domain, UNDRAINED, facet_tags, supports, degree=2)
+    for part in np.linspace(0.05, 1.0, 20):
+        assert model.equilibrate(bridge.Load(displacement=part)).converged
+    return model.reaction(PRESSED)[1] / (HALF * COHESION)
+
+
+def test_a_footing_on_particles_that_do_not_drain_carries_the_load_of_total_stresses():
+    """Without averages the skeleton locks, whose own volume each cell has to keep: its load rises without end."""
+    before, found = bearing_capacity(CLAY, nmd=True)
+    assert found - before < 2e-3 * found  # it has come to a limit
+    assert found == pytest.approx(quadratic_elements(), rel=0.02)
+    assert found == pytest.approx(bearing_capacity(UNDRAINED, nmd=True)[1], rel=0.01)
+    assert 2 + np.pi < found < 1.07 * (2 + np.pi)
+    before, locked = bearing_capacity(CLAY, nmd=False)
+    assert locked > 1.5 * found and locked - before > 0.04 * locked
+
+
+def collapse(law):
+    """Unit weight at which a slope of cohesive soil collapses, in multiples of the cohesion over its height, to 1 %."""
+    model = mpm.Model(bridge.background_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, 1.0, 45.0, 1.1, 0.1)), law)
+    model.seed(density=COHESION / 9.81, per_cell=1, cell_tag=bridge.SOIL)
+    model.roller(bridge.LEFT, (1, 0))
+    model.fix(bridge.BASE)
+    if law is CLAY:
+        model.add_water(porosity=0.4, conductivity=1e-17, modulus=2.2e9)
+    weight = 5.0
+    while weight < 12.0:
+        model.set_gravity((0.0, -9.81 * weight))
+        try:
+            model.implicit(
+                model.time + 1.0, dt=1.0, quasi_static=True, small_displacements=True, nmd=True, solver=ONE_TRY
+            ).last()
+        except mpm.RunError:
+            return weight
+        weight *= 1.01
+    raise AssertionError("the slope does not collapse")
+
+
+ONE_TRY = mpm.Newton(max_iterations=60)
+
+
+def test_a_slope_of_particles_that_does_not_drain_collapses_as_that_of_total_stresses():
+    assert collapse(CLAY) == pytest.approx(collapse(UNDRAINED), rel=0.02)
