@@ -133,7 +133,8 @@ def relax(
         if len(result.time) == 1:  # the elastic displacement under the change of load, which theta has slowed down
             reference += ELASTIC * (1 + theta) * result.growth[0]
         result.balanced = result.residual[-1] <= tolerance
-        if result.balanced or result.missing[-1] <= solver.missing_tolerance:
+        # Soil that is still elastic lacks nothing, however far the body is from equilibrium: both must be small.
+        if result.balanced or max(result.residual[-1], result.missing[-1]) <= solver.missing_tolerance:
             result.outcome = "equilibrium"
             return result
         if _flows(result, reference):

@@ -26,8 +26,8 @@ class Solver:
     relaxed_tolerance: float = 1e-5
     """Out-of-balance force at which a relaxation ends [-]"""
     missing_tolerance: float = 0.0
-    """Missing stress, over the strength that is mobilised, in every cell that yields, at which a relaxation ends, too [-]; at 0
-    only the out-of-balance force counts"""
+    """A relaxation also ends when the out-of-balance force, and in every cell that yields the missing stress over the mobilised
+    strength, are below this number [-]; at 0 only `relaxed_tolerance` counts"""
     max_steps: int = 80
     """Largest number of steps of a relaxation"""
 
@@ -43,5 +43,5 @@ class Solver:
 
 
 PRACTICE = Solver(tolerance=1e-5, missing_tolerance=1e-2)
-"""Also accepts a relaxation in which no cell that yields lacks more than 1 % of the stress, a tolerance as in practice. Factors
-of safety become up to 1 % higher, whatever part of the body fails: see `missing_stress`."""
+"""Also accepts a relaxation with an out-of-balance force of 1 % in which no cell that yields lacks more than 1 % of the stress,
+tolerances as in practice. Factors of safety become up to 1 % higher, whatever part of the body fails: see `missing_stress`."""

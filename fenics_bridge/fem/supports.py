@@ -16,6 +16,7 @@ from fenics_bridge.compat import facet_nodes
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.types import MeshTags
+from mpm_core.mesh import Tag
 
 
 @dataclass(frozen=True)
@@ -151,8 +152,8 @@ def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[flo
     return tuple(float(k == along[0]) for k in range(domain.geometry.dim)) if len(along) == 1 else None
 
 
-def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: int | str, argument: str) -> NDArray[np.int32]:
-    """Facets of this rank with a tag, given as a number or name. Raises InputError, on all ranks, for none. Collective."""
+def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: Tag, argument: str) -> NDArray[np.int32]:
+    """Facets of this rank with a tag, or tags, by number or name. Raises InputError, on all ranks, for none. Collective."""
     return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
 
 

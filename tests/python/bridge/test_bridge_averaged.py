@@ -81,6 +81,14 @@ def test_soil_without_dilation_fails_no_earlier_than_in_quadratic_elements():
     assert -0.01 < excess[1] < 0.6 * excess[0]
 
 
+def test_soil_that_hardly_dilates_is_right_at_its_reduced_strength():
+    """tan(psi) / tan(phi) is 0.08 at the start and 0.15 in failure; averaged forces would give 1.82."""
+    model, reference = bank(0.5, loam(3.0), degree=1, nmd=True), bank(0.5, loam(3.0), degree=2)
+    linear, quadratic = (bridge.factor_of_safety(one, bridge.Load(unit_weight=20e3)) for one in (model, reference))
+    assert linear.failed and quadratic.failed
+    assert linear.value == pytest.approx(quadratic.value, rel=0.02)
+
+
 def test_forces_are_those_of_the_stress_where_soil_does_not_dilate_and_conjugate_to_strain_elsewhere():
     plain, averaged = (bank(2.0, loam(0.0), degree=1, nmd=nmd) for nmd in (False, True))
     stress = 1e3 * np.random.default_rng(7).normal(size=plain.points.stress.shape)

@@ -37,6 +37,17 @@ def test_an_elastic_body_relaxes_at_the_rate_of_the_closed_form():
     assert np.allclose(np.array(relaxation.carried)[above], carried[above], rtol=1e-6)
 
 
+@pytest.mark.parametrize("missing", [0.0, 1e-2])
+def test_an_elastic_body_is_not_in_equilibrium_because_nothing_yields(missing):
+    """Where nothing yields no stress is missing, to round-off; the first pseudo-step still leaves a quarter of the forces."""
+    report = elastic_column().equilibrate(
+        weight(20e3), tolerance=1e-30, max_iterations=1, relaxed_tolerance=1e-6, missing_tolerance=missing
+    )
+    assert report.converged and report.relaxation.missing[0] < 1e-12
+    assert report.relaxation.residual[0] > 0.1
+    assert report.relaxation.residual[-1] <= max(missing, 1e-6)
+
+
 def test_a_body_that_flows_at_a_steady_rate_takes_one_system_a_step():
     """A plastic block flows at constant volume, at the strain rate (p - 2 s_u) / 4G: each step begins at its own end."""
     block, _, sides = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [2, 2])
