@@ -1,4 +1,4 @@
-"""Consolidation: deformation of saturated soil and flow of its pore water, coupled."""
+"""Consolidation: deformation of soil, saturated or not, and flow of its pore water, coupled."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledS
 from fenics_bridge.water.coupled import (
     CoupledConstraints,
     Element,
-    PressureProjection,
     ReservoirLoads,
     WaterTerms,
     pressure_is_free,
 )
 from fenics_bridge.water.initial_state import set_initial_state
+from fenics_bridge.water.projection import PressureProjection
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
@@ -47,13 +47,13 @@ from mpm_core import Geometry
 
 
 class Consolidation(PointFunctions):
-    """Quasi-static deformation of saturated soil coupled with the flow of its water: displacement u and pore pressure p.
+    """Quasi-static deformation of soil coupled with the flow of its water: displacement u and pore pressure p.
 
     Args:
         domain: mesh of the body.
         law: law of `mpm_core` for effective stresses, or laws by cell tag or name.
-        soil: soil, or soils by cell tag or name; its compressibility does not count, and its retention curve must be
-            AlwaysSaturated.
+        soil: soil, or soils by cell tag or name; its compressibility does not count. With a retention curve it is unsaturated
+            under suction; in axisymmetric bodies it must be AlwaysSaturated.
         facet_tags: tags of the boundary.
         supports: boundary conditions of the displacement, from `fixed`, `roller` and `prescribed`.
         boundary: boundary conditions of the water, as for `Seepage`; a Reservoir also presses on the soil.
@@ -91,7 +91,7 @@ class Consolidation(PointFunctions):
         solver: Solver | None = None,
         options_prefix: str = "consolidation_",
     ) -> None:
-        agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus))
+        agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus, geometry))
         self.domain = domain
         """Mesh of the body"""
         self.geometry = geometry_of(domain, geometry)
@@ -378,13 +378,13 @@ def _largest_conductivity(soils):
     return max(np.linalg.eigvalsh(soil.tensor(soil.conductivity, 3)).max() for soil in soils)
 
 
-def _first_mistake(element, soil, unit_weight, water_modulus):
+def _first_mistake(element, soil, unit_weight, water_modulus, geometry):
     if not isinstance(element, Element):
         return f"element: got {element!r}, expected one of {', '.join(map(str, Element))}"
     for one in soil.values() if isinstance(soil, dict) else [soil]:
         retention = getattr(one, "retention", None)
-        if retention is not None and not isinstance(retention, AlwaysSaturated):
-            return f"soil: it has the retention curve {retention!r}, expected AlwaysSaturated: consolidation is of saturated soil"
+        if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):
+            return f"soil: it has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
     if not (np.isfinite(unit_weight) and unit_weight > 0):
         return f"unit_weight: got {unit_weight!r} N/m3, expected a positive number"
     if not water_modulus > 0:

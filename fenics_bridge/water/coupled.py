@@ -4,6 +4,11 @@
 
 with the pressure p positive in compression (Biot 1941; Zienkiewicz and Shiomi 1984). Backward Euler takes the second equation
 over a step; times minus the unit of pressure it makes the system symmetric where the law's tangent is.
+
+Soil with a retention curve is unsaturated under suction -p, its air at atmospheric pressure: with the degree of saturation S,
+the effective one S_e and the relative permeability k_r,
+
+    div(sigma' - S_e p I) + (rho - n (1 - S) rho_w) g = 0,    d/dt(S (n + div u + n p / K_w)) + div q = 0,    k -> k_r k .
 """
 
 from __future__ import annotations
@@ -15,15 +20,13 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.mesh.tagged import cell_corners, owned_cells
-from fenics_bridge.types import Law
 from fenics_bridge.water.boundary import Reservoir, value_at
+from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.soils import PorousSoil
 
 
@@ -35,6 +38,14 @@ class Element(Enum):
     STABILISED = 1
     """Linear displacement, stabilised by a polynomial pressure projection; some four times fewer unknowns in two dimensions, ten
     times in three"""
+
+
+UNSATURATED, LUMPED = {"quadrature_degree": 4}, {"quadrature_rule": "vertex", "quadrature_degree": 1}
+"""Integrals of soil that may dry: flow and forces; water that it stores, at the vertices, so that pressures do not oscillate."""
+
+
+def _may_dry(soil: PorousSoil) -> bool:
+    return not isinstance(soil.retention, AlwaysSaturated)
 
 
 class WaterTerms:
@@ -63,17 +74,21 @@ class WaterTerms:
         degree: int,
     ) -> None:
         domain = solution.function_space.mesh
+        self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
         self._soils, (self._gamma, self._modulus) = soils, weights
         rule = {"quadrature_degree": degree}
-        self._measures = [dx(metadata=rule) for dx in measures]
+        curved = [_may_dry(soil) for soil in soils]
+        self._measures = [dx(metadata=UNSATURATED if dry else rule) for dx, dry in zip(measures, curved)]
+        self._storing = [dx(metadata=LUMPED if dry else rule) for dx, dry in zip(measures, curved)]
         self.dt = fem.Constant(domain, 1.0)
         """Length of the step [s], a constant of the forms"""
         self.projection = fem.Function(compat.function_space(domain, "DG", 0, self._dim**2))
         """Function of the pressure projection (D * D,) [m2/Pa], see `PressureProjection`"""
         self._u, self._p = ufl.split(solution)
         self._du, self._dp = ufl.split(increment)
-        self.content = fem.form(self._sum(lambda s: s.porosity + self._volume(self._u) + self._storage(s) * self._p))
+        content = lambda s: self._saturation(s, self._p) * self._pores(s)
+        self.content = fem.form(self._sum(content, self._storing))
         """Form of the volume of stored water"""
 
     def forms(self, applied: Any) -> Callable[[Any, Any], tuple[Any, Any]]:
@@ -81,12 +96,11 @@ class WaterTerms:
 
         def further(test, trial):
             v, q = ufl.split(test)
-            forces = self._sum(lambda s: (self._p + self._dp) * self._volume(v))
-            water = self._sum(lambda s: q * (self._volume(self._du) + self._storage(s) * self._dp))
-            pushed = (self._unit / self._gamma) * ufl.grad(self._p + self._dp)
-            water += self.dt * (
-                self._flow(pushed, q) + self._flow(self._up(), q) - applied.unit * applied.inflow_form(q)
-            )
+            end = self._p + self._dp
+            forces = self._sum(lambda s: self._pressing(s, end) * self._volume(v) + self._missing(s, end, v))
+            water = self._sum(lambda s: q * self._stored(s), self._storing)
+            pushed = (self._unit / self._gamma) * ufl.grad(end)
+            water += self.dt * (self._flow(pushed + self._up, q, end) - applied.unit * applied.inflow_form(q))
             spread = ufl.as_matrix(
                 [[self.projection[i * self._dim + j] for j in range(self._dim)] for i in range(self._dim)]
             )
@@ -99,21 +113,46 @@ class WaterTerms:
     def gravity_flow(self, space: Any) -> NDArray[np.float64]:
         """What the weight of the water makes flow in 1 s, as part of the internal forces: (m,). Collective."""
         q = ufl.TestFunctions(space)[1]
-        return self._unit * assembled(fem.form(self._flow(self._up(), q)), space).array
+        return self._unit * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
 
-    def _flow(self, gradient, q):
+    def _flow(self, gradient, q, pressure):
         def density(soil):
             k = ufl.as_matrix(soil.tensor(soil.conductivity, self._dim).tolist())
-            return ufl.inner(k * gradient, ufl.grad(q))
+            through = soil.retention.relative_permeability(-self._unit * pressure) if _may_dry(soil) else 1.0
+            return through * ufl.inner(k * gradient, ufl.grad(q))
 
         return self._sum(density)
 
-    def _sum(self, density):
+    def _sum(self, density, measures=None):
         """Integral over the cells of all soils of a density that is a function of the soil."""
-        return sum(weighted(density(soil), self._radius) * dx for soil, dx in zip(self._soils, self._measures))
+        pairs = zip(self._soils, measures or self._measures)
+        return sum(weighted(density(soil), self._radius) * dx for soil, dx in pairs)
 
-    def _up(self):
-        return ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
+    def _saturation(self, soil, pressure):
+        return soil.retention.saturation(-self._unit * pressure) if _may_dry(soil) else 1.0
+
+    def _pressing(self, soil, pressure):
+        """Part of the pressure that the total stress has, over its unit."""
+        return soil.retention.effective(-self._unit * pressure) * pressure if _may_dry(soil) else pressure
+
+    def _missing(self, soil, pressure, v):
+        """Weight of the water that pores have no more, times a test function, over the unit of pressure."""
+        if not _may_dry(soil):
+            return 0.0
+        lost = soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
+        return lost * ufl.inner(self._up, v)
+
+    def _pores(self, soil):
+        """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""
+        return soil.porosity + self._volume(self._u) + self._storage(soil) * self._p
+
+    def _stored(self, soil):
+        """Water that a volume of soil takes up in the step; small differences are taken first, for the sake of round-off."""
+        gained = self._volume(self._du) + self._storage(soil) * self._dp
+        if not _may_dry(soil):
+            return gained
+        now, before = (self._saturation(soil, p) for p in (self._p + self._dp, self._p))
+        return now * gained + (now - before) * self._pores(soil)
 
     def _volume(self, u):
         return dilation(u, self._radius)
@@ -130,60 +169,6 @@ def pressure_is_free(space: Any, constraints: Any, radius: Any) -> bool:
     work[constraints.dofs] = 0.0
     most = np.max(space.mesh.comm.allgather([largest, np.abs(work).max(initial=0.0)]), axis=0)
     return bool(most[1] <= 1e-10 * most[0])
-
-
-MARGIN = 4
-"""Of the pressure projection over the least factor that does for uniaxial strain"""
-
-
-class PressureProjection:
-    """The term tau int (dp - P dp)(q - P q), P the mean of a cell, that keeps equal-order elements from oscillating.
-
-    (Bochev and Dohrmann 2006; White and Borja 2008.) For a linear pressure it is tau int grad dp . T grad q with the second
-    moments T of the cell about its centroid over its volume. With m = 1,
-        tau = m (D + 1) max(0, 3/2 (1 / M + S) - 6 k dt / (gamma_w h^2)),
-    M the oedometric modulus, S = n / K_w, h the longest edge, is the least factor with which layers of simplices cut from cubes
-    have, in uniaxial strain, no positive off-diagonal entry in the system of the pressures, so that these obey a maximum
-    principle. But the nodes of a layer do not all move alike, which leaves 1 to 3 %; m is `MARGIN`.
-
-    Args:
-        domain: mesh of the body.
-        points: the quadrature points.
-        laws: the laws, by number.
-        soils: soils, as of `soils_by_tag`.
-        cells: cells of each of them.
-        weights: unit weight [N/m3] and bulk modulus [Pa] of water.
-    """
-
-    def __init__(
-        self,
-        domain: Mesh,
-        points: Any,
-        laws: Sequence[Law],
-        soils: Sequence[PorousSoil],
-        cells: Sequence[NDArray[np.int32]],
-        weights: tuple[float, float],
-    ) -> None:
-        (gamma, modulus), corners, n = weights, cell_corners(domain), owned_cells(domain)
-        dim = corners.shape[2]
-        longest = np.sum((corners[:, :, None] - corners[:, None]) ** 2, axis=3).max(axis=(1, 2))
-        from_centroid = corners - corners.mean(axis=1, keepdims=True)
-        moments = np.einsum("cki,ckj->cij", from_centroid, from_centroid) / ((dim + 1) * (dim + 2))
-        flexibility, mobility = np.empty(n), np.empty(n)
-        flexibility[points.cells] = 1 / np.array([law.p_wave_modulus for law in laws])[points.material]
-        for soil, own in zip(soils, cells):
-            own = own[own < n]
-            flexibility[own] += soil.porosity / modulus
-            mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / gamma
-        self._moments = MARGIN * (dim + 1) * moments.reshape(n, -1)
-        self._undrained, self._per_second = 1.5 * flexibility, 6 * mobility / longest
-
-    def write(self, function: fem.Function, dt: float) -> None:
-        """Write tau T of a step of dt [s] to a function that is constant in each cell. Collective."""
-        values = np.maximum(0.0, self._undrained - self._per_second * dt)[:, None] * self._moments
-        rows = compat.cell_dofs(function.function_space)[: len(values), 0]
-        function.x.array.reshape(-1, values.shape[1])[rows] = values
-        function.x.scatter_forward()
 
 
 class CoupledConstraints:

@@ -98,7 +98,7 @@ def test_nor_do_they_on_unstructured_meshes(dim, ratio, tmp_path):
 
 def test_elements_of_equal_order_overshoot_without_the_projection(monkeypatch):
     # In uniaxial strain the first node below a drained surface takes 2 q, as p / 4 [1 1; 1 1] of a layer says.
-    monkeypatch.setattr(water.coupled, "MARGIN", 0)
+    monkeypatch.setattr(water.projection, "MARGIN", 0)
     column = Column(water.Element.STABILISED, cells=12)
     column.model.advance(1e-6 * column.period / 12**2)
     assert column.nodal_excess().max() > 1.5
