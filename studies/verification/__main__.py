@@ -24,7 +24,8 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
-                     "coupled_consolidation", "wet_ground", "two_phase"),  # fmt: skip
+                     "ground_water", "coupled_consolidation", "wet_ground", "undrained_footing", "liakopoulos", "two_phase",
+                     "far_field"),  # fmt: skip
     "Earthquakes": ("newmark_block",),
     "Axial symmetry": (
         "axisymmetric_cylinder",

@@ -1,8 +1,8 @@
 """Motion of bodies of revolution by the explicit scheme: free fall, a ring that breathes, an elastic impact and its energy.
 
-A cylinder on the axis falls through a mesh of uneven cells: it must stay as it is, without strain, stress or motion
-along the radius. A thin ring that widens is held by its hoops alone and breathes with the frequency √(E/ρ) / R. A
-cylinder that is let go on rough ground vibrates: kinetic and stored energy are the work of its weight at all times.
+A cylinder on the axis falls through a mesh of uneven cells: it must fall without strain, stress or radial motion. A
+thin ring that widens has hoop stresses only and oscillates with the angular frequency √(E/ρ) / R. A cylinder that is
+released on rough ground vibrates: the sum of kinetic and stored energy equals the work of its weight at all times.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Column under its own weight, small strains, in plane strain and in 3D.
 
-Rollers at the sides, fixed base. Particles vibrate under gravity and local damping until they are at rest. Expected
-are the stresses and the settlement of the elastic column (oedometer). Each linear cell has one stress, so stresses
-are compared as means over rows of cells.
+Rollers at the sides, fixed base. Particles vibrate under gravity with local damping until they are at rest. Expected
+values are stresses and settlement of the elastic column (oedometer). Each linear cell has one stress, so stresses are
+compared as means over rows of cells.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by elements and particles.
 
-Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains at its
-top. Between the rigid plates of Mandel's slab, and inside of Cryer's ball, the pressure first rises above its value at once, as
-the soil at the drained surface consolidates and gives way: flow without deformation does not know that. The motion of Mandel's
-plates is prescribed, and the force on them comes out. The ball is axisymmetric. A strip load lies on a layer that is
-so deep and wide that it stands for a half-plane.
+Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains
+at its top. Between the rigid plates of Mandel's slab, and inside Cryer's ball, the pressure first rises above its
+initial value, because the soil at the drained surface consolidates and becomes softer: uncoupled flow does not have
+this effect. The motion of Mandel's plates is prescribed, and the force on them is compared. The ball is axisymmetric. A
+strip load acts on a layer that is so deep and wide that it represents a half-plane.
 
 Quadratic displacement with linear pressure (Taylor-Hood), linear displacement and pressure with the polynomial pressure
 projection, and implicit particles with the latter's nodes, three per cell; backward Euler with steps that grow with the time.

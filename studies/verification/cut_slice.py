@@ -1,10 +1,10 @@
 """A vertical cut in three dimensions: the weight at which a slice of it between smooth planes collapses.
 
-The slice is a cube of cells thick and cannot bulge: its limit load is that of plane strain, by limit analysis that of the
-log-spiral (associated flow, Chen 1975; 3.83 c/γ without friction is that of a circle). Quadratic tetrahedra, and quadratic
-triangles on the same squares, raise the weight in steps that begin with c/H and are bisected to 0.5 %. The law meets here the
-stress states of three dimensions, and without friction the edges of Mohr-Coulomb's hexagon. Both elements come
-from above, and their error falls with the cells.
+The slice is a cube of cells thick and cannot bulge: its limit load is that of plane strain, by limit analysis that of
+the log-spiral (associated flow, Chen 1975; 3.83 c/γ without friction is that of a circle). Quadratic tetrahedra, and
+quadratic triangles on the same squares, raise the weight in steps that begin with c/H and are bisected to 0.5 %. The
+law has general stress states in three dimensions here, and without friction those on the edges of the Mohr-Coulomb
+hexagon. Both elements converge from above, and their error decreases with the cell size.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
-"""Beam that bends far: clamped, with a tip load, against the elastica.
+"""Large bending of a clamped beam with a tip load, against the elastica.
 
 Implicit steps without inertia in plane strain; the load rises to P L²/EI' = 2, EI' = E I / (1 - ν²), and keeps its
 direction. L is the arm of the load, to the middle of the particles that carry it. Linear triangles are stiff in
-bending, which mixed discretisation does not remove; 4, 8 and 16 squares over the height show how they come nearer.
+bending, which mixed discretisation does not remove; 4, 8 and 16 squares over the height show their convergence.
 
-Particles cross from cell to cell as the beam bends. Each crossing is a jump of nodal forces, for the gradients of linear
-shape functions jump; the stresses of the particles scatter, which finer cells, crossed more often, hardly lessen. Nor does
-mixed integration: bending is largest at the faces, where cells are not full and are left to their particles. A run whose
-mesh goes with the beam (made anew from its moved nodes after each step) has no crossings and shows what they cost.
-What is left of its error on fine meshes is shear, which the elastica lacks (0.8 %), and the length of the steps (1 %).
+Particles cross from cell to cell as the beam bends. At each crossing nodal forces jump, because the gradients of linear
+shape functions are discontinuous; this causes noise in the stresses of the particles, which is hardly smaller on finer
+meshes, where crossings are more frequent. Mixed integration does not help either: bending stresses are largest at the
+faces, where cells are not full and are integrated over their particles. A run whose mesh moves with the beam (it is
+rebuilt from its moved nodes after each step) has no crossings and shows their influence. The remaining error on fine
+meshes is due to shear, which the elastica does not include (0.8 %), and to the length of the steps (1 %).
 """
 
 import numpy as np

@@ -3,11 +3,11 @@
 Cauchy stress follows a rate law and ν = 0, so σ = E ln(stretch) and σ = -w (H - X) at the place that was X above the base:
 u(X) = ∫ exp(-w (H - s) / E) ds - X, -0.986801 m at the top. The weight rises in ten implicit steps without inertia.
 
-Finer cells do not bring particles nearer: they are crossed more often, and each crossing shifts the fraction 1 / (particles in a
-cell) of the cell's force to its neighbour, which strains both. So the error grows with the number of cells crossed, and with
-the number of steps in which that happens, and falls with the number of particles in a cell. Mixed integration removes it: a
-full cell integrates its mean stress over its own volume, whoever has just crossed into it. With a mesh that goes with the
-particles there are no crossings, and what is left is the error of the steps' lengths.
+Particles do not become more accurate with smaller cells: these are crossed more often, and each crossing moves the
+fraction 1 / (particles in a cell) of the cell's force to its neighbour, which strains both. The error therefore grows
+with the number of cells crossed and with the number of steps, and decreases with the number of particles per cell.
+Mixed integration removes it: a full cell integrates its mean stress over its own volume, whichever particles are in it.
+With a mesh that moves with the particles there are no crossings, and only the error of the step length remains.
 """
 
 import numpy as np

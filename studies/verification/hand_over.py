@@ -1,10 +1,11 @@
-"""From finite elements to particles: equilibrium that stays one, and a load that goes on rising.
+"""From finite elements to particles: the equilibrium is preserved, and the load rises further.
 
-The paper's slope under 16 kN/m³, where a part of it yields. Linear and quadratic elements on the cells of the particles: their
-stresses balance the particles' weight by an identity, whatever the law; so nothing moves afterwards, by explicit steps
-without damping. Then the weight rises to 19 kN/m³: in quasi-static steps with small displacements, particles are the same
-finite elements and must have the same stresses, where the soil yields as well. Elements on another, unstructured mesh hand
-over stresses that balance only up to the error of both meshes; one step without load restores equilibrium.
+The paper's slope under 16 kN/m³, where a part of it yields. Linear and quadratic elements on the cells of the
+particles: their stresses balance the weight of the particles exactly, whatever the law, so that nothing moves in
+explicit steps without damping. Then the weight rises to 19 kN/m³: in quasi-static steps with small displacements,
+particles are equivalent to the finite elements and must have the same stresses, also where the soil yields. Stresses
+from elements on another, unstructured mesh balance only up to the error of both meshes; one step without load restores
+equilibrium.
 """
 
 from __future__ import annotations

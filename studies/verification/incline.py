@@ -1,10 +1,10 @@
 """Cylinder on an inclined plane: it slides without friction and rolls without slip.
 
 A solid elastic cylinder lies on the plane through the background mesh alone: nodes on the plane move along it only
-(sliding) or not at all (rolling). The axes lie along the plane and across it; gravity is inclined. Sliding, its
-centre moves by g sin(α) t²/2; rolling, by two thirds of that, since half of m R² is its moment of inertia. The
-cylinder starts one cell above the plane, where it begins to be felt: particles laid onto fixed nodes without stress
-would have to be torn off them.
+(sliding) or not at all (rolling). The axes are parallel and normal to the plane; gravity is inclined. Sliding, its
+centre moves by g sin(α) t²/2; rolling, by two thirds of that, since half of m R² is its moment of inertia. The cylinder
+starts one cell above the plane, where the contact by nodes begins: particles that are placed on fixed nodes without
+stress would have to be pulled off them.
 """
 
 import numpy as np

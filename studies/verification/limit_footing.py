@@ -1,8 +1,9 @@
 """Strip footing: the bearing capacity factors Nc and Nq of weightless ground.
 
 Half of a smooth, flexible strip; associated flow. Nc: the pressure that ground with cohesion carries, over the
-cohesion. Nq: the pressure that ground without cohesion carries beside a surcharge, over the surcharge. Finite
-elements come from above; their steps begin with the cohesion or the surcharge and are bisected to 0.2 % of the pressure.
+cohesion. Nq: the pressure that ground without cohesion carries beside a surcharge, over the surcharge. Finite elements
+converge from above; their load steps begin with the cohesion or the surcharge and are bisected to 0.2 % of the
+pressure.
 """
 
 import numpy as np

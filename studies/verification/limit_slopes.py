@@ -5,8 +5,8 @@ through the toe, with associated flow (Chen 1975), here repeated for each slope.
 spiral dips below the level of the toe before it rises to it. Where that is more than a hundredth of the height, the
 ground below and before the toe is of the same soil; else it is rigid. Quadratic finite elements raise the weight to the
 last equilibrium, in steps that begin with c/H and are bisected to 0.5 % of the weight. Both are upper bounds: finite
-elements come from above and may end lower than the spiral where another mechanism is better.
-A slope of 30° with a friction angle of 30° carries any weight.
+elements converge from above and may end below the spiral where another mechanism is more critical. A slope of 30° with
+a friction angle of 30° carries any weight.
 """
 
 import matplotlib.pyplot as plt

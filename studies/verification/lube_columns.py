@@ -1,16 +1,17 @@
 """Columns of sand that spread on all sides: run-out and height over their aspect ratio, after Lube et al. (2004).
 
-A cylinder of sand, a times as high as its radius r0, is let go on rough ground: a half section. Lube, Huppert, Sparks
-and Hallworth (J. Fluid Mech. 508, 175-199) found, for many sorts of grains, a run-out past its foot of 1.24 a r0
-where a < 1.7 and of 1.6 √a r0 above; a height of the deposit that stays a r0 where a < 1 and is 0.88 a^(1/6) r0 where
-a > 1.7.
+A cylinder of sand, a times as high as its radius r0, is released on rough ground, computed as a half section. Lube,
+Huppert, Sparks and Hallworth (J. Fluid Mech. 508, 175-199) found, for many sorts of grains, a run-out past its foot of
+1.24 a r0 where a < 1.7 and of 1.6 √a r0 above; a height of the deposit that stays a r0 where a < 1 and is 0.88 a^(1/6)
+r0 where a > 1.7.
 
-The sand has an angle of repose of 31°; the experiments hardly depend on it, the particles do. With the friction angle
-of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders run less far and
-end higher than the experiments; with 31° itself they are near. A foot that spreads over a growing ring is not in
-plane strain, and which angle is the right one is open, so both are shown, and a quarter is what these numbers can be
-trusted to. What limits them besides: the foot is thinner than a cell, and where it ends is known to a cell, 8 to 13 %
-of the radius; PIC of 0.1 % in place of 0.6 % makes the columns with 31° run up to a fifth farther.
+The sand has an angle of repose of 31°. The experiments hardly depend on this angle, but the computed run-outs do. With
+the friction angle of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders
+run less far and end higher than the experiments; with 31° itself they are near. A foot that spreads over a growing ring
+is not in plane strain, and it is an open question which angle is right; both are therefore shown, and the tolerance of
+these results is a quarter. There are two further limits: the foot is thinner than a cell, and its end is known to the
+size of a cell only, 8 to 13 % of the radius; and with a PIC fraction of 0.1 % instead of 0.6 % the columns with 31° run
+up to a fifth farther.
 """
 
 import numpy as np

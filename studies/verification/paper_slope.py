@@ -5,10 +5,10 @@ A slope 1 m high under 80 kN/m3, 3.5 times the unit weight at which it collapses
 agree with the paper's Figure 6 as far as that can be read. Plain triangles lock; with nodal mixed discretisation (NMD) the
 slope slides farther.
 
-The slow creep comes from local damping, which holds back elastic oscillations too. How fast it is depends on what
-feeds these, so on locking, on the size of cells and on the noise of particles that cross them (see the case on
-integration): with the standard method it does not converge on finer meshes. Mixed integration takes most of that
-noise away, and the displacement in the end hardly depends on the mesh.
+The slow creep comes from local damping, which holds back elastic oscillations too. Its speed depends on what excites
+these, that is on locking, on the size of cells and on the noise of cell crossing (see the case on integration): with
+the standard method it does not converge on finer meshes. Mixed integration removes most of that noise, and the final
+displacement hardly depends on the mesh.
 """
 
 import numpy as np

@@ -5,9 +5,9 @@ diameter and shear strength at collapse is that of Randolph and Houlsby (1984),
 
 N = pi + 2 D + 2 cos D + 4 (cos D/2 + sin D/2),   D = asin(alpha)
 
-with the roughness alpha. For a rough pipe it is exact; for a smooth one it comes from stresses in equilibrium, and the
-mechanism of Martin and Randolph (2006) lies less than a per cent above it. Soil that sticks to a rough pipe has to
-shear within the cells around it, so that coarse cells give more.
+with the roughness alpha. It is exact for a rough pipe; for a smooth one it is a lower bound, and the upper bound by
+Martin and Randolph (2006) is less than one per cent higher. Soil that sticks to a rough pipe must shear within the
+cells around it, so that coarse cells give higher loads.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """Rigid walls that move away from sand and into it: active and passive pressure, smooth and rough.
 
 The study wall: sand with a friction angle of 30 degrees on rock, and walls that are contact bodies. Behind smooth walls
-Rankine's coefficients are exact. Behind rough ones they lie between a field of stresses and a mechanism: 2 % apart for the
-active pressure, while the passive pressure of the plane wedge is far too high. Sand that does not dilate rises less than
-the wall needs to make use of all its friction, so the passive pressure is compared with the field of stresses for the
-friction that acts.
+Rankine's coefficients are exact. Behind rough ones they lie between a field of stresses and a mechanism: 2 % apart for
+the active pressure, while the passive pressure of the plane wedge is far too high. Sand that does not dilate rises too
+little to mobilise the full wall friction, so the passive pressure is compared with the stress field for the mobilised
+friction.
 """
 
 import numpy as np

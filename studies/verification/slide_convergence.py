@@ -1,10 +1,10 @@
-"""An undamped slide of frictional soil: what its crest and run-out owe to cells, steps, particles and the mesh.
+"""An undamped slide of frictional soil: influence of cells, time steps, particles and mesh on crest and run-out.
 
-The paper's slope at once under 60 kN/m³, two seconds, no damping, mixed integration, averaged strains. Flow without
-dilation has shear bands without a width of their own: the finer the cells the thinner they are, and the farther the slope
-slides, whatever moves the particles. Strength that rises with the rate of shear gives bands a width, and then the slide
-must converge. Its viscosity here is 1 kPa s, which raises the strength by some kilopascals. No value is known beforehand:
-each variant is compared with the run that differs from it in one thing.
+The paper's slope under 60 kN/m³, applied at once, for two seconds, without damping, with mixed integration and averaged
+strains. In flow without dilation shear bands have no intrinsic width: they become thinner with the cells, and the slope
+slides farther, whichever integration is used. Strength that rises with the shear rate gives the bands a width, and the
+slide must then converge. Its viscosity here is 1 kPa s, which raises the strength by some kilopascals. There is no
+reference solution: each variant is compared with the run that differs from it in one parameter.
 
 The energy balance is that of a body whose particles cross cells all the time. With sums over particles the crossings
 dissipate a part of it that grows as cells become smaller. Implicit steps of second order follow the

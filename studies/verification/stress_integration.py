@@ -1,10 +1,10 @@
 """Stresses while particles cross cells: the standard method does not converge; mixed and dual domain integration do.
 
-A column settles under its weight by a twentieth of its height and comes to rest. The weight above a particle stays
-above it, so its vertical stress is w (H - X) wherever it went. The standard method integrates forces by particles,
-with gradients that jump at the sides of cells: each crossing is an error of the size of a particle's stress, on
-fine meshes as on coarse ones. Then the paper's slope slides: its vertical stress is fitted by a plane through the
-nearest particles, and the distance from it is its roughness.
+A column settles under its weight by a twentieth of its height and comes to rest. The weight above a particle does not
+change, so its vertical stress is w (H - X) wherever it moves. The standard method integrates forces by particles, with
+gradients that jump at the sides of cells: each crossing is an error of the size of a particle's stress, on fine meshes
+as on coarse ones. Then the paper's slope slides: its vertical stress is fitted by a plane through the nearest
+particles, and the distance from it is its roughness.
 """
 
 import matplotlib.pyplot as plt

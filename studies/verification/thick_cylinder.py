@@ -1,4 +1,4 @@
-"""Thick-walled cylinder of Mohr-Coulomb soil under pressure from inside: the plastic ring, the widening, the last pressure.
+"""Thick-walled cylinder of Mohr-Coulomb soil under internal pressure: plastic ring, expansion, and limit pressure.
 
 A quarter of the cylinder, plane strain, flow without dilation. The pressure is the one at which the ring between
 the inner wall and a chosen radius is plastic. Quadratic finite elements, and particles in quasi-static steps with

@@ -1,9 +1,10 @@
 """Soil and pore water with a velocity each, by explicit steps: waves, consolidation, critical gradient.
 
-A saturated column on a fixed base between rollers. Without drag it swings in its first mode as either of the two compression
-waves (Verruijt, Soil Dynamics, 2010, section 5): det(K - c² M) = 0 with K = [E + (1-n)² K_w/n, (1-n) K_w; (1-n) K_w, n K_w] and
-M = diag((1-n) rho_s, n rho_w). With much drag soil and water move together, and a load runs through the column as one front.
-Slowly it consolidates as Terzaghi has it; c_v is that with compressible water, k / gamma_w / (1/E + n/K_w).
+A saturated column on a fixed base between rollers. Without drag it oscillates in its first mode by either of the two
+compression waves (Verruijt, Soil Dynamics, 2010, section 5): det(K - c² M) = 0 with K = [E + (1-n)² K_w/n, (1-n) K_w;
+(1-n) K_w, n K_w] and M = diag((1-n) rho_s, n rho_w). With large drag soil and water move together, and a load travels
+through the column as one front. Slow consolidation is that of Terzaghi; c_v is that with compressible water, k /
+gamma_w / (1/E + n/K_w).
 """
 
 import numpy as np

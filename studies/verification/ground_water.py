@@ -1,0 +1,154 @@
+"""Ground water: a dam and a sheet pile, slopes through which water seeps, and water that falls over level ground.
+
+Dupuit's discharge of a dam with vertical faces, k (h₁² - h₂²) / 2L, is exact in spite of the seepage face (Charny 1951); the
+flow under a sheet pile at the depth s in a layer T is that of conformal mapping, q / (k h) = K' / 2K with the modulus sin(π s
+/ 2T) (Polubarinova-Kochina 1962). The singular point at the tip of the pile leaves an error in proportion to the size of the
+cells, and the ends of a slope one in proportion to its length, so that two sizes give the limit. Lowering water that stands
+over level ground changes no effective stress and moves nothing, whatever the conductivity: the load on the surface falls by
+as much as the pressure in the pores.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from _case import Check, Result, run_alone
+from _plots import save_comparison
+from _wet_bodies import GRAVITY, PARTICLES, WATER, wet
+from dolfinx import mesh
+from mpi4py import MPI
+from scipy.special import ellipk
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+comm = MPI.COMM_WORLD
+METHODS = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1", PARTICLES: "particles"}
+LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+
+
+# --- 1. Flow -------------------------------------------------------------------------------------------------------
+
+
+def dam(cells_high):
+    """Discharge over k of a dam 16 m long between 10 m and 2 m of water [m]."""
+    domain, _, facet_tags = bridge.box_mesh(comm, (16.0, 10.0), (8 * cells_high // 5, cells_high))
+    soil = water.PorousSoil(1.0, porosity=0.4, retention=water.FreeSurface(fringe=0.1 * WATER))
+    flow = water.Seepage(domain, soil, facet_tags, [water.Reservoir(LEFT, 10.0), water.Reservoir(RIGHT, 2.0)])
+    flow.solve()
+    return flow.inflow(LEFT)
+
+
+def sheet_pile(part, cells_high):
+    """Flow over k h under a pile that goes down to a part of a layer; half of the ground, of which the gap has the mean head."""
+    thickness = 4.0
+    domain, _, _ = bridge.box_mesh(comm, (4 * thickness, thickness), (4 * cells_high, cells_high))
+    ground = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[1], thickness))
+    below = thickness * (1 - part) + 1e-9
+    gap = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0) & (x[1] <= below))
+    facets, tags = np.concatenate([ground, gap]), np.repeat([1, 2], [len(ground), len(gap)]).astype(np.int32)
+    order = np.argsort(facets)
+    facet_tags = mesh.meshtags(domain, 1, facets[order], tags[order])
+    boundary = [water.Head(1, thickness + 1.0), water.Head(2, thickness + 0.5)]
+    flow = water.Seepage(domain, water.PorousSoil(1.0), facet_tags, boundary, degree=2)
+    flow.solve()
+    return flow.inflow(1)
+
+
+def under_pile(part):
+    """K' / 2K, of the modulus sin(pi s / 2T)."""
+    squared = np.sin(np.pi * part / 2) ** 2
+    return ellipk(1 - squared) / (2 * ellipk(squared))
+
+
+def flow_checks(quick):
+    """Checks, and the flow under a sheet pile over its depth."""
+    discharge = dam(20 if quick else 40)
+    checks = [Check("discharge of a dam over k, h₁ 10 m, h₂ 2 m, L 16 m", 3.0, "k (h₁² - h₂²) / 2L", discharge, 0.01, "m",
+                    method="linear elements")]  # fmt: skip
+    n, curve = 8 if quick else 16, []
+    for part in (0.25, 0.5, 0.75):
+        coarse, fine = sheet_pile(part, n), sheet_pile(part, 2 * n)
+        curve.append((part, 2 * fine - coarse))
+        checks.append(Check(f"flow under a sheet pile over k h, s/T = {part:g}", under_pile(part), "K' / 2K, sin(π s / 2T)",
+                            curve[-1][1], 0.01, method="quadratic elements"))  # fmt: skip
+    return checks, np.array(curve).T
+
+
+# --- 2. A long slope -----------------------------------------------------------------------------------------------
+
+
+def slope_factor(length, angle, unit_weight, seeps):
+    """Factor of safety of a layer 1 m deep on an incline, with cohesion c = 1 kPa, φ = ψ = 30°."""
+    tangent = np.tan(angle)
+    domain, _, facet_tags = bridge.box_mesh(comm, (length, 1.0), (int(2 * length), 4))
+    domain.geometry.x[:, 1] -= tangent * domain.geometry.x[:, 0]
+    law = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=1e3, friction_angle=30.0, dilation_angle=30.0)
+    fem = bridge.QuasiStatic(domain, law, facet_tags, HELD)
+    if seeps:
+        fem.reconfigure(pore_pressure=lambda x: WATER * np.cos(angle) ** 2 * (1.0 - x[:, 1] - tangent * x[:, 0]))
+    found = bridge.factor_of_safety(fem, bridge.Load(unit_weight=unit_weight), start=0.4, tolerance=1e-3)
+    return 0.5 * (found.value + found.failed_at)
+
+
+def slope_checks(quick):
+    angle, checks = np.radians(20.0), []
+    for name, unit_weight, seeps in (("dry", 18e3, False), ("seepage parallel to it", 20e3, True)):
+        short, long = (
+            slope_factor(length, angle, unit_weight, seeps) for length in ((15.0, 30.0) if quick else (20.0, 40.0))
+        )
+        normal = (unit_weight - WATER * seeps) * np.cos(angle) ** 2
+        exact = (1e3 + normal * np.tan(np.radians(30.0))) / (unit_weight * np.sin(angle) * np.cos(angle))
+        checks.append(Check(f"factor of safety of an infinite slope of 20°, {name}", exact,
+                            "[c + (γ d cos²β - p) tan φ] / (γ d sin β cos β)", 2 * long - short, 0.02,
+                            method="quadratic elements"))  # fmt: skip
+    return checks
+
+
+# --- 3. Water that falls over level ground -------------------------------------------------------------------------
+
+
+def level_ground_checks(method, conductivity):
+    """The water falls by 5 m within an hour, and nothing happens."""
+    soil = mpm.LinearElastic(young=5e6, poisson=0.3)
+    ground = bridge.box_mesh(comm, (2.0, 3.0), (4, 6))
+    weight = 2000.0 * GRAVITY
+    body = wet(method, ground, soil, conductivity, HELD, {TOP: 9.0}, weight, start=9.0)
+    for _ in range(
+        4
+    ):  # its weight comes on, and a step of backward Euler leaves 1 / 250 of what is not yet consolidated
+        body.advance(100 * 3.0**2 * WATER / (conductivity * soil.p_wave_modulus))
+    stress, moved = body.mean_stress()[1], body.displacement((1.0, 3.0))[1]
+    for level in np.linspace(9.0, 4.0, 6)[1:]:
+        if method == PARTICLES:
+            body.model.hold_pore_pressure(TOP, level=level)
+        else:
+            body.model.boundary = [water.Reservoir(TOP, level)]
+        body.advance(720.0)
+    elastic = 5.0 * WATER * 3.0 / soil.p_wave_modulus
+    name, where = METHODS[method], f"water falls by 5 m over level ground, k = {conductivity:g} m/s"
+    return [
+        Check(f"{where}: change of the effective stress over that of the water", 0.0, "load and pore pressure fall alike",
+              (body.mean_stress()[1] - stress) / (5.0 * WATER), 1e-5, scale=1.0, method=name),
+        Check(f"{where}: settlement over that under such a load", 0.0, "load and pore pressure fall alike",
+              (body.displacement((1.0, 3.0))[1] - moved) / elastic, 1e-5, scale=1.0, method=name),
+    ]  # fmt: skip
+
+
+def run(quick: bool, folder) -> Result:
+    checks, piles = flow_checks(quick)
+    checks += slope_checks(quick)
+    for method in METHODS:
+        for conductivity in (1e-3, 1e-7, 1e-11):
+            checks += level_ground_checks(method, conductivity)
+    if comm.rank == 0:
+        parts = np.linspace(0.05, 0.95, 91)
+        expected = {"conformal mapping": (parts, under_pile(parts))}
+        labels = "Depth of the pile over that of the layer [-]", "Flow over $k h$ [-]"
+        save_comparison(folder / "sheet_pile.png", {"quadratic elements": tuple(piles)}, expected, labels)
+    return Result(checks, {"sheet_pile.png": "Flow under a sheet pile"})
+
+
+if __name__ == "__main__":
+    run_alone(run)

@@ -1,0 +1,127 @@
+"""Drainage of a sand column: soil that dries and shrinks (Liakopoulos), and rain on its way to a water table.
+
+Liakopoulos (1965) let a column of Del Monte sand, 1 m high, with water seeping through it under its weight alone, drain at
+its base from one moment on, its top closed. Its retention curve and permeability are S = 1 - 1.9722e-11 s^2.4279 (suction s
+in Pa) and k_r = 1 - 2.207 (1 - S)^1.0121; k = 4.41e-6 m/s, n = 0.2975, and, as is customary, E = 1.3 MPa and ν = 0.4 (Lewis
+and Schrefler 1998). The expected values are those of OpenGeoSys, quadratic displacement with linear pressure and lumped
+storage, whose test RichardsMechanics/LiakopoulosHM keeps its smallest pressure and its largest displacement after 600 and
+7,200 s; the steps in time here are the same, by backward Euler in both. Air stays at atmospheric pressure, and effective
+stresses are those of Bishop.
+
+Steady rain of half the conductivity above a water table, with k_r = e^(αψ), has a closed form (Gardner 1958; Srivastava and
+Yeh 1991).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from _case import Check, Result, run_alone
+from _plots import save_comparison
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+comm = MPI.COMM_WORLD
+GRAVITY, WATER = 9.81, 9810.0  # m/s2, N/m3
+LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+METHODS = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1"}
+POROSITY, CONDUCTIVITY = (
+    0.2975,
+    4.5e-13 * WATER / 1e-3,
+)  # -, m/s from an intrinsic permeability [m2] and a viscosity [Pa s]
+STEPS = ((1, 0.06), (9, 1), (5, 10), (1, 0.94), (3, 10), (1, 30), (1, 100), (1, 80), (9, 100), (2, 200), (3, 400), (3, 600),
+         (1, 200), (3, 600), (1, 0.06), (9, 1), (5, 10), (1, 0.94), (3, 10), (1, 30), (1, 100), (1, 80), (3, 100))  # fmt: skip
+"""How many steps of which length [s]"""
+PUBLISHED = {600: (-5170.6, -0.76202), 7200: (-9171.7, -1.54702)}
+"""Pressure [Pa] and displacement [mm] of the top, by time [s]"""
+
+
+def del_monte_sand():
+    """Points of the measured curves, joined; closer ones where the sand is nearly full."""
+    dry = (1 / 1.9722e-11) ** (1 / 2.4279)
+    suction = np.concatenate([[0.0], np.linspace(250.0, 12e3, 48), [dry]])
+    saturation = np.clip(1 - 1.9722e-11 * suction**2.4279, 0.0, 1.0)
+    permeability = np.maximum(1 - 2.207 * (1 - saturation) ** 1.0121, 0.0)
+    saturation[-1] = 0.0
+    return water.Tabulated(tuple(suction), tuple(saturation), tuple(permeability))
+
+
+def column(element, cells, law, soil, boundary, weight):
+    """A column 1 m high and 0.1 m wide between rollers."""
+    domain, _, facet_tags = bridge.box_mesh(comm, (0.1, 1.0), (2, cells))
+    held = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    return water.Consolidation(domain, law, soil, facet_tags, held, boundary, load=bridge.Load(unit_weight=weight),
+                               element=element, unit_weight=WATER, water_modulus=2e9)  # fmt: skip
+
+
+def at(model, points):
+    """Displacements [m] and pressures [Pa] at points, on all ranks."""
+    own = np.asarray(points) if comm.rank == 0 else np.empty((0, 2))
+    there = model.evaluate_at(own)
+    return comm.bcast((there["displacement"], there["pressure"][:, 0]))
+
+
+def drainage(element, cells):
+    """Checks; suctions over the height at times, and the outflow over time."""
+    name, weight = METHODS[element], ((1 - POROSITY) * 2000.0 + POROSITY * 1000.0) * GRAVITY
+    soil = water.PorousSoil(CONDUCTIVITY, porosity=POROSITY, retention=del_monte_sand())
+    law = mpm.LinearElastic(young=1.3e6, poisson=0.4)
+    model = column(element, cells, law, soil, [water.Head(BASE, 0.0)], weight)
+    stress = np.zeros_like(model.points.stress)
+    stress[:, 1] = -weight * (1.0 - model.points.coordinates()[:, 1])
+    model.initialise(stress, lambda x: 0.0 * x[:, 0])  # water under atmospheric pressure seeps with the gradient 1
+    heights, profiles, checks = np.linspace(0.0, 1.0, 21), {}, []
+    for count, dt in STEPS:
+        for _ in range(count):
+            report = model.advance(dt)
+            if not report.converged:
+                raise mpm.RunError(f"no step from {model.time:.4g} s on: {report.reason}")
+            time = round(model.time)
+            if abs(model.time - time) < 1e-6 and time in (300, 600, 1200, 7200):
+                moved, pressure = at(model, np.column_stack([np.full(21, 0.05), heights]))
+                profiles[f"{time / 60:g} min, {name}"] = pressure / 1e3, heights
+            if abs(model.time - time) < 1e-6 and time in PUBLISHED:
+                published, moved_there = PUBLISHED[time]
+                checks.append(Check(f"pressure of the water at the top after {time} s", published / 1e3, "OpenGeoSys",
+                                    pressure[-1] / 1e3, 0.01, "kPa", method=name))  # fmt: skip
+                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved[-1, 1],
+                                    0.01, "mm", method=name))  # fmt: skip
+                checks.append(Check(f"water that is missing after the step to {time} s, over the pores", 0.0, "balance",
+                                    report.water_error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
+    return checks, profiles
+
+
+def rain(element, cells):
+    part, alpha = 0.5, 2.0  # of the conductivity; 1/m
+    soil = water.PorousSoil(1e-5, porosity=0.4, retention=water.Gardner(alpha / WATER))
+    boundary = [water.Head(BASE, 0.0), water.Flux(TOP, part * 1e-5)]
+    model = column(element, cells, mpm.LinearElastic(young=5e6, poisson=0.3), soil, boundary, 20e3)
+    report = model.run(1e8, 100.0, growth=2.0)[-1]
+    if not report.converged:
+        raise mpm.RunError(f"no steady rain was found: {report.reason}")
+    heights = np.array([0.25, 0.5, 1.0])
+    found = alpha * at(model, np.column_stack([np.full(3, 0.05), heights]))[1] / WATER
+    exact = np.log(part + (1 - part) * np.exp(-alpha * heights))
+    return [
+        Check(f"steady rain, α times the pressure head at α z = {alpha * z:g}", e, "ln(r + (1 - r) exp(-α z))", f, 0.005,
+              method=METHODS[element])
+        for z, e, f in zip(heights, exact, found)
+    ]  # fmt: skip
+
+
+def run(quick: bool, folder) -> Result:
+    checks, profiles = [], {}
+    for element in METHODS:
+        found, curves = drainage(element, 20 if quick else 40)
+        checks, profiles = checks + found + rain(element, 20 if quick else 40), profiles | curves
+    if comm.rank == 0:
+        shown = {name: curve for name, curve in profiles.items() if "P1-P1" in name}
+        rest = {"at rest in the end": (np.array([0.0, -WATER / 1e3]), np.array([0.0, 1.0]))}
+        save_comparison(folder / "pressure.png", shown, rest, ("Pressure of the water [kPa]", "Height [m]"))
+    return Result(checks, {"pressure.png": "Pressure of the water in Liakopoulos's column as it drains"})
+
+
+if __name__ == "__main__":
+    run_alone(run)

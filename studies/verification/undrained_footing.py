@@ -1,0 +1,134 @@
+"""Strip footing on clay that does not drain: bearing capacity by soil and pore water, and by total stresses.
+
+Half of a rough footing comes down on weightless ground with cohesion and no friction until its load does not rise any more;
+the limit is 2 + π times the cohesion (Prandtl 1920). Water in the pores keeps the volume, as k → 0. Quadratic displacement
+with linear pressure (P2-P1) carries the same load as quadratic elements of total stresses with the undrained law, which is
+the expected value below. Linear displacement and pressure (P1-P1), and particles on the same nodes, do not: besides the
+water, which keeps the volume around each node, the skeleton resists to the change of volume of each cell, and its effective
+stresses rise for ever, the slower the smaller its Poisson ratio. Particles whose volumetric strains are averaged over nodes
+(NMD) are free of that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from _case import Check, Result, run_alone
+from _plots import save_comparison
+from common.results import ROOT
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+comm = MPI.COMM_WORLD
+COHESION, SHEAR, POROSITY, MODULUS = 1e3, 4e6, 0.4, 2.2e9  # Pa, Pa, -, Pa
+HALF, SETTLED, STEPS = 0.5, 0.02, 20  # half width and settlement of the footing [m]
+SIZES = (0.24, 0.12, 0.06)
+"""Of cells beside the footing [m]; a quarter of them at its edge"""
+AXIS, BASE, FAR, FREE, PRESSED = 1, 2, 3, 4, 5
+LIMIT = 2 + np.pi
+SUPPORTS = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
+LOCKED = "the skeleton resists to the change of volume of each cell"
+
+
+def clay(poisson=0.3):
+    """Of one shear modulus, whatever the Poisson ratio of the skeleton is."""
+    return mpm.MohrCoulomb(young=2 * SHEAR * (1 + poisson), poisson=poisson, cohesion=COHESION, friction_angle=0.0)
+
+
+def undrained():
+    return mpm.Undrained(clay(), water_modulus=MODULUS, porosity=POROSITY)
+
+
+def ground(size):
+    parameters = {"width": 4.0, "depth": 2.0, "edge_size": size / 4, "near_size": size, "far_size": 5 * size}
+    return bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
+
+
+def total_stress(size):
+    """Load over the cohesion by quadratic elements with the undrained law, step by step."""
+    domain, _, facet_tags = ground(size)
+    supports = [*SUPPORTS, bridge.prescribed(PRESSED, (0.0, -SETTLED))]
+    model = bridge.QuasiStatic(domain, undrained(), facet_tags, supports, degree=2)
+    loads = []
+    for part in np.arange(1, STEPS + 1) / STEPS:
+        if not model.equilibrate(bridge.Load(displacement=part)).converged:
+            raise mpm.RunError(f"no equilibrium at {part:g} of the settlement")
+        loads.append(model.reaction(PRESSED)[1] / (HALF * COHESION))
+    return np.array(loads)
+
+
+def coupled(size, element, law):
+    """The same by finite elements of soil and water."""
+    domain, _, facet_tags = ground(size)
+    supports = [*SUPPORTS, bridge.prescribed(PRESSED, (0.0, -SETTLED))]
+    soil = water.PorousSoil(1e-17, porosity=POROSITY)
+    model = water.Consolidation(
+        domain, law, soil, facet_tags, supports, [water.Head(FREE, 0.0)], element=element, unit_weight=1e-3,
+        water_modulus=np.inf, load=lambda time: bridge.Load(displacement=time),
+    )  # fmt: skip
+    loads = []
+    for part in np.arange(1, STEPS + 1) / STEPS:
+        report = model.run(part, 1 / STEPS)[-1]
+        if not report.converged:
+            raise mpm.RunError(f"no equilibrium at {part:g} of the settlement: {report.reason}")
+        loads.append(model.reaction(PRESSED)[1] / (HALF * COHESION))
+    return np.array(loads)
+
+
+def particles(size, *, nmd, wet=True):
+    """The same by implicit particles with water, or with the undrained law, one per cell: work of the footing over its way."""
+    model = mpm.Model(bridge.background_mesh(*ground(size)), clay() if wet else undrained())
+    model.seed(density=2000.0, per_cell=1)
+    bridge.apply_supports(model, SUPPORTS)
+    model.prescribe(PRESSED, (0.0, -SETTLED))
+    if wet:
+        model.add_water(porosity=POROSITY, conductivity=1e-17, modulus=MODULUS)
+        model.hold_pore_pressure(FREE, 0.0)
+    steps = model.implicit(
+        1.0, dt=1 / STEPS, every=1 / STEPS, quasi_static=True, small_displacements=True, nmd=nmd,
+        solver=mpm.Newton(max_iterations=100),
+    )  # fmt: skip
+    works = [0.0] + [report.support_work for report in steps]
+    return np.diff(works) * STEPS / (SETTLED * HALF * COHESION)
+
+
+def run(quick: bool, folder) -> Result:
+    way = np.arange(1, STEPS + 1) / STEPS * SETTLED / HALF
+    checks, found = [], {}
+    for size in SIZES[1:2] if quick else SIZES:
+        expected = total_stress(size)
+        curves = {
+            "P2-P1": coupled(size, water.Element.TAYLOR_HOOD, clay()),
+            "P1-P1": coupled(size, water.Element.STABILISED, clay()),
+            "P1-P1, skeleton of ν = -0.9": coupled(size, water.Element.STABILISED, clay(-0.9)),
+            "particles": particles(size, nmd=False),
+            "particles, NMD": particles(size, nmd=True),
+            "particles, NMD, undrained law": particles(size, nmd=True, wet=False),
+        }
+        for name, loads in curves.items():
+            averaged = "NMD" in name
+            limit = (
+                ""
+                if averaged and size < 0.2 or name == "P2-P1"
+                else "cells of 0.24 m are too coarse"
+                if averaged
+                else LOCKED
+            )
+            checks.append(Check(f"load over the cohesion, cells of {size:g} m", expected[-1], "total stresses, P2", loads[-1],
+                                0.02, limit=limit, method=name))  # fmt: skip
+        found |= {f"cells of {size:g} m, {name}": (100 * way, curves[name]) for name in ("particles", "particles, NMD")}
+        checks.append(Check(f"load of total stresses over the cohesion, cells of {size:g} m", LIMIT, "2 + π, Prandtl 1920",
+                            expected[-1], 0.05, limit="from above" if size > 0.2 else "", method="P2"))  # fmt: skip
+    if comm.rank == 0:
+        labels = "Settlement over half the width [%]", "Load over the cohesion [-]"
+        save_comparison(
+            folder / "load.png", found, {"2 + π": ([0, 4], [LIMIT, LIMIT])}, labels, limits=((0, 4), (0, 14))
+        )
+    caption = "Load of a footing on particles whose water does not leave, without and with averaged volumetric strains"
+    return Result(checks, {"load.png": caption})
+
+
+if __name__ == "__main__":
+    run_alone(run)
