@@ -2,8 +2,11 @@
 
 The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise
 by a part of the effective vertical stresses, as an earthquake raises them, and effective stresses fall by as much. Soil and
-water then move by velocities of their own: the excess pressures drive the water out, upwards, and the sand regains its strength
-from its base on. The less conductive the sand, the longer it flows.
+water then move by velocities of their own. In fine sand next to no water leaves while it flows; coarse sand drains as fast.
+
+While pores are full the sand keeps its volume (`volume_gain`), and flows out to some 4 degrees. Loose sand would contract instead
+and flow on, so that the run-out is a lower bound; dense sand would stop earlier. Sand that is so coarse that it holds no suction
+has `--air-entry 0`: where effective stresses would become tensile it dilates, and its pores run empty.
 """
 
 from __future__ import annotations
@@ -35,7 +38,9 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GRAVITY, WATER = 9.81, 1000.0  # m/s2, kg/m3
 GRAINS = 2650.0
-COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "water_out_m2", "fastest_m_per_s",
+FRONT = 0.01
+"""Part of the soil that lies beyond its front"""
+COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "volume_gain", "water_out_m2", "fastest_m_per_s",
            "kinetic_energy_J", "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
 
 
@@ -52,14 +57,15 @@ def parser() -> ArgumentParser:
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "rise of the pore pressures over the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip
-    add_number(p, "--conductivity", 1e-3, "m/s", "hydraulic conductivity", above=0)
+    add_number(p, "--conductivity", 1e-5, "m/s", "hydraulic conductivity", above=0)
     add_number(p, "--porosity", 0.45, "-", "porosity of the loose sand", above=0, below=1)
     add_number(p, "--water-modulus", 2e7, "Pa", "bulk modulus of the water; below 2.2e9 steps are longer", above=0)
     add_number(p, "--young", 1e7, "Pa", "Young's modulus of the sand", above=0)
     add_number(p, "--friction-angle", 33.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--cohesion", 100.0, "Pa", "cohesion of the sand", at_least=0)
     add_number(p, "--time", 6.0, "s", "duration", above=0)
-    body_runs.add_body_run_options(p, damping=0.0, pic=0.002, nmd=True, frames=60)
+    add_number(p, "--air-entry", 2e4, "Pa", "suction up to which pores stay full; 0 lets them run empty", at_least=0)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=60)
     return p
 
 
@@ -101,7 +107,7 @@ def build(a: Namespace) -> mpm.Model:
     model.fix(bridge.BASE)
     model.set_gravity((0.0, -GRAVITY))
     model.add_water(porosity=a.porosity, conductivity=a.conductivity, modulus=a.water_modulus, kozeny_carman=True,
-                    suction_limit=0.0)  # fmt: skip
+                    suction_limit=a.air_entry)  # fmt: skip
     model.rebalance()
     raise_pressures(a, model)
     return model
@@ -122,20 +128,35 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
 # --- 3. The slide ----------------------------------------------------------------------------------------------------
 
 
+def front(x: np.ndarray, volume: np.ndarray) -> float:
+    """Where the front of the soil is [m]: beyond it lies `FRONT` of the volume of all particles. Collective.
+
+    Args:
+        x: positions along the slope (n,) of this rank's particles [m].
+        volume: their volumes (n,) [m2].
+    """
+    x, volume = (np.concatenate(comm.allgather(values)) for values in (x, volume))
+    order = np.argsort(x)
+    filled = np.cumsum(volume[order])
+    return float(np.interp((1 - FRONT) * filled[-1], filled, x[order]))
+
+
 def row(a: Namespace, model: mpm.Model, _: History, report: mpm.Report) -> dict[str, float]:
     """A row of the history. Collective."""
     p = model.particles
+    grains = (1 - p.porosity) * p.volume
+    volume, volume_of_grains = comm.allreduce(np.array([p.volume.sum(), grains.sum()]))
     weighed = np.array([p.volume @ p.pore_pressure, p.volume @ (p.pore_pressure - p.stress[:, 1])])
     pressure, total = comm.allreduce(weighed)
-    toe = a.crest + a.height / np.tan(np.radians(a.angle))
     top = p.initial_position[:, 1] > a.height - a.cell_size
     crest = top & (p.initial_position[:, 0] > 0.5 * a.crest) & (p.initial_position[:, 0] < a.crest)
     count, settled = comm.allreduce(np.array([crest.sum(), -p.displacement[crest, 1].sum()]))
-    front = comm.allreduce(float(p.position[:, 0].max(initial=0.0)), MPI.MAX)
+    runout = front(p.position[:, 0], grains) - front(p.initial_position[:, 0], grains)
     fastest = comm.allreduce(float(np.linalg.norm(p.velocity, axis=1).max(initial=0.0)), MPI.MAX)
     return {
-        "time_s": report.time, "runout_m": front - toe, "crest_settlement_m": settled / max(count, 1),
-        "pressure_ratio": pressure / total, "water_out_m2": -model.water_inflow(), "fastest_m_per_s": fastest,
+        "time_s": report.time, "runout_m": runout, "crest_settlement_m": settled / max(count, 1),
+        "pressure_ratio": pressure / total, "volume_gain": volume * (1 - a.porosity) / volume_of_grains - 1,
+        "water_out_m2": -model.water_inflow(), "fastest_m_per_s": fastest,
         "kinetic_energy_J": report.kinetic_energy, "unexplained_fraction_of_energy": report.unexplained_fraction,
         "dt_s": report.dt,
     }  # fmt: skip
@@ -145,11 +166,13 @@ def row(a: Namespace, model: mpm.Model, _: History, report: mpm.Report) -> dict[
 
 
 def draw_course(path: Path, history: History) -> None:
-    """Run-out and mean pore pressure over total vertical stress, over time."""
+    """Ways of front and crest, and mean pore pressure over total vertical stress, over time."""
     with paper_style():
         figure, (above, below) = plt.subplots(2, 1, figsize=(4.6, 4.2), sharex=True, layout="constrained")
-        above.plot(history["time_s"], history["runout_m"], color=CURVES[0])
-        above.set(ylabel="Run-out past the toe [m]", ylim=(0, None))
+        above.plot(history["time_s"], history["runout_m"], color=CURVES[0], label="front, forwards")
+        above.plot(history["time_s"], history["crest_settlement_m"], color=CURVES[2], label="crest, downwards")
+        above.legend(fontsize=8)
+        above.set(ylabel="Way of the front,\nof the crest [m]", ylim=(0, None))
         below.plot(history["time_s"], history["pressure_ratio"], color=CURVES[1])
         below.set(
             xlabel="Time [s]", ylabel="Mean pore pressure over\ntotal vertical stress [-]", xlim=(0, None), ylim=(0, 1)
@@ -189,17 +212,18 @@ def main(arguments: list[str] | None = None) -> int:
     results = {
         "runout_m": history["runout_m"][-1], "crest_settlement_m": history["crest_settlement_m"][-1],
         "fastest_m_per_s": history["fastest_m_per_s"].max(), "pressure_ratio_at_start": history["pressure_ratio"][0],
-        "pressure_ratio_in_the_end": history["pressure_ratio"][-1], "water_out_m2": history["water_out_m2"][-1],
+        "pressure_ratio_in_the_end": history["pressure_ratio"][-1], "volume_gain": history["volume_gain"][-1],
+        "water_out_m2": history["water_out_m2"][-1],
         "water_modulus_Pa": a.water_modulus, "undrained_wave_m_per_s": speeds.undrained, "fast_wave_m_per_s": speeds.fast,
         "critical_time_step_s": model.critical_time_step(),
     }  # fmt: skip
     said = (
-        f"run-out {results['runout_m']:.2f} m, crest settled by {results['crest_settlement_m']:.2f} m; water of "
+        f"front moved by {results['runout_m']:.2f} m, crest by {results['crest_settlement_m']:.2f} m; water of "
         f"{a.water_modulus:.3g} Pa: undrained wave {speeds.undrained:.0f} m/s, critical step "
         f"{1e6 * results['critical_time_step_s']:.0f} us"
     )
     captions = {
-        "course": "Run-out, and mean pore pressure over total vertical stress",
+        "course": "Ways of front and crest, and mean pore pressure over total vertical stress",
         **{f"{key}_{name}": f"{quantity.name}: {text}"
            for key, quantity in WET_QUANTITIES.items()
            for name, text in (("start", "at the start"), ("slide", "as it slides"), ("end", "in the end"))},

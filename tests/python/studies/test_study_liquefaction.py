@@ -1,0 +1,34 @@
+"""The study liquefaction: a flow slide of sand that does not drain as it moves, and where its front is."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
+study = importlib.import_module("liquefaction")
+COARSE = ["--cell-size", "0.5", "--time", "2.5", "--frames", "5", "--no-pictures"]
+
+
+def test_the_front_is_beyond_all_but_a_hundredth_of_the_soil():
+    x = np.random.default_rng(1).permutation(np.linspace(0.0, 10.0, 100_001))
+    assert study.front(x, np.ones_like(x)) == pytest.approx(9.9, abs=1e-3)
+    assert study.front(x, np.where(x > 5, 1e-9, 1.0)) == pytest.approx(4.95, abs=1e-3)  # by volume
+
+
+def slid(folder, *options):
+    assert study.main([*COARSE, "--output", str(folder), *options]) == 0
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_fine_sand_flows_without_losing_water_or_gaining_volume_and_farther_than_coarse_sand(tmp_path):
+    fine = slid(tmp_path / "fine")
+    coarse = slid(tmp_path / "coarse", "--conductivity", "1e-3", "--air-entry", "0")
+    assert fine["water_out_m2"] < 1e-3 * 33 and abs(fine["volume_gain"]) < 2e-3
+    assert fine["crest_settlement_m"] > 0.4 and fine["runout_m"] > 0.05
+    assert fine["crest_settlement_m"] > 1.3 * coarse["crest_settlement_m"]
+    held = slid(tmp_path / "held", "--pressure-ratio", "0")
+    assert abs(held["crest_settlement_m"]) < 0.01 and abs(held["runout_m"]) < 0.01
