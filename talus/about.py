@@ -1,4 +1,4 @@
-"""What is installed: versions, solvers, ranks."""
+"""The command ``talus info``: versions, solvers, processors."""
 
 from __future__ import annotations
 

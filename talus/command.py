@@ -1,4 +1,4 @@
-"""What is said on the command line after ``talus``."""
+"""The command line of ``talus``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from talus import find
 from talus.about import about
 from talus.begin import begin
-from talus.completion import SHELLS, completion
+from talus.completion import SCRIPTS
 from talus.launch import run
 
 
@@ -19,17 +19,13 @@ def parser() -> argparse.ArgumentParser:
     """All commands."""
     p = argparse.ArgumentParser(prog="talus", description="Slopes from rest to large deformation, by FEM and MPM.")
     commands = p.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    commands.add_parser(
-        "run", help="run a study; `talus run --help` says how"
-    )  # its words go to `run_study` as they are
-    commands.add_parser("list", help="list the studies there are, yours too")
+    commands.add_parser("run", help="run a study; see `talus run --help`")  # `run_study` takes its arguments
+    commands.add_parser("list", help="list all studies, including your own")
     new = commands.add_parser("new", help="begin a study of your own: a commented script, and a geometry for gmsh")
-    new.add_argument("name", help="of the study: NAME.py and NAME.geo are written to the present folder")
-    commands.add_parser("info", help="versions, solvers, and ranks that this machine has")
-    shell = commands.add_parser(
-        "completion", help="print what makes a shell complete the names of commands and studies"
-    )
-    shell.add_argument("shell", choices=SHELLS)
+    new.add_argument("name", help="name of the study: NAME.py and NAME.geo are written to the current folder")
+    commands.add_parser("info", help="print versions, linear solvers and processors")
+    shell = commands.add_parser("completion", help="print the script by which a shell completes commands and studies")
+    shell.add_argument("shell", choices=SCRIPTS)
     return p
 
 
@@ -51,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         elif a.command == "info":
             print(about())
         else:
-            print(completion(a.shell))
+            print(SCRIPTS[a.shell])
     except (OSError, ValueError) as error:
         print(f"talus {a.command}: {error}", file=sys.stderr)
         return 2

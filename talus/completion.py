@@ -1,14 +1,12 @@
 """Completion of commands, studies and files by the shell."""
 
-SHELLS = ("bash", "zsh")
-
 _BASH = """\
 _talus() {
   local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}
   if ((COMP_CWORD == 1)); then
     COMPREPLY=($(compgen -W "run list new info completion" -- "$word"))
   elif [[ $command == completion ]]; then
-    COMPREPLY=($(compgen -W "bash zsh" -- "$word"))
+    COMPREPLY=($(compgen -W "bash zsh fish" -- "$word"))
   elif [[ $command == run && ($before == run || ${COMP_WORDS[COMP_CWORD-2]} == --ranks) ]]; then
     COMPREPLY=($(compgen -W "--ranks $(talus list | awk '{print $1}')" -- "$word") $(compgen -f -X '!*.py' -- "$word"))
   else
@@ -18,7 +16,19 @@ _talus() {
 complete -o filenames -F _talus talus
 """
 
+_ZSH = """\
+autoload -Uz compinit bashcompinit
+(( $+functions[compdef] )) || compinit
+bashcompinit
+"""
 
-def completion(shell: str) -> str:
-    """The text that a shell reads: ``source <(talus completion bash)``."""
-    return _BASH if shell == "bash" else "autoload -Uz bashcompinit && bashcompinit\n" + _BASH
+_FISH = """\
+complete -c talus -f -n __fish_use_subcommand -a "run list new info completion"
+complete -c talus -f -n "__fish_seen_subcommand_from list new info"
+complete -c talus -f -n "__fish_seen_subcommand_from completion" -a "bash zsh fish"
+complete -c talus -x -n "__fish_seen_subcommand_from run" -l ranks -d "number of ranks"
+complete -c talus -n "__fish_seen_subcommand_from run" -a "(talus list | string replace -r '^ *(\\\\S+) +' '\\$1\\t')"
+"""
+
+SCRIPTS = {"bash": _BASH, "zsh": _ZSH + _BASH, "fish": _FISH}
+"""What a shell reads, ``source <(talus completion bash)`` or ``talus completion fish | source``"""

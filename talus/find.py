@@ -1,4 +1,4 @@
-"""Where studies lie: those of Talus, and those of the user."""
+"""Folders of studies: those of Talus, and those of the user."""
 
 from __future__ import annotations
 

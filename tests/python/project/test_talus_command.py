@@ -138,6 +138,29 @@ def test_the_shell_completes_studies(tmp_path):
     assert done.stdout.split() == ["slope", "slope_schemes", "info"], done.stderr
 
 
+def test_zsh_takes_the_completion_without_further_preparation(tmp_path):
+    if shutil.which("zsh") is None:
+        pytest.skip("needs zsh")
+    script = f'talus() {{ {sys.executable} -m talus "$@" }}; source <(talus completion zsh); echo $_comps[talus]'
+    done = subprocess.run(
+        ["zsh", "-fc", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, env=ENVIRONMENT
+    )
+    assert done.stdout.split()[-2:] == ["-F", "_talus"] and done.stderr == ""
+
+
+def test_fish_completes_commands_and_studies(tmp_path):
+    if shutil.which("fish") is None:
+        pytest.skip("needs fish")
+    lines = ["talus in", "talus run slo", "talus completion f", "talus run --r"]
+    script = "\n".join([f"function talus; {sys.executable} -m talus $argv; end", "talus completion fish | source",
+                        *(f"complete -C '{line}'" for line in lines)])  # fmt: skip
+    done = subprocess.run(
+        ["fish", "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, env=ENVIRONMENT
+    )
+    words = [line.split("\t")[0] for line in done.stdout.splitlines()]
+    assert words == ["info", "slope", "slope_schemes", "fish", "--ranks"], done.stderr
+
+
 def test_the_installed_package_holds_all_that_studies_need(tmp_path):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert project["project"]["scripts"] == {"talus": "talus.command:main"}
