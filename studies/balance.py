@@ -1,7 +1,7 @@
-"""Load balance: a slope that slides across the ranks' parts of the mesh, with the first partition and with repartition.
+"""Load balance: a slope that slides from rank to rank, with the first partition of the mesh and with repartition.
 
-DOLFINx partitions the background mesh by cells. Soil fills only some of them, so that ranks have unequal numbers of particles
-from the start, which change as the slope slides; each step waits for the rank with most particles. The slope slides twice: with
+DOLFINx partitions the background mesh by cells. Soil fills only some of them, so that ranks have different numbers of particles
+from the start, which change as the slope slides. Each step waits for the rank with most particles. The slope slides twice: with
 the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds the
 threshold.
 """

@@ -1,9 +1,9 @@
-"""A granular flow hits a wall: force over time, between two bores.
+"""A granular flow hits a wall: force on the wall over time, against the balance of momentum.
 
-A layer of sand with a front slides down a plane that just keeps its velocity, and is stopped by a wall at right angles to
-the plane. A bore goes back from the wall. The force that follows from mass and momentum depends on the pressure within the
-sand: it lies between that of a fluid of the same density and that of sand under Rankine's passive pressure. Coordinates go
-along the plane and away from it.
+A layer of sand slides down a plane, whose inclination keeps its velocity constant, and is stopped by a wall at right angles
+to the plane. A bore travels back from the wall. The force that follows from the balance of mass and momentum depends on the
+pressure within the sand: it lies between that of a fluid of the same density and that of sand under Rankine's passive
+pressure. Coordinates are parallel and normal to the plane.
 """
 
 from __future__ import annotations
@@ -58,16 +58,22 @@ def parser() -> ArgumentParser:
     add_number(p, "--length", 14.0, "-", "length of the flow over its depth", at_least=4)
     add_number(p, "--froude", 2.0, "-", "velocity over that of shallow waves", at_least=1)
     add_number(p, "--slope", 20.0, "degrees", "inclination of the plane", at_least=0, below=45)
-    add_number(p, "--base-friction-angle", None, "degrees", "friction on the plane (default: the slope)", at_least=0,
+    add_number(p, "--base-friction-angle", None, "degrees", "friction angle of the plane (default: its inclination)", at_least=0,
                below=60)  # fmt: skip
-    add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction on the wall", at_least=0, below=60)
+    add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction angle of the wall", at_least=0, below=60)
     add_number(p, "--front-angle", 25.0, "degrees", "inclination of the front to the plane", above=5, at_most=90)
     add_number(p, "--friction-angle", 30.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--young", 5e6, "Pa", "Young's modulus of the sand", above=0)
     add_number(p, "--density", 1600.0, "kg/m3", "density of the sand", above=0)
-    add_number(p, "--duration", 8.0, "-", "over the time of passage, depth over velocity", above=0)
+    add_number(p, "--duration", 8.0, "-", "duration of the run over the time depth/velocity", above=0)
     add_number(
-        p, "--cell-size", 0.125, "-", "side of the squares, of two triangles each, over the depth", above=0, at_most=0.5
+        p,
+        "--cell-size",
+        0.125,
+        "-",
+        "side of the squares (two triangles each) over the depth of the flow",
+        above=0,
+        at_most=0.5,
     )
     body_runs.add_body_run_options(p, damping=0.0, pic=0.05, nmd=False, frames=48)
     return p

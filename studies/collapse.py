@@ -1,7 +1,7 @@
-"""Collapse of the slope: the unit weight that it can just carry, by elasto-plastic FEM against limit analysis.
+"""Collapse of the slope: the largest unit weight that it carries, by elasto-plastic FEM against limit analysis.
 
-The unit weight is raised until no equilibrium is found any more, on several meshes. With associated flow (the default) the
-result converges from above to that of limit analysis; flow without dilation is reported beside it.
+The unit weight is raised until there is no equilibrium any more, on several meshes. With associated flow (the default) the
+result converges from above to that of limit analysis; results without dilation are reported as well.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Collapse of the slope by particles: quasi-static steps under rising unit weight, against finite elements and limit analysis.
 
-Small displacements: particles keep their places and take stresses only. The unit weight is raised until no step converges, on
-several meshes, with and without nodal mixed discretisation; so it is in quadratic finite elements, on the coarsest to the
-finest of these meshes. Flow is associated unless --dilation-angle says otherwise, as limit analysis supposes. On one rank.
+Displacements are small: stresses change, but particles keep their positions. The unit weight is raised until no step
+converges, on several meshes, with and without nodal mixed discretisation, and by quadratic finite elements on the same
+meshes. Flow is associated, as limit analysis assumes, unless --dilation-angle is given. The study runs on one rank.
 """
 
 from __future__ import annotations
@@ -42,7 +42,15 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_fem_slope_options(p)
     add_count(p, "--particles-per-cell", 1, "particles in each cell: 1, 3, 4, 6, 10, 12, ...")
-    add_number(p, "--tolerance", 2e-3, "-", "step of unit weight, over it, below which a run ends", above=0, below=1)
+    add_number(
+        p,
+        "--tolerance",
+        2e-3,
+        "-",
+        "relative increment of the unit weight below which a run ends",
+        above=0,
+        below=1,
+    )
     return p
 
 

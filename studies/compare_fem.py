@@ -1,10 +1,10 @@
 """Particles against FEM below collapse: the displacements of both at rest, for several unit weights and mesh sizes.
 
-Particles are loaded by their weight, slowly and with damping, until they are at rest; quadratic finite elements on the finest
-mesh are the reference, and the difference of the displacements shrinks with the size of the particles' cells. The soil is a
-hundred times as stiff as in the study slope, so that strains are small, as the finite elements assume; with soft soil
-(--young 200e3) a difference of some percent remains: particles follow the body as it deforms, and they cross into other cells,
-which makes them settle more, the less the more particles there are (--particles-per-cell).
+Particles are loaded by their weight, slowly and with damping, until they are at rest. Quadratic finite elements on the finest
+mesh are the reference; the difference of the displacements decreases with the cell size of the particles. The soil is a
+hundred times as stiff as in the study slope, so that strains are small, as the finite elements assume. With soft soil
+(--young 200e3) a difference of some per cent remains: particles move with the deformed body, and those that cross into other
+cells increase the settlement, less so if there are more of them (--particles-per-cell).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from common.field_plots import save_log_log, save_side_by_side
 from common.figures import Pictures
 from common.files import OutputError
 from common.movie import Movie, fem_frame, particle_frame
-from common.options import add_choice, add_count, add_number, change_defaults, study_parser
+from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
 from common.plots import Quantity
 from common.ranks import run_study
@@ -66,12 +66,12 @@ def parser() -> ArgumentParser:
         "--scheme",
         "explicit",
         ("explicit", "implicit"),
-        "how particles come to rest: damped motion, or without inertia",
+        "how particles come to rest: by damped motion, or by quasi-static steps",
     )
     add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
-    add_number(p, "--ramp", 30.0, "-", "time over which the weight rises in the explicit scheme, in times that a pressure wave "
-               "takes over the height", above=0)  # fmt: skip
-    change_defaults(p, young=20e6)
+    add_number(p, "--ramp", 30.0, "-", "time over which the weight rises in the explicit scheme, over the time that a pressure "
+               "wave takes to cross the height", above=0)  # fmt: skip
+    p.set_defaults(young=20e6)
     return p
 
 

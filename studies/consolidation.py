@@ -1,9 +1,9 @@
 """Consolidation of ground under a load: pore pressures rise as it is placed, and fall as the water leaves and the ground settles.
 
 The site is a TOML file (`meshes/fill.toml` unless another is given): a mesh of gmsh, soils with laws of effective stress and
-conductivities, supports, what the water does at the boundaries, and pressures in time. The ground begins at rest under its
-weight and the steady flow; from there displacement and pore pressure are found together. With `--particles`, implicit particles
-whose pores hold water take over the ground at rest and follow it beside the finite elements, with the same steps and in small
+conductivities, supports, boundary conditions of the pore water, and loads over time. The ground is first in equilibrium under its
+weight and steady flow; from there displacements and pore pressures are computed together. With `--particles`, implicit particles
+with pore water start from the same equilibrium and are computed beside the finite elements, with the same steps and small
 displacements.
 """
 
@@ -57,9 +57,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--first-step", 0.5, "days", "first step", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
     add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
-    add_flag(
-        p, "--particles", "follow the ground by implicit particles, too, which the reservoirs have to keep under water"
-    )
+    add_flag(p, "--particles", "compute implicit particles as well; the reservoirs must keep the ground under water")
     add_particles_per_cell(p, 3)
     return p
 

@@ -1,10 +1,11 @@
-"""What equilibrium costs: explicit scheme, transient relaxation and Newton's method, in drained and in undrained soil.
+"""Cost of an equilibrium: explicit scheme, transient relaxation and Newton's method, in drained and in undrained soil.
 
-The slope under 20 kN/m3 is brought to an out-of-balance ratio of 1e-6 in two ways. Drained: from zero stress. Undrained: the
-slope stands drained under --initial-unit-weight, and gets the rest too quickly for the water to drain; pore water makes the
-soil so stiff that the critical time step shrinks by two orders. The explicit scheme is damped locally; the others take
-quasi-static steps. Each run has a limit of processor time; where it is used up, the table has a lower bound. A further table has
-the force evaluations of every solver in one implicit step from zero stress. On one rank.
+The slope under 20 kN/m3 is brought to an out-of-balance ratio of 1e-6 in two ways. Drained: from zero stress. Undrained: from
+drained equilibrium under --initial-unit-weight, where the remaining weight is applied too quickly for the water to drain;
+pore water makes the soil so stiff that the critical time step is smaller by two orders of magnitude. The explicit scheme has
+local damping; the others take quasi-static steps. Each run has a limit of processor time; if it is reached, the table gives a
+lower bound. Another table has the force evaluations of every solver in one implicit step from zero stress. The study runs on
+one rank.
 """
 
 from __future__ import annotations
@@ -58,7 +59,14 @@ def parser() -> ArgumentParser:
     add_slope_options(p)
     p.set_defaults(unit_weight=20e3, particles_per_cell=3, water_modulus=2.2e9, porosity=0.5)
     add_count(p, "--meshes", 3, "meshes, each with cells half as large as the one before")
-    add_number(p, "--initial-unit-weight", 19e3, "N/m3", "unit weight carried before the undrained load", above=0)
+    add_number(
+        p,
+        "--initial-unit-weight",
+        19e3,
+        "N/m3",
+        "unit weight in drained equilibrium, before the undrained load",
+        above=0,
+    )
     add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
     add_number(p, "--tolerance", 1e-6, "-", "out-of-balance ratio to reach", above=0)
     add_number(p, "--limit", 30.0, "s", "processor time of one run", above=0)

@@ -1,7 +1,8 @@
 """A slope in wide ground: particles everywhere against resting cells that turn into particles where the soil fails.
 
-The elasto-plastic equilibrium under the initial unit weight is found by finite elements. Then the unit weight is raised at once,
-and the slope fails: once with particles in all cells, once with cells that rest as the finite elements that they were.
+Finite elements give the elasto-plastic equilibrium under the initial unit weight. Then the unit weight is raised at once, and
+the slope fails. This is computed twice: with particles in all cells, and with resting cells, which remain finite elements
+until the soil in them fails.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.followed import cells_near, mean_displacement, numbers_in
 from common.movie import frame_of
-from common.options import add_count, add_number, change_defaults, check, study_parser
+from common.options import add_count, add_number, check, study_parser
 from common.page import Page
 from common.plots import AXES, SHEAR_STRAIN, WIDTH, paper_style, save_history
 from common.ranks import run_study
@@ -51,7 +52,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that the initial stresses carry", above=0)
     add_number(p, "--unit-weight", 60e3, "N/m3", "unit weight under which the slope fails", above=0)
     add_soil_options(p, dilation_angle=0.0)
-    change_defaults(p, young=1e9)
+    p.set_defaults(young=1e9)
     add_number(p, "--damping", 0.1, "-", "local damping", at_least=0, below=1)
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
     add_count(p, "--frames", 40, "times of the history")

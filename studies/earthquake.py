@@ -1,9 +1,10 @@
-"""A slope in an earthquake: from equilibrium by finite elements to the displacement that stays, beside Newmark's block.
+"""A slope in an earthquake: from equilibrium by finite elements to the permanent displacement, against Newmark's block.
 
-The slope lies on a stiffer layer over rock. Finite elements find its elasto-plastic equilibrium; then the base lets the motion of
-a rock outcrop in and waves out, free fields lie beside the sides, and cells rest until the soil in them fails. The displacement
-of the slope is compared with those of Newmark's sliding block under the motion of the free field at the levels of toe and
-crest, and the amplification of a linear column of the ground with the closed form of layers over a half-space.
+The slope lies on a stiffer layer over rock. Finite elements give its elasto-plastic equilibrium. In the earthquake the motion
+of a rock outcrop enters through the base, which absorbs outgoing waves; free fields are coupled to the sides; resting cells
+turn into particles where the soil fails. The displacement of the slope is compared with those of Newmark's sliding block
+under the motion of the free field at the levels of toe and crest, and the amplification of a linear column of the ground with
+the closed form of layers over a half-space.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from common.history import History
 from common.motions import ricker
 from common.movie import Movie, gathered, own_frame
 from common.newmark import sliding_block, yield_acceleration
-from common.options import add_choice, add_count, add_number, change_defaults, check, study_parser
+from common.options import add_choice, add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN
@@ -65,14 +66,14 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_number(p, "--height", 10.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 35.0, "degrees", "inclination of the slope", above=11, at_most=78)
-    add_number(p, "--level", 40.0, "m", "level ground on each side of the slope", above=0)
+    add_number(p, "--level", 40.0, "m", "length of the level ground on each side of the slope", above=0)
     add_number(p, "--soil-depth", 5.0, "m", "depth below the toe at which the stiffer layer begins", above=0)
     add_number(p, "--stiff-depth", 10.0, "m", "thickness of the stiffer layer", above=0)
     add_number(p, "--cell-size", 1.0, "m", "side of the squares", above=0)
     add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
     add_number(p, "--unit-weight", 19e3, "N/m3", "unit weight of the soil and of the stiffer layer", above=0)
     add_soil_options(p, dilation_angle=0.0)
-    change_defaults(p, young=200e6, poisson=0.3, cohesion=25e3, friction_angle=20.0)
+    p.set_defaults(young=200e6, poisson=0.3, cohesion=25e3, friction_angle=20.0)
     add_number(p, "--stiff-young", 800e6, "Pa", "Young's modulus of the stiffer layer, which stays elastic", above=0)
     add_number(p, "--rock-density", 2400.0, "kg/m3", "density of the rock below", above=0)
     add_number(p, "--rock-speed", 1000.0, "m/s", "speed of shear waves in the rock", above=0)
@@ -81,11 +82,18 @@ def parser() -> ArgumentParser:
                    help="file of the outcrop's motion, time [s] and acceleration, in place of a synthetic one")  # fmt: skip
     add_choice(p, "--unit", "m/s2", ("m/s2", "cm/s2", "g"), "unit of the accelerations in that file")
     add_number(p, "--peak", 4.0, "m/s2", "largest acceleration of a synthetic motion", above=0)
-    add_number(p, "--frequency", 2.0, "Hz", "of the Ricker wavelet, or twice the lowest of the noise", above=0)
-    add_number(p, "--highest-frequency", 6.0, "Hz", "highest of the noise", above=0)
-    add_number(p, "--duration", 8.0, "s", "of a synthetic motion", above=0)
+    add_number(
+        p,
+        "--frequency",
+        2.0,
+        "Hz",
+        "frequency of the Ricker wavelet, or twice the lowest one of the noise",
+        above=0,
+    )
+    add_number(p, "--highest-frequency", 6.0, "Hz", "highest frequency of the noise", above=0)
+    add_number(p, "--duration", 8.0, "s", "duration of a synthetic motion", above=0)
     add_count(p, "--seed", 1, "of the noise")
-    add_number(p, "--rest", 3.0, "s", "time after the motion", at_least=0)
+    add_number(p, "--rest", 3.0, "s", "time that is computed after the motion", at_least=0)
     add_number(p, "--damping-ratio", 0.02, "-", "damping ratio of the soil at small strains", at_least=0, below=0.5)
     add_count(p, "--frames", 40, "times at which particles are drawn")
     add_picture_options(p)

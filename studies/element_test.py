@@ -1,7 +1,7 @@
 """Laboratory tests on one point of any law: oedometer, triaxial drained and undrained, simple shear; stress paths.
 
-The undrained triaxial test keeps the volume; with --undrained the law itself has pore water, and the excess pore pressure is
-drawn. Laws of one's own: --python-law FILE.py:CLASS, or --umat LIBRARY.so with its PROPS.
+The undrained triaxial test keeps the volume constant. With --undrained the law itself includes pore water, and the excess pore
+pressure is drawn. A law of your own is given by --python-law FILE.py:CLASS, or by --umat LIBRARY.so with its PROPS.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", 
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    add_choice(p, "--test", "drained", TESTS, "compression at no side strain; triaxial at constant side stress; at "
-               "constant volume; simple shear at constant volume")  # fmt: skip
+    add_choice(p, "--test", "drained", TESTS, "compression without lateral strain; triaxial with constant lateral "
+               "stress; triaxial at constant volume; simple shear at constant volume")  # fmt: skip
     add_number(p, "--pressure", 20e3, "Pa", "isotropic pressure at the start", at_least=0)
     add_number(p, "--strain", 0.2, "-", "axial strain to reach (shear strain in simple shear), in compression", above=0)
     add_count(p, "--steps", 400, "increments")

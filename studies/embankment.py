@@ -1,9 +1,9 @@
 """An embankment built in layers on soft clay: settlement by FEM and particles, then failure and slide by particles.
 
 The site is a TOML file (`meshes/embankment.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
-of its physical groups, supports by boundary, and a list of stages. Finite elements and quasi-static particles carry out the
-same list. Then the strength of all soils is divided by --factor, and the explicit scheme follows what happens; a stage that
-has no equilibrium is followed as it is.
+of its physical groups, supports by boundary, and a list of stages. Finite elements and quasi-static particles compute the
+same stages. Then the strength of all soils is divided by --factor, and the explicit scheme computes the failure; if a stage
+has no equilibrium, its failure is computed without reduction of the strength.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """An excavation in stages: a pit is dug in steps while the water is drawn down, by elasto-plastic FEM.
 
 The site is a TOML file (`meshes/excavation.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
-of its physical groups, supports by boundary, and a list of stages that place and take away soil, change laws, loads, supports
-and water levels. For elastic soil what remains is, whatever the stages, as if built at once; the study measures that, and how
-far plastic soil is from it.
+of its physical groups, supports by boundary, and a list of stages that place and remove soil, change laws, loads, supports
+and water levels. In elastic soil the final state does not depend on the stages; with --compare the study verifies this, and
+computes the difference that stages make in plastic soil.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_stage_options(p, "excavation", "P2")
-    add_switch(p, "--compare", True, "elastic soil as well, and the same ground built at once, to compare with")
+    add_switch(p, "--compare", True, "also compute elastic soil, and the final geometry in one stage, for comparison")
     return p
 
 

@@ -1,7 +1,7 @@
 """Bearing capacity of a strip footing on weightless ground, by elasto-plastic FEM against Prandtl's solution.
 
-Half of a smooth, flexible strip: a uniform pressure is raised until no equilibrium is found any more, on several meshes.
-Pressure at collapse = cohesion x Nc; with associated flow (the default) Nc converges from above to that of Prandtl.
+Half of a smooth, flexible strip is loaded by a uniform pressure until there is no equilibrium any more, on several meshes.
+The pressure at collapse is cohesion x Nc; with associated flow (the default) Nc converges from above to that of Prandtl.
 """
 
 from __future__ import annotations
@@ -38,13 +38,18 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_number(p, "--friction-angle", 0.0, "degrees", "friction angle", at_least=0, below=45)
     add_number(p, "--dilation-angle", None, "degrees",
-               "dilation angle, at most the friction angle (default: that one, associated flow)", at_least=0)  # fmt: skip
+               "dilation angle, at most the friction angle (default: equal, associated flow)", at_least=0)  # fmt: skip
     add_number(p, "--cohesion", 1e3, "Pa", "cohesion", above=0)
     add_number(p, "--young", 100e3, "Pa", "Young's modulus", above=0)
     add_number(p, "--poisson", 0.3, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--half-width", 0.5, "m", "half of the footing's width", above=0)
     add_number(
-        p, "--cell-size", 0.05, "m", "triangles below the footing; a fifth of it at its edge, more far away", above=0
+        p,
+        "--cell-size",
+        0.05,
+        "m",
+        "size of the triangles below the footing; a fifth of it at the edge, larger far away",
+        above=0,
     )
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_element_options(p)

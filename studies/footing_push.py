@@ -1,10 +1,10 @@
 """A rigid footing is pushed into clay: load over settlement, from the first yield to large penetration.
 
-A strip or circular footing, smooth or rough, is a rigid body that touches the particles; it does not depend on the mesh, and
-goes on when the soil beside it has risen above its base. The clay does not drain and has no weight (Tresca), so that the load
-over area and shear strength just after the soil has yielded is the bearing capacity factor N_c: 5.14 for a strip, 5.69 for a
-smooth and 6.05 for a rough circle. It comes from above: cells at the edge make the footing wider by half of their size. With
-the penetration the load goes on rising, as that of a footing that is embedded.
+A strip or circular footing, smooth or rough, is a rigid body in contact with the particles. It does not depend on the mesh,
+and is pushed further when the soil beside it has risen above its base. The clay is undrained and has no weight (Tresca), so
+that the load over area and shear strength just after the soil has yielded is the bearing capacity factor N_c: 5.14 for a
+strip, 5.69 for a smooth and 6.05 for a rough circle. It converges from above, because cells at the edge make the footing
+wider by half of their size. With further penetration the load continues to rise, as for an embedded footing.
 """
 
 from __future__ import annotations
@@ -60,15 +60,15 @@ def parser() -> ArgumentParser:
         p, "--base", "rough", ("smooth", "rough"), "no shear stress on the footing, or up to the strength of the clay"
     )
     add_number(p, "--half-width", 0.5, "m", "half of the footing's width, or its radius", above=0)
-    add_number(p, "--penetration", 0.3, "m", "settlement in the end", above=0)
+    add_number(p, "--penetration", 0.3, "m", "final settlement", above=0)
     add_number(p, "--strength", 20e3, "Pa", "undrained shear strength of the clay", above=0)
     add_number(p, "--rigidity", 200.0, "-", "Young's modulus over the shear strength", above=0)
     add_number(p, "--poisson", 0.45, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--density", 1800.0, "kg/m3", "density of the clay", above=0)
     add_number(p, "--speed", 1e-3, "-", "speed of the footing over that of elastic waves", above=0, at_most=0.1)
-    add_number(p, "--cell-size", 0.02, "m", "cells along the way of the footing's edge", above=0)
-    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that; those far away have four times "
-               "as much", at_least=1)  # fmt: skip
+    add_number(p, "--cell-size", 0.02, "m", "size of the cells along the path of the footing's edge", above=0)
+    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that along the path; those far away are "
+               "four times as large", at_least=1)  # fmt: skip
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
 

@@ -1,8 +1,8 @@
-"""When to hand over: the load at which particles take over from FEM, and what it changes in the final run-out.
+"""Hand-over from FEM to particles: the load at which it takes place, and its influence on the final run-out.
 
-The slope is brought to elasto-plastic equilibrium by FEM under a fraction of the unit weight at which it collapses, and
-particles take over its stresses. Then the unit weight is raised at once to its full value and the slope slides, as in the study
-slope. With a fraction of zero the slide starts from zero stress.
+The slope is brought to elasto-plastic equilibrium by FEM under a fraction of the unit weight at which it collapses, and its
+stresses are transferred to particles. Then the unit weight is raised at once to its full value and the slope slides, as in
+the study slope. With a fraction of zero the slide starts from zero stress.
 """
 
 from __future__ import annotations

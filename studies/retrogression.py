@@ -1,10 +1,10 @@
-"""A slope of sensitive clay: a disturbed toe slips, and the bank fails back piece by piece, on two mesh sizes.
+"""A slope of sensitive clay: a disturbed toe slips, and the bank fails retrogressively, piece by piece, on two cell sizes.
 
-The clay does not drain and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell
-size, so that a slip dissipates the same energy on any mesh). Finite elements find the stresses of the intact slope; the
-strength of a zone around the toe is then taken away, and the explicit scheme follows the failure until the slope is at rest:
-until its kinetic energy has stayed below a thousandth of its largest for two seconds. All of it is done with the cell size
-given and with half of it, and the two are compared.
+The clay is undrained and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell size,
+so that a slip dissipates the same energy on any mesh). Finite elements give the stresses of the intact slope. Then the clay
+in a zone around the toe loses strength, and the explicit scheme computes the failure until the slope is at rest, that is,
+until its kinetic energy has been below a thousandth of its maximum for two seconds. The results with the given cell size and
+with half of it are compared.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import Movie, particle_frame
-from common.options import add_choice, add_count, add_number, add_switch, change_defaults, study_parser
+from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, paper_style, save_particles
@@ -61,14 +61,14 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_slope_options(p)
-    change_defaults(
-        p, height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=17e3,
+    p.set_defaults(
+        height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=17e3,
         material="softening", young=2e6, poisson=0.45, cohesion=15e3, friction_angle=0.0, residual_cohesion=4e3,
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
     add_number(p, "--disturbed", 4.0, "m", "distance from the toe up to which the clay is disturbed", above=0)
     add_number(
-        p, "--disturbed-loss", 0.9, "-", "fraction of its strength that disturbed clay has lost", above=0, at_most=1
+        p, "--disturbed-loss", 0.9, "-", "fraction of its strength that the disturbed clay has lost", above=0, at_most=1
     )
     add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
     add_pic(p, 0.1)
@@ -77,7 +77,9 @@ def parser() -> ArgumentParser:
     add_picture_options(p)
     add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
     add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
-    add_switch(p, "--coupled", False, "let cells rest as finite elements until the clay in them fails")
+    add_switch(
+        p, "--coupled", False, "begin with resting cells, which are finite elements until the clay in them fails"
+    )
     return p
 
 

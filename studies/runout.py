@@ -1,7 +1,7 @@
-"""A slide runs out over ground in three dimensions: over a valley given by formulas, or over a raster of heights.
+"""A slide runs out over terrain in three dimensions: over a valley given by formulas, or over a raster of heights.
 
-The body between the ground before the slide and the surface on which it breaks loose is filled with particles, which touch the
-ground that is left with friction. Maps of the deposit, of the largest thickness and speed, and of where the slide has been are
+Particles fill the body between the ground before the slide and the surface of rupture; friction acts between them and the
+remaining ground. Maps of the deposit, of the largest thickness and speed, and of the area that the slide has covered are
 written as ESRI ASCII grids or GeoTIFF and drawn over a hillshade.
 """
 
@@ -47,27 +47,33 @@ def parser() -> ArgumentParser:
     p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
                    help="heights of the ground before the slide: .asc, .tif, .xyz (default: a valley by formulas)")  # fmt: skip
     p.add_argument(
-        "--rupture", type=Path, default=None, metavar="FILE", help="heights of the ground that the slide leaves"
+        "--rupture",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help="heights of the surface of rupture, on which the slide begins",
     )
     p.add_argument(
         "--crs",
         default=None,
         metavar="TEXT",
-        help="coordinate reference of files that name none; local for metres on a plane",
+        help="coordinate reference system of files that name none; 'local' for metres on a plane",
     )
     add_number(p, "--height", 60.0, "m", "height of the valley's side where it is given by formulas", above=0)
     add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide in that valley", above=0)
     add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
     add_number(p, "--spacing", 2.0, "m", "distance between particles", above=0)
     add_number(p, "--headroom", 20.0, "m", "height of the background mesh above the ground", above=0)
-    add_number(p, "--ground-friction-angle", 15.0, "degrees", "friction between slide and ground", at_least=0, below=90)
+    add_number(
+        p, "--ground-friction-angle", 15.0, "degrees", "friction angle between slide and ground", at_least=0, below=90
+    )
     add_number(p, "--density", 1900.0, "kg/m3", "density of the slide", above=0)
     add_number(p, "--young", 5e6, "Pa", "Young's modulus; stiffer soil takes shorter steps", above=0)
-    add_number(p, "--friction-angle", 28.0, "degrees", "friction within the slide", at_least=0, below=60)
+    add_number(p, "--friction-angle", 28.0, "degrees", "friction angle of the slide", at_least=0, below=60)
     add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide", at_least=0)
     add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)
     add_number(p, "--time", 20.0, "s", "duration", above=0)
-    add_count(p, "--frames", 80, "times at which maps and particles are taken")
+    add_count(p, "--frames", 80, "times at which maps and particles are stored")
     add_choice(p, "--grids", "asc", ("asc", "tif"), "files of the maps: ESRI ASCII grids, or GeoTIFF by rasterio")
     add_picture_options(p)
     return p

@@ -1,8 +1,8 @@
-"""Factor of safety of the slope: by what its strength can be divided, by elasto-plastic FEM against limit analysis.
+"""Factor of safety of the slope: strength reduction with elasto-plastic FEM, against limit analysis.
 
-Cohesion and tan(friction angle) are divided by a rising factor until no equilibrium under the unit weight is found any more
-(strength reduction), on several meshes. Flow is associated unless a dilation angle is given; flow without dilation is
-reported beside it.
+Cohesion and tan(friction angle) are divided by a rising factor until there is no equilibrium under the unit weight any more
+(strength reduction), on several meshes. Flow is associated unless a dilation angle is given; results without dilation are
+reported as well.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ def parser() -> ArgumentParser:
     add_fem_slope_options(p)
     add_ground_option(p)
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
-    add_number(p, "--start", 0.5, "-", "first factor that is tried; the slope must stand with it", above=0)
+    add_number(p, "--start", 0.5, "-", "first factor to try; the slope must be stable with it", above=0)
     add_flow_options(p)
     add_site_option(p)
-    add_flag(p, "--particles", "a second opinion by particles on the same cells, which rest or flow")
+    add_flag(p, "--particles", "also find the factor by particles on the same cells, which come to rest or flow")
     return p
 
 

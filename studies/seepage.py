@@ -1,8 +1,8 @@
-"""Seepage through a dam, or any site of one's own: steady flow, then what happens as reservoirs and rain change.
+"""Seepage through a dam, or through a site of your own: steady flow, then transient flow as reservoirs and rain change.
 
 The site is a TOML file (`meshes/dam.toml` unless another is given): a mesh of gmsh, soils with conductivities and retention
-curves by the names of its physical groups, and what the water does at the boundaries. The water table is part of the solution.
-Where values at boundaries change in time, the flow is followed from the steady state of the beginning.
+curves by the names of its physical groups, and boundary conditions of the water. The water table is part of the solution.
+If boundary values change in time, transient flow is computed from the steady state at the beginning.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
     add_site_file(p, "dam", "soils and boundaries", ("P1", ("P1", "P2"), "linear or quadratic triangles"))
-    add_number(p, "--days", 60.0, "days", "time that is followed, where values at boundaries change", above=0)
-    add_count(p, "--frames", 6, "pictures of the flow in time")
+    add_number(p, "--days", 60.0, "days", "duration of transient flow, if boundary values change", above=0)
+    add_count(p, "--frames", 6, "number of pictures of the flow over time")
     return p
 
 

@@ -17,7 +17,7 @@ packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libptscotch-dev l
   python3-rasterio ffmpeg)
 # What the tests need besides.
 test_packages=(gfortran python3-pytest python3-hypothesis python3-meshio python3-pandas python3-scipy python3-vtk9
-  chromium chromium-driver python3-selenium clang-format black mypy)
+  chromium chromium-driver python3-selenium clang-format black mypy zsh fish)
 docs_packages=(python3-sphinx python3-myst-parser python3-sphinx-rtd-theme libjs-mathjax)
 
 say() { printf "%s: %s\n" "$program" "$*" >&2; }
@@ -171,18 +171,4 @@ configure() {
   local generator=()
   [[ -e $build/CMakeCache.txt ]] || ! command -v ninja >/dev/null || generator=(-G Ninja)
   (cd "$root" && cmake --preset release "${generator[@]}" "-DPython_EXECUTABLE=$python") >"$log" 2>&1
-}
-
-# --- MPI ---
-
-# Sets `launch` to the words that start a command on $1 ranks.
-choose_launcher() {
-  command -v mpirun >/dev/null || die "mpirun is not on the path"
-  launch=(mpirun -n "$1")
-  [[ $(mpirun --version 2>/dev/null) == *"Open MPI"* ]] || return 0
-  [[ $(id -u) != 0 ]] || export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-  # Open MPI counts cores, not hardware threads.
-  local cores
-  cores=$(lscpu -p=Core,Socket 2>/dev/null | grep -v '^#' | sort -u | wc -l)
-  ((cores >= $1)) || launch+=(--oversubscribe)
 }

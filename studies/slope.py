@@ -1,9 +1,10 @@
 """The paper's slope: initial stresses by FEM, then failure and slide by MPM, explicit or implicit.
 
-The elasto-plastic equilibrium of the soil body under its initial unit weight is found in DOLFINx; its stresses go to the
-particles; the unit weight is raised at once, and the slope slides until its geometry has changed enough to carry it. The
-defaults are those of the paper's section 6; --paper repeats it exactly, with zero initial stress and a time step of 1e-4 s.
-With --site soils of a mesh of one's own take the place of the slope, and slide when their strength is divided by --factor.
+Finite elements (DOLFINx) give the elasto-plastic equilibrium of the soil body under its initial unit weight, and its stresses
+are transferred to particles. Then the unit weight is raised at once, and the slope slides until its geometry has changed
+enough to carry it. The defaults are those of section 6 of the paper; --paper repeats it exactly, with zero initial stress and
+a time step of 1e-4 s. With --site a mesh of your own with its soils replaces the slope; it slides when the strength of all
+soils is divided by --factor.
 """
 
 from __future__ import annotations
@@ -73,28 +74,33 @@ MAY_CHANGE = {
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
+    add_flag(p, "--paper", "repeat the paper exactly: zero initial stress, time step 1e-4 s")
     add_slope_options(p)
-    add_choice(p, "--initial", None, ("fem", "elastic", "k0", "zero"),
+    start = p.add_argument_group("initial state")
+    add_choice(start, "--initial", None, ("fem", "elastic", "k0", "zero"),
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
-    add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
-    add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
-    add_pic(p, 0.0)
-    add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")
-    add_number(p, "--time", 34.8, "s", "duration of the slide", above=0)
-    add_scheme_options(p)
-    add_count(p, "--frames", 120, "times at which particles are stored and drawn")
+    add_number(start, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    slide = p.add_argument_group("slide")
+    add_number(slide, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    add_pic(slide, 0.0)
+    add_switch(slide, "--nmd", False, "average volumetric strains over nodes, against locking")
+    add_number(slide, "--time", 34.8, "s", "duration of the slide", above=0)
+    add_scheme_options(slide)
+    add_number(slide, "--rebalance", 1.2, "-",
+               "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
+    add_count(slide, "--ensemble", 1,
+              "runs with initial states that differ by round-off; mean and standard deviation are reported")  # fmt: skip
+    files = p.add_argument_group("frames and pictures")
+    add_count(files, "--frames", 120, "times at which particles are stored and drawn")
     add_count(
-        p, "--frame-steps", None, "steps between further times at which particles are stored, not drawn (default: none)"
+        files, "--frame-steps", None, "store particles every so many steps too, without drawing them (default: not)"
     )
-    add_output_options(p, PARTICLE_FIELDS)
-    add_picture_options(p)
-    add_number(p, "--rebalance", 1.2, "-", "repartition the mesh above this load imbalance: maximum over mean particles per rank",
-               above=1)  # fmt: skip
-    add_count(p, "--ensemble", 1, "runs from starts that differ by round-off, whose mean and scatter are reported")
-    add_checkpoint_options(p)
-    add_site_option(p)
-    add_strength_factor(p)
-    add_flag(p, "--paper", "the paper exactly: zero initial stress, time step 1e-4 s")
+    add_output_options(files, PARTICLE_FIELDS)
+    add_picture_options(files)
+    add_checkpoint_options(p.add_argument_group("checkpoints"))
+    site = p.add_argument_group("a site instead of the slope")
+    add_site_option(site)
+    add_strength_factor(site)
     return p
 
 
@@ -206,7 +212,7 @@ def slide(
                     checkpoints.save()
                     loop[
                         "stopped"
-                    ] = f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
+                    ] = f"interrupted at {report.time:g} s; --restart {checkpoints.path} continues from there"
                     break
                 started = perf_counter()
         except mpm.RunError as error:

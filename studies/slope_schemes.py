@@ -1,8 +1,8 @@
-"""The damped slope by the explicit and the implicit scheme: where it comes to rest, and what that takes.
+"""The damped slope by the explicit and the implicit scheme: where it comes to rest, and the cost.
 
-The paper's slope at once under its full weight, by the explicit scheme, by Newton's method with several time steps and by
-transient relaxation. A run ends when the slope is at rest: when neither the out-of-balance force over the external one nor
-kinetic energy over the work of gravity is above --rest.
+The full weight of the paper's slope acts at once. It slides by the explicit scheme, by Newton's method with several time
+steps, and by transient relaxation. A run ends when the slope is at rest: when neither the out-of-balance ratio nor the
+kinetic energy over the work of gravity exceeds --rest.
 """
 
 from __future__ import annotations
@@ -74,10 +74,10 @@ def parser() -> ArgumentParser:
         p,
         "--longer-steps",
         2,
-        "further runs by Newton's method, with steps 2.5 and then 5 times as long",
+        "number of additional runs by Newton's method, with steps 2.5 and then 5 times as long",
         choices=(1, 2),
     )
-    add_count(p, "--frames", 120, "times at which the crest is looked at in the explicit run")
+    add_count(p, "--frames", 120, "times at which the explicit run records the displacement of the crest")
     return p
 
 

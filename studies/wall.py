@@ -1,9 +1,10 @@
 """Earth pressure on a rigid wall that moves away from sand, into it, or gives way.
 
-A wall retains sand on rock with the friction angle of the sand. It moves away from the sand (active pressure) or into it
-(passive pressure), or it is free, held by a force that falls to a part of the active one. Smooth, the coefficients are
-Rankine's; rough, they lie between those of a field of stresses (Lancellotta 2002), which is on the safe side, and of a
-plane wedge (Coulomb 1776), which is not. Sand that does not dilate may not make use of all of the wall's friction.
+A wall retains sand, which lies on rock with the friction angle of the sand. The wall moves away from the sand (active
+pressure) or into it (passive pressure), or it is free and held by a force that falls to a fraction of the active one. For a
+smooth wall the coefficients are Rankine's. For a rough wall they lie between those of a stress field (Lancellotta 2002),
+which are on the safe side, and those of a plane wedge (Coulomb 1776), which are not. Sand that does not dilate may not
+mobilise all of the wall friction.
 """
 
 from __future__ import annotations
@@ -49,20 +50,33 @@ LAST = 1 / 3
 def parser() -> ArgumentParser:
     """All options; units stand in the help."""
     p = study_parser(__doc__)
-    add_choice(p, "--motion", "active", ("active", "passive", "free"), "of the wall: from the sand, into it, or free")
+    add_choice(
+        p,
+        "--motion",
+        "active",
+        ("active", "passive", "free"),
+        "motion of the wall: away from the sand, into it, or free",
+    )
     add_number(p, "--height", 1.0, "m", "height of the wall", above=0)
     add_number(p, "--friction-angle", 30.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--dilation-angle", 0.0, "degrees", "dilation angle, at most the friction angle", at_least=0)
-    add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction between sand and wall", at_least=0)
+    add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction angle between sand and wall", at_least=0)
     add_number(p, "--cohesion", 50.0, "Pa", "cohesion of the sand", at_least=0)
     add_number(p, "--young", 1e7, "Pa", "Young's modulus", above=0)
     add_number(p, "--density", 1800.0, "kg/m3", "density of the sand", above=0)
     add_number(p, "--movement", None, "-", "displacement of the wall over its height (default: 0.008 active, 0.03 passive)",
                above=0)  # fmt: skip
     add_number(p, "--speed", 0.01, "1/s", "speed of the wall over its height", above=0)
-    add_number(p, "--support", 0.5, "-", "force on a free wall in the end, over the active force", at_least=0)
-    add_number(p, "--wall-mass", 0.2, "-", "mass of a free wall, over that of a square of sand as high", above=0)
-    add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height", above=0, at_most=0.25)
+    add_number(p, "--support", 0.5, "-", "final force on a free wall, over the active force", at_least=0)
+    add_number(
+        p,
+        "--wall-mass",
+        0.2,
+        "-",
+        "mass of a free wall, over that of a square of sand of the same height",
+        above=0,
+    )
+    add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height of the wall", above=0, at_most=0.25)
     body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=40)
     return p
 

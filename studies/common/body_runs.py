@@ -42,16 +42,18 @@ CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displaceme
 
 def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
     """Options of the particles, of their explicit run, of its files and of its checkpoints."""
-    add_particles_per_cell(p, 6)
-    add_number(p, "--damping", damping, "-", "local damping", at_least=0, below=1)
-    add_pic(p, pic)
-    add_switch(p, "--nmd", nmd, "average volumetric strains over nodes, against locking")
-    add_count(p, "--frames", frames, "times at which particles are stored and drawn")
-    add_output_options(p, PARTICLE_FIELDS)
-    add_picture_options(p)
-    add_number(p, "--rebalance", 1.2, "-", "repartition the mesh above this load imbalance: maximum over mean particles per rank",
-               above=1)  # fmt: skip
-    add_checkpoint_options(p)
+    run = p.add_argument_group("particles and run")
+    add_particles_per_cell(run, 6)
+    add_number(run, "--damping", damping, "-", "local damping", at_least=0, below=1)
+    add_pic(run, pic)
+    add_switch(run, "--nmd", nmd, "average volumetric strains over nodes, against locking")
+    add_number(run, "--rebalance", 1.2, "-",
+               "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
+    files = p.add_argument_group("frames and pictures")
+    add_count(files, "--frames", frames, "times at which particles are stored and drawn")
+    add_output_options(files, PARTICLE_FIELDS)
+    add_picture_options(files)
+    add_checkpoint_options(p.add_argument_group("checkpoints"))
 
 
 @dataclass
@@ -132,7 +134,7 @@ def follow(
                 if interrupt.requested():
                     checkpoints.save()
                     result.stopped = (
-                        f"interrupted at {report.time:g} s; --restart {checkpoints.path} goes on from there"
+                        f"interrupted at {report.time:g} s; --restart {checkpoints.path} continues from there"
                     )
                     break
         except mpm.RunError as error:

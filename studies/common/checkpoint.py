@@ -1,4 +1,4 @@
-"""Checkpoints of a study now and then, and the options of a run that goes on from one."""
+"""Regular checkpoints of a study, and the options of a restart."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def add_checkpoint_options(parser: argparse.ArgumentParser) -> None:
     """Options ``--checkpoint-every`` and ``--restart``."""
     parser.add_argument(
         "--checkpoint-every", type=_interval, default=None, metavar="N|Xmin",
-        help="save checkpoint.h5 in the results folder after this many steps, or minutes of wall time: 500, or 5min "
+        help="save checkpoint.h5 in the results folder every so many steps, such as 500, or minutes of wall time, such as 5min "
         "(default: only when the run is interrupted)",
     )  # fmt: skip
     parser.add_argument(
         "--restart", type=Path, default=None, metavar="FILE",
-        help="go on from a checkpoint, with the options that its run had, in the folder where it lies unless --output names "
+        help="continue from a checkpoint, with the options of its run, and in its folder unless --output names "
         "another",
     )  # fmt: skip
 

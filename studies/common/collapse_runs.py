@@ -21,7 +21,7 @@ UNDECIDED = 3
 
 def add_flow_options(parser: ArgumentParser) -> None:
     """Option ``--without-dilation``."""
-    add_switch(parser, "--without-dilation", True, "flow without dilation as well, to compare with")
+    add_switch(parser, "--without-dilation", True, "also compute flow without dilation, for comparison")
 
 
 def dilation_angles(options: Namespace) -> list[float]:

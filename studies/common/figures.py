@@ -38,7 +38,7 @@ def _where(error: BaseException) -> str:
 
 
 def save_figure(figure: Figure, path: Path, **look: object) -> None:
-    """Write a picture and close the figure. When that fails, the run takes note of the reason and goes on without it.
+    """Write a picture and close the figure. If that fails, the run records the reason and continues without it.
 
     Args:
         look: as of ``Figure.savefig``.

@@ -47,7 +47,7 @@ def write_text(path: Path, text: str) -> None:
 
 @contextlib.contextmanager
 def expendable(path: Path) -> Iterator[Path]:
-    """As `written_whole`, for a picture or film: when it cannot be written, the run takes note and goes on without it."""
+    """As `written_whole`, for a picture or film: if it cannot be written, the run records the reason and continues without it."""
     try:
         with written_whole(path) as aside:
             yield aside

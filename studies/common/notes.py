@@ -1,4 +1,4 @@
-"""What a study notes in its checkpoints: how the run was made, so that one that goes on is compared with it."""
+"""Notes of a study in its checkpoints: the options of the run, with which those of a restart are compared."""
 
 from __future__ import annotations
 

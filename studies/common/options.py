@@ -1,4 +1,4 @@
-"""Command line options of a study: the unit stands in the help, and a bad value is named with what was expected.
+"""Command line options of a study: the help shows their units, and errors give the value and what was expected.
 
 Example:
     >>> parser = study_parser(__doc__)
@@ -7,8 +7,8 @@ Example:
     >>> add_count(parser, "--particles-per-cell", 10, "particles in each cell at the start", choices=(1, 3, 4, 6, 10, 12))
     >>> options = parser.parse_args()
 
-Every option may also stand in a TOML file, ``--parameters FILE``, under its name without the dashes in front; the command
-line wins over the file.
+Every option may also be given in a TOML file, ``--parameters FILE``, under its name without the leading dashes; the command
+line takes precedence.
 """
 
 from __future__ import annotations
@@ -48,8 +48,20 @@ class Options(argparse.Namespace):
         return described(self.actions, self)
 
 
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Shows the default of an option behind its meaning and unit."""
+
+    def _get_help_string(self, action: argparse.Action) -> str:
+        text, default = action.help or "", action.default
+        if not hasattr(action, "meaning") or default is None:
+            return text
+        if isinstance(action, argparse.BooleanOptionalAction):
+            default = action.option_strings[0 if default else 1]
+        return f"{text} (default: {default:g})" if isinstance(default, float) else f"{text} (default: {default})"
+
+
 class _Parser(argparse.ArgumentParser):
-    """A parser that reads a file of parameters too and, on several ranks, speaks on the first one only."""
+    """A parser that also reads a file of parameters and, on several ranks, prints on the first one only."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: None = None) -> Options:  # type: ignore[override]
         options = Options()
@@ -63,7 +75,7 @@ class _Parser(argparse.ArgumentParser):
         return super().parse_args(args, options)
 
     def _take_defaults_from_files(self, args: Sequence[str] | None, options: Options) -> None:
-        """Values of a checkpoint, and over them those of a file of parameters, stand for what the command line does not name."""
+        """Values of a checkpoint, overridden by those of a file of parameters, become the defaults of the command line."""
         first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
         names = ["parameters", *(["restart"] if any(action.dest == "restart" for action in self._actions) else [])]
         for name in names:
@@ -79,7 +91,7 @@ class _Parser(argparse.ArgumentParser):
         self.set_defaults(**values)
 
     def _refuse_code(self, args: Sequence[str] | None, values: Mapping[str, object]) -> None:
-        """Code that a file names is run only when the command line says so too."""
+        """Refuse code that only a file names: the command line must name it too, or allow it."""
         words = {word.split("=")[0] for word in (sys.argv[1:] if args is None else args)}
         for action in self._actions:
             if not getattr(action, "runs_code", False) or values.get(action.dest) is None:
@@ -107,30 +119,28 @@ def study_parser(description: str | None) -> argparse.ArgumentParser:
     Args:
         description: the study's docstring; shown as it is.
     """
-    parser = _Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+    parser = _Parser(description=description, formatter_class=_Help, allow_abbrev=False)
     parser.prog = f"{PROGRAM} {Path(parser.prog).stem}"
-    parser.add_argument(
+    results = parser.add_argument_group("results and parameters")
+    results.add_argument(
         "--output", type=Path, default=None, metavar="DIR",
-        help="folder for the results; one that holds results is refused (default: results/NAME, or where that holds a run "
-        "results/NAME-2 and so on)",
+        help="folder for the results; a folder with results is refused (default: results/NAME, or results/NAME-2 and so on if "
+        "that has results)",
     )  # fmt: skip
-    add_flag(parser, "--overwrite", "remove the results of the earlier run in the folder")
-    parser.add_argument(
+    add_flag(results, "--overwrite", "remove the results of the earlier run in the folder")
+    results.add_argument(
         "--parameters", type=Path, default=None, metavar="FILE", dest="parameters_file",
-        help="TOML file with options, such as parameters.toml of an earlier run; the command line wins over it",
+        help="TOML file with options, such as parameters.toml of an earlier run; the command line takes precedence",
     )  # fmt: skip
     return parser
 
 
-def _add(parser: argparse.ArgumentParser, name: str, default: object, text: str, **kind: object) -> None:
-    shown = (
-        ""
-        if default is None
-        else f" (default: {default:g})"
-        if isinstance(default, float)
-        else f" (default: {default})"
-    )
-    parser.add_argument(name, default=default, help=(text + shown).replace("%", "%%"), **kind)  # type: ignore[arg-type]
+def _add(
+    parser: argparse.ArgumentParser, name: str, default: object, text: str, unit: str = "", **kind: object
+) -> None:
+    shown = (f"{text} [{unit}]" if unit else text).replace("%", "%%")
+    action = parser.add_argument(name, default=default, help=shown, **kind)  # type: ignore[arg-type]
+    action.meaning, action.unit = text, unit or "-"  # type: ignore[attr-defined]
 
 
 def add_number(
@@ -168,7 +178,7 @@ def add_number(
         return result
 
     number.takes = "a number"  # type: ignore[attr-defined]
-    _add(parser, name, default, f"{text} [{unit}]", type=number, metavar="X")
+    _add(parser, name, default, text, unit, type=number, metavar="X")
 
 
 def add_count(
@@ -202,8 +212,7 @@ def add_choice(
 
 def add_switch(parser: argparse.ArgumentParser, name: str, default: bool, text: str) -> None:
     """Add a pair of options, ``--name`` and ``--no-name``."""
-    shown = name if default else "--no-" + name.removeprefix("--")
-    parser.add_argument(name, action=argparse.BooleanOptionalAction, default=default, help=f"{text} (default: {shown})")
+    _add(parser, name, default, text, action=argparse.BooleanOptionalAction)
 
 
 def add_flag(parser: argparse.ArgumentParser, name: str, text: str) -> None:
@@ -228,15 +237,6 @@ def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str
             "--allow-code",
             "run the code that a file of parameters or a checkpoint names; see docs/howto/trust.md",
         )
-
-
-def change_defaults(parser: argparse.ArgumentParser, **defaults: object) -> None:
-    """Other defaults for options that are shared by studies, by their names with underscores; the help shows them."""
-    for name, value in defaults.items():
-        action = next(a for a in parser._actions if a.dest == name)
-        action.default = value
-        shown = f" (default: {value:g})" if isinstance(value, float) else f" (default: {value})"
-        action.help = re.sub(r" \(default: .*\)$", "", action.help or "") + shown
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

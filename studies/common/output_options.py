@@ -51,8 +51,10 @@ def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) ->
 
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
     """Options ``--no-pictures`` and ``--no-film`` of a study that draws figures and a film."""
-    add_switch(parser, "--pictures", True, "draw figures and film; without them the page has the player and the curves")
-    add_switch(parser, "--film", True, "draw a film, the longest of the pictures to draw")
+    add_switch(
+        parser, "--pictures", True, "draw figures and a film; otherwise the page has the player and the curves only"
+    )
+    add_switch(parser, "--film", True, "draw a film, which takes most of the time of all pictures")
 
 
 def check_frames(model: mpm.Model, options: argparse.Namespace, folder: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +34,8 @@ class Parameter:
 def described(actions: Sequence[argparse.Action], values: argparse.Namespace) -> list[Parameter]:
     """The options that say what is computed, with their values."""
     return [
-        Parameter(name, getattr(values, action.dest), *_described(action)) for name, action in _named(actions).items()
+        Parameter(name, getattr(values, a.dest), getattr(a, "unit", "-"), getattr(a, "meaning", a.help or ""))
+        for name, a in _named(actions).items()
     ]
 
 
@@ -111,15 +111,6 @@ def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:
     """Options by their names without dashes in front; of a pair --name and --no-name by the first."""
     shown = [action for action in actions if action.option_strings and action.dest not in NOT_PARAMETERS]
     return {action.option_strings[0].removeprefix("--"): action for action in shown}
-
-
-def _described(action: argparse.Action) -> tuple[str, str]:
-    """Unit and meaning of an option, from its help: ``meaning [unit] (default: ...)``, or with the default before the unit."""
-    text = re.sub(r" \(default: [^)]*\)", "", (action.help or "").replace("%%", "%"))
-    if text.endswith("]") and " [" in text:
-        meaning, unit = text[:-1].rsplit(" [", 1)
-        return unit, meaning
-    return "-", text
 
 
 def _to_toml(value: object) -> str:

@@ -44,7 +44,7 @@ class _Unheard(io.FileIO):
 
 
 def outlive_readers() -> None:
-    """From now on a run goes on when the reader of what it prints has ended.
+    """From now on a run continues when the reader of its output has ended.
 
     In ``studies/run slope 2>&1 | tee log`` Ctrl-C ends tee, too, and what the study still prints must not keep it from
     writing its results.

@@ -69,7 +69,7 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
 
 
 def _keep_compiler_lines(folder: Path) -> None:
-    """What the C compiler says while forms are compiled goes to ``forms.log``, which is there only if it said something."""
+    """Write the output of the C compiler, while it compiles forms, to ``forms.log``; without output there is no such file."""
     logger = logging.getLogger("fenics_bridge.forms")
     for handler in [handler for handler in logger.handlers if isinstance(handler, logging.FileHandler)]:
         logger.removeHandler(handler)
@@ -96,14 +96,14 @@ def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
 
 
 def release_reserved_space(folder: Path) -> None:
-    """Give back what was reserved for the summary, just before it is written. Call it on the first rank."""
+    """Release the space reserved for the summary, just before it is written. Call it on the first rank."""
     lock = _locks.get(folder)
     if lock is not None:
         _store(lock, _known(lock))
 
 
 def note_what_was_written(folder: Path) -> None:
-    """Store which files are the run's, so that ``--overwrite`` removes no others. Call it on the first rank, at the end."""
+    """Store which files the run has written, so that ``--overwrite`` removes no others. Call it on the first rank, at the end."""
     lock = _locks.get(folder)
     known = _known(lock) if lock is not None else {}
     if known:
@@ -122,7 +122,7 @@ def _opened(options: Options, adds: bool) -> Path:
         folder = Path(options.output) if options.output is not None else home
         goes_on = home is not None and folder.exists() and folder.samefile(home)
         if goes_on and options.overwrite:
-            raise OutputError("--overwrite would remove the checkpoint that --restart goes on from; leave it out")
+            raise OutputError("--overwrite would remove the checkpoint that --restart continues from; leave it out")
         obstacle = _taken(folder, adds or goes_on, options.overwrite)
         if obstacle is not None:
             raise OutputError(obstacle)
@@ -205,7 +205,7 @@ def _locked(folder: Path, keeps: bool, overwrite: bool) -> str | None:
 
 
 def _earlier(folder: Path, known: dict[str, Any]) -> set[str]:
-    """What an earlier run wrote; not its parameters, so that a run that ended before it computed anything is none."""
+    """Files of an earlier run, without its parameters: a run that ended before it computed anything does not count."""
     names = _names(folder)
     if not known:
         return names & set(NAMES)
@@ -225,7 +225,7 @@ def _remove(path: Path) -> None:
 
 
 def _set_aside(folder: Path) -> None:
-    """Summary and page of the part that a run goes on from get a number, since they do not speak of what comes now."""
+    """Give summary and page of the earlier part of a continued run a number, since they do not describe the new part."""
     number = next(n for n in itertools.count(1) if not (folder / f"summary-{n}.json").exists())
     for path in (folder / "summary.json", folder / "report.html"):
         if path.exists():
@@ -238,7 +238,7 @@ def _set_aside(folder: Path) -> None:
 
 
 def _known(lock: TextIO) -> dict[str, Any]:
-    """What a mark says; nothing when it is new or damaged."""
+    """Content of a mark; empty if it is new or damaged."""
     lock.seek(0)
     try:
         known = json.loads(lock.read().rstrip("\0"))

@@ -26,7 +26,7 @@ def add_scheme_options(parser: argparse.ArgumentParser) -> None:
                "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
     add_discretisation(parser)
-    add_number(parser, "--dt", None, "s", "longest time step (default: half of the critical one; 20 times the critical "
+    add_number(parser, "--dt", None, "s", "largest time step (default: half of the critical one; 20 times the critical "
                "one where implicit or quasi-static)", above=0)  # fmt: skip
 
 
@@ -40,7 +40,7 @@ def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> Non
 def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
     """Option ``--pic``."""
     add_number(parser, "--pic", default, "-",
-               "fraction of their own velocities that particles lose to the grid's in a critical time step (0 is FLIP)",
+               "PIC fraction: part of a particle's velocity that the nodal velocity replaces in a critical time step (0 is FLIP)",
                at_least=0, at_most=1)  # fmt: skip
 
 
@@ -48,7 +48,11 @@ def add_discretisation(parser: argparse.ArgumentParser) -> None:
     """Options ``--second-order`` and ``--integration``."""
     add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
     add_choice(
-        parser, "--integration", "particles", tuple(INTEGRATIONS), "how the stresses of a cell become nodal forces"
+        parser,
+        "--integration",
+        "particles",
+        tuple(INTEGRATIONS),
+        "how stresses are integrated over a cell to nodal forces",
     )
 
 

@@ -19,5 +19,5 @@ def add_site_file(parser: ArgumentParser, site: str, contents: str, elements: tu
     """
     parser.add_argument("--site", type=Path, default=ROOT / "meshes" / f"{site}.toml", metavar="FILE",
                         help=f"TOML file of mesh, {contents} (default: meshes/{site}.toml)")  # fmt: skip
-    add_number(parser, "--cell-size", None, "m", "size of the triangles (default: that of the site)", above=0)
+    add_number(parser, "--cell-size", None, "m", "size of the triangles (default: that of the site file)", above=0)
     add_choice(parser, "--elements", *elements)

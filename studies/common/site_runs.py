@@ -25,7 +25,7 @@ from .summary import write_summary
 def add_site_option(parser: argparse.ArgumentParser) -> None:
     """Option ``--site``."""
     parser.add_argument("--site", type=Path, default=None, metavar="FILE", help="TOML file of a mesh and its soils by name, such "
-                        "as meshes/embankment.toml, in place of the slope; its options are then without effect")  # fmt: skip
+                        "as meshes/embankment.toml, instead of the slope, whose options then have no effect")  # fmt: skip
 
 
 def site_study(

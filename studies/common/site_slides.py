@@ -48,7 +48,7 @@ def add_strength_factor(parser: ArgumentParser) -> None:
         "--factor",
         1.5,
         "-",
-        "by what the strength of all soils of a site is divided before the slide",
+        "factor by which the strength of all soils of a site is divided before the slide",
         at_least=1,
     )
 

@@ -26,11 +26,12 @@ SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 
 def add_slope_options(parser: argparse.ArgumentParser) -> None:
     """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6."""
-    add_geometry_options(parser, cell_size=0.1)
-    add_number(parser, "--runout-length", 2.0, "m", "background mesh beyond the toe", above=0)
-    add_particles_per_cell(parser, 10)
-    add_number(parser, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
-    add_soil_options(parser, dilation_angle=0.0)
+    slope = parser.add_argument_group("slope and soil")
+    add_geometry_options(slope, cell_size=0.1)
+    add_number(slope, "--runout-length", 2.0, "m", "length of the background mesh beyond the toe", above=0)
+    add_particles_per_cell(slope, 10)
+    add_number(slope, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
+    add_soil_options(slope, dilation_angle=0.0)
     add_law_options(parser)
 
 
@@ -41,7 +42,7 @@ def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> N
     add_number(parser, "--crest", 1.1, "m", "length of the level crest", above=0)
     add_number(parser, "--cell-size", cell_size, "m", "side of the squares or of the triangles", above=0)
     add_choice(parser, "--mesh", None, ("crossed", "fitted", "gmsh"),
-               "squares cut by their diagonals, the same stretched to fit the slope, or unstructured (default: the first "
+               "squares divided by their diagonals, the same stretched to fit the slope, or unstructured (default: the first "
                "of them that suits the angle)")  # fmt: skip
 
 
@@ -49,7 +50,7 @@ def add_soil_options(parser: argparse.ArgumentParser, dilation_angle: float | No
     """Options of the soil; without a default for the dilation angle it is the friction angle: associated flow."""
     for name, default in [("young", 200e3), ("poisson", 0.33), ("cohesion", 1e3), ("friction_angle", 25.0)]:
         add_parameter(parser, mpm.MohrCoulomb, name, default)
-    associated = "" if dilation_angle is not None else " (default: that one, associated flow)"
+    associated = "" if dilation_angle is not None else " (default: equal, associated flow)"
     add_number(parser, "--dilation-angle", dilation_angle, "degrees",
                "dilation angle, at most the friction angle" + associated, at_least=0)  # fmt: skip
 

@@ -26,7 +26,7 @@ MATERIALS = (
 
 def add_law_options(parser: argparse.ArgumentParser) -> None:
     """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation."""
-    p = parser
+    p = parser.add_argument_group("law of the soil")
     add_choice(p, "--material", MATERIALS[0], MATERIALS,
                "law of the soil; Tresca and von Mises: the cohesion is the shear strength")  # fmt: skip
     add_parameter(p, mpm.MohrCoulomb, "tension_cutoff", None)
@@ -38,10 +38,12 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
                                   ("critical_slope", 1.0, None), ("void_ratio", 1.0, None),
                                   ("preconsolidation", 20e3, None), ("attraction", 1e3, None)]:  # fmt: skip
         add_parameter(p, mpm.CamClay, name, default, "Cam-Clay: ", option)
-    add_switch(p, "--undrained", False, "effective stresses, with pore water that does not drain")
+    add_switch(p, "--undrained", False, "undrained: effective stresses, and pore water that does not drain")
     for name, default in [("water_modulus", 2e7), ("porosity", 0.4)]:
         add_parameter(p, mpm.Undrained, name, default, "undrained: ")
-    add_code(p, "--python-law", "FILE:CLASS", "a law written in Python, made without arguments, instead of --material")
+    add_code(
+        p, "--python-law", "FILE:CLASS", "law written in Python, constructed without arguments, instead of --material"
+    )
     add_code(p, "--umat", "LIBRARY", "shared library with an Abaqus UMAT, instead of --material")
     p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
     p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")

@@ -35,9 +35,9 @@ HOLDING = 0.9
 def add_optional_slide(parser: ArgumentParser) -> None:
     """Option ``--slide``, and those of the slide."""
     p = parser
-    add_flag(p, "--slide", "where the slope fails, follow its slide by particles")
+    add_flag(p, "--slide", "compute the slide by particles if the slope fails")
     add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
-               "the slide begins at the first factor below 1 that was found, or at the lowest one")  # fmt: skip
+               "begin the slide at the first factor of safety below 1, or at the lowest one")  # fmt: skip
     add_slide_options(p, damping=0.0, pic=0.01)
 
 
