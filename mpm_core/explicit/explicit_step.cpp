@@ -7,6 +7,7 @@
 #include "model/absorbing.h"
 #include "model/contacts.h"
 #include "model/far_field.h"
+#include "model/field_contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
@@ -58,6 +59,10 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     sum_shared(exchange, field.nodes);
     find_start_velocity(field);
     add_nodal_forces(model, options, dt, field);
+  }
+  add_field_contact_forces(model, gravity, dt);
+  for (VelocityField<G>& field : model.fields)
+  {
     // Momentum balance: a_i = (f_ext - f_int - D)_i / m_i
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
@@ -69,12 +74,17 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     map_resting_change<G>(field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - options.pic_fraction, field);
+  }
+  separate_fields(model, dt);
+  for (VelocityField<G>& field : model.fields)
+  {
     clock.begin(Phase::momentum);
     add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
     note_rayleigh_work(exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
     find_means(mesh, exchange, options, dt, field);
   }
+  note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock); // (18), (20), stresses; migration
 }
 
@@ -91,6 +101,10 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     sum_shared(model.exchange, field.nodes);
     find_start_velocity(field);
     add_nodal_forces(model, options, dt, field);
+  }
+  add_field_contact_forces(model, gravity, dt);
+  for (VelocityField<G>& field : model.fields)
+  {
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
@@ -100,6 +114,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     clock.begin(Phase::averaging);
     find_means(model.mesh, model.exchange, options, dt, field);
   }
+  note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock);
 }
 
@@ -124,14 +139,17 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   clock.begin(Phase::momentum);
   double work_at_end = 0;
   for (VelocityField<G>& field : model.fields)
-  {
     add_nodal_forces(model, options, dt, field);
+  add_field_contact_forces(model, gravity, dt);
+  for (VelocityField<G>& field : model.fields)
+  {
     find_acceleration(gravity, options.damping, dt, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     work_at_end += add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
     note_rayleigh_work(model.exchange.owned, dt, field, model.totals);
   }
+  note_field_contact_work(model, dt);
   model.energy.ahead = -0.5 * work_at_end; // the stresses are half a step behind the velocities, not ahead
   update_particles(model, options, dt, false, clock);
 }

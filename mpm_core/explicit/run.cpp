@@ -214,6 +214,7 @@ Diagnostics diagnostics(const Model<G>& model)
   d.damping_work = model.totals.damping_work;
   d.support_work = model.totals.support_work;
   d.drag_work = model.totals.drag_work;
+  d.friction_work = model.totals.friction_work;
   take_energies(model, d);
   auto scales = energy_scales(model, d.kinetic_energy, d.stored_energy);
   MPI_Allreduce(MPI_IN_PLACE, scales.data(), static_cast<int>(scales.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);

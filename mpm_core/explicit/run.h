@@ -46,6 +46,7 @@ struct Diagnostics
   double damping_work;
   double support_work;
   double drag_work;     ///< of the flow of pore water through the soil
+  double friction_work; ///< taken out where velocity fields touch
   double stress_work;   ///< of the particles' stresses on their strains
   double stored_energy; ///< by elastic strain; NaN where a law does not say
   double plastic_work;  ///< stress work less stored energy since the particles were last changed by anything but a step

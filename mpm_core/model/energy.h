@@ -5,7 +5,7 @@
 /// The balance of nodal works says nothing of the stresses: it is an identity. So the work of the stresses is taken at
 /// the particles, V sigma : d epsilon by the trapezoidal rule, and compared with what changed their kinetic energy:
 ///
-///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_pic = unexplained energy.
+///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_drag - W_friction - W_pic = unexplained energy.
 ///
 /// The difference comes from particles that cross cells, from averages and integration over cells, whose forces are not
 /// those of the particles' stresses, and from the time step.

@@ -6,6 +6,7 @@
 #include "contact/contact.h"
 #include "materials/laws/law.h"
 #include "model/energy.h"
+#include "model/field_contact.h"
 #include "model/pore_water.h"
 #include "model/water_field.h"
 #include "parallel/far_search.h"
@@ -55,6 +56,7 @@ struct Totals
   double damping_work = 0;           ///< taken out by local damping
   double support_work = 0;           ///< of prescribed velocities
   double drag_work = 0;              ///< taken out by the flow of water through the soil
+  double friction_work = 0;          ///< taken out where velocity fields touch
 };
 
 /// Of the last step, on this rank.
@@ -100,11 +102,12 @@ struct Model
   Particles<D> particles;
   std::vector<Law> laws;
   std::vector<VelocityField<G>> fields = std::vector<VelocityField<G>>(1);
-  std::vector<Index> field_of_law;   ///< number of the velocity field of the particles that follow each law
-  std::vector<Contact<D>> contacts;  ///< with rigid surfaces
-  std::vector<Collision> collisions; ///< of rigid bodies among one another
-  std::optional<PoreWater> water;    ///< in the pores of the soil
-  WaterField<G> water_field;         ///< its motion, where it has its own; see `has_two_phases`
+  std::vector<Index> field_of_law;             ///< number of the velocity field of the particles that follow each law
+  std::vector<Contact<D>> contacts;            ///< with rigid surfaces
+  std::vector<Collision> collisions;           ///< of rigid bodies among one another
+  std::vector<FieldContact<D>> field_contacts; ///< of velocity fields among one another
+  std::optional<PoreWater> water;              ///< in the pores of the soil
+  WaterField<G> water_field;                   ///< its motion, where it has its own; see `has_two_phases`
   std::vector<Index> outflow_tags;
   Vector<D> gravity{};     ///< [m/s2]
   double gravity_ramp = 0; ///< time over which gravity rises from zero [s]

@@ -22,6 +22,11 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalI
     field = {};
   for (Contact<D>& contact : model.contacts)
     contact.clearance.clear(); // of cells that have other numbers now
+  for (FieldContact<D>& contact : model.field_contacts)
+  {
+    contact.touching.clear();
+    contact.scratch = {};
+  }
   model.order = {};
   model.migration = {};
   model.ready = false;

@@ -97,6 +97,13 @@ void for_each_number(M& model, F&& f)
     f("water_inflow", Kind::sum, model.water->inflow);
     f("drag_work", Kind::sum, model.totals.drag_work);
   }
+  if (!model.field_contacts.empty())
+    f("friction_work", Kind::sum, model.totals.friction_work);
+  for (std::size_t k = 0; k < model.field_contacts.size(); ++k)
+  {
+    for_each_entry(numbered("field_contact_force", k), Kind::sum, model.field_contacts[k].force, f);
+    for_each_entry(numbered("field_contact_impulse", k), Kind::sum, model.field_contacts[k].impulse, f);
+  }
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
   {
     const std::string name = "contact_" + std::to_string(k) + "_";

@@ -3,6 +3,7 @@
 #include "parallel/lists.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <unordered_map>
 
@@ -68,7 +69,11 @@ NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm)
   return exchange;
 }
 
-void sum_shared(NodeExchange& exchange, double* values, int width)
+namespace
+{
+/// Replaces the values of shared nodes by what `combine` makes of those of all ranks that share them, by rising rank.
+template <class Combine>
+void combine_shared(NodeExchange& exchange, double* values, int width, double neutral, Combine&& combine)
 {
   if (exchange.neighbours.empty())
     return;
@@ -96,7 +101,7 @@ void sum_shared(NodeExchange& exchange, double* values, int width)
   {
     double* value = values + static_cast<std::size_t>(exchange.shared_nodes[k]) * w;
     std::copy_n(value, w, &exchange.own[k * w]);
-    std::fill_n(value, w, 0.0);
+    std::fill_n(value, w, neutral);
   }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
 
@@ -104,7 +109,10 @@ void sum_shared(NodeExchange& exchange, double* values, int width)
   {
     for (std::size_t k = 0; k < nodes.size(); ++k)
       for (std::size_t i = 0; i < w; ++i)
-        values[static_cast<std::size_t>(nodes[k]) * w + i] += terms[k * w + i];
+      {
+        double& value = values[static_cast<std::size_t>(nodes[k]) * w + i];
+        value = combine(value, terms[k * w + i]);
+      }
   };
   std::size_t next = 0;
   for (; next < exchange.neighbours.size() && exchange.neighbours[next].rank < exchange.rank; ++next)
@@ -112,6 +120,18 @@ void sum_shared(NodeExchange& exchange, double* values, int width)
   add(exchange.shared_nodes, exchange.own);
   for (; next < exchange.neighbours.size(); ++next)
     add(exchange.neighbours[next].nodes, exchange.neighbours[next].receive);
+}
+} // namespace
+
+void sum_shared(NodeExchange& exchange, double* values, int width)
+{
+  combine_shared(exchange, values, width, 0.0, [](double a, double b) { return a + b; });
+}
+
+void max_shared(NodeExchange& exchange, double* values, int width)
+{
+  combine_shared(exchange, values, width, -std::numeric_limits<double>::infinity(),
+                 [](double a, double b) { return std::max(a, b); });
 }
 
 template NodeExchange make_node_exchange(const Mesh<2>&, MPI_Comm);

@@ -47,6 +47,9 @@ NodeExchange make_node_exchange(const Mesh<D>& mesh, MPI_Comm comm);
 /// @note Collective over neighbours
 void sum_shared(NodeExchange& exchange, double* values, int width);
 
+/// The same for the largest of the values in the place of their sum.
+void max_shared(NodeExchange& exchange, double* values, int width);
+
 /// The same for a vector or span with one entry per node that consists of doubles only; it may be empty.
 template <class Values>
 void sum_shared(NodeExchange& exchange, Values&& values)
@@ -54,5 +57,12 @@ void sum_shared(NodeExchange& exchange, Values&& values)
   using T = typename std::remove_cvref_t<Values>::value_type;
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
   sum_shared(exchange, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
+}
+
+template <class T>
+void max_shared(NodeExchange& exchange, std::vector<T>& values)
+{
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
+  max_shared(exchange, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
 }
 } // namespace mpm::parallel

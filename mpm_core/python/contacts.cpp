@@ -117,6 +117,44 @@ py::dict contact_state(const Model<G>& model, std::size_t number)
   return state;
 }
 
+/// What two bodies do to each other on all ranks.
+template <class G, int D = G::dim>
+py::dict field_contact_state(const Model<G>& model, std::size_t number)
+{
+  const FieldContact<D>& contact = model.field_contacts.at(number);
+  struct
+  {
+    Vector<D> force, impulse;
+    double nodes;
+  } sums{contact.force, contact.impulse, 0};
+  for (const auto& at : contact.touching)
+    sums.nodes += model.exchange.owned[at.node];
+  MPI_Allreduce(MPI_IN_PLACE, &sums, sizeof(sums) / sizeof(double), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  py::dict state;
+  state["force"] = sums.force;
+  state["impulse"] = sums.impulse;
+  state["nodes"] = static_cast<std::int64_t>(sums.nodes);
+  return state;
+}
+
+/// Points, normals and forces of the nodes of this rank at which two bodies touch, each (n, D).
+template <class G, int D = G::dim>
+py::tuple touching_nodes(const Model<G>& model, std::size_t number)
+{
+  std::vector<std::array<Vector<D>, 3>> rows;
+  for (const auto& at : model.field_contacts.at(number).touching)
+    if (model.exchange.owned[at.node])
+      rows.push_back({model.mesh.points[at.node], at.normal, at.force});
+  const auto column = [&rows](std::size_t k)
+  {
+    py::array_t<double> values({rows.size(), static_cast<std::size_t>(D)});
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      std::ranges::copy(rows[i][k], values.mutable_data() + i * D);
+    return values;
+  };
+  return py::make_tuple(column(0), column(1), column(2));
+}
+
 template <class G, int D = G::dim>
 void bind_contacts_of(py::module_& m)
 {
@@ -140,6 +178,7 @@ void bind_contacts_of(py::module_& m)
         {
           model.contacts.clear();
           model.collisions.clear();
+          model.field_contacts.clear();
         });
   m.def("add_collision",
         [](Model<G>& model, std::size_t ball, std::size_t other, double friction, double restitution) {
@@ -148,6 +187,12 @@ void bind_contacts_of(py::module_& m)
   m.def("distance_between", [](const Model<G>& model, std::size_t ball, std::size_t other)
         { return distance_between(model.contacts.at(ball), model.contacts.at(other)); });
   m.def("contact_state", &contact_state<G>);
+  m.def("add_field_contact",
+        [](Model<G>& model, Index first, Index second, double friction, double adhesion, const Surface<D>& interface) {
+          model.field_contacts.push_back({first, second, friction, adhesion, interface, {}, {}, {}, {}});
+        });
+  m.def("field_contact_state", &field_contact_state<G>);
+  m.def("touching_nodes", &touching_nodes<G>);
 }
 } // namespace
 

@@ -45,6 +45,7 @@ GROUPS = {
         "pushed_footing",
         "retaining_wall",
         "weak_layer",
+        "weak_plane",
     ),
     "Experiments": ("bui_collapse", "lube_runout"),
     "Locking": ("volumetric_locking",),

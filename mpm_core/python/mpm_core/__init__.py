@@ -34,6 +34,7 @@ from .contact import RigidContact
 from .critical_cell import CriticalCell, critical_cell
 from .element import ElementTest
 from .energy import EnergyWarning
+from .field_contact import FieldContact
 from .ghost import GhostPenalty
 from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
@@ -66,6 +67,7 @@ __all__ = [
     "DruckerPrager",
     "ElementTest",
     "EnergyWarning",
+    "FieldContact",
     "FreeBody",
     "Geometry",
     "GhostPenalty",

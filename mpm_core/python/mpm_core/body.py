@@ -84,6 +84,7 @@ class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._free_fields, self._columns, self._tables = [], [], []
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._collisions: list[dict[str, Any]] = []
+        self._field_contacts: list[dict[str, Any]] = []
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0
         self._control: Any = None  # of the implicit run, a StepControl

@@ -19,6 +19,7 @@ from .collisions import set_collisions
 from .contact import require_surfaces, set_contacts
 from .description import parsed
 from .far_field import require_border
+from .field_contact import set_field_contacts
 from .fingerprint import fingerprint, mesh_fingerprint
 from .rows import found
 from .step_control import StepControl
@@ -78,7 +79,9 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     there = checkpoint_description(name, model.comm)
     here = _description(model)
     collectively(model.comm, lambda: _compare(name, there, here))
-    collectively(model.comm, lambda: require_surfaces(model, there.get("contacts", [])))
+    surfaces = [one["surface"] for one in there.get("contacts", [])]
+    surfaces += [one["interface"] for one in there.get("field_contacts", [])]
+    collectively(model.comm, lambda: require_surfaces(model, surfaces))
     collectively(model.comm, lambda: require_border(model, name, there.get("far_field")))
     with CheckpointFile(name, model.comm) as file:
         if there.get("cuts") and there["ranks"] == model.comm.size:
@@ -87,7 +90,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         for field in there.get("added_fields", []):
             if field["name"] not in {known["name"] for known in model.particles.schedule()}:
                 model.add_field(**field)
-        contacts = there.get("contacts", []), there.get("collisions", [])
+        contacts = tuple(there.get(name, []) for name in ("contacts", "collisions", "field_contacts"))
         before, water = _replace_contacts(model, *contacts), _water(model)
         _take_water(model, there.get("water"))
         try:
@@ -151,13 +154,16 @@ def _require_owners(path: str, particles: Arrays, owners: NDArray[np.int64]) -> 
 _Entries: TypeAlias = list[dict[str, Any]]
 
 
-def _replace_contacts(model: Model, contacts: _Entries, collisions: _Entries) -> tuple[_Entries, _Entries]:
+def _replace_contacts(
+    model: Model, contacts: _Entries, collisions: _Entries, of_fields: _Entries
+) -> tuple[_Entries, _Entries, _Entries]:
     """Give the model other contacts and collisions; returns those that it had."""
-    before = model._contacts, model._collisions
-    model._contacts, model._collisions = [], []
+    before = model._contacts, model._collisions, model._field_contacts
+    model._contacts, model._collisions, model._field_contacts = [], [], []
     _core.clear_contacts(model._core)
     collectively(model.comm, lambda: set_contacts(model, contacts))
     set_collisions(model, collisions)
+    set_field_contacts(model, of_fields)
     return before
 
 
@@ -217,6 +223,7 @@ def _description(model: Model) -> dict[str, Any]:
         "left_imbalance": model._left_imbalance,
         "contacts": model._contacts,
         "collisions": model._collisions,
+        "field_contacts": model._field_contacts,
         "water": _water(model),
         "absorbing": model._absorbing_state(),
         "far_field": model._border_state(),

@@ -20,7 +20,7 @@ Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 FORMAT = 2
 """1: checked by a stamp in its first 512 bytes, which is not read any more, and with the description as an attribute"""
-_MAY_LACK = ("drag_work", "energy_", "order_", "converted_", "gained_")
+_MAY_LACK = ("drag_work", "friction_work", "energy_", "order_", "converted_", "gained_")
 """Beginnings of the names of totals that older files do not have"""
 
 

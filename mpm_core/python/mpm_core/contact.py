@@ -126,7 +126,7 @@ class RigidContact:
             mesh, entry = self.model.mesh, self.model._contacts[self._number]
             corners = np.array([mesh.points.min(axis=0, initial=np.inf), -mesh.points.max(axis=0, initial=-np.inf)])
             self.model.comm.Allreduce(MPI.IN_PLACE, corners, MPI.MIN)
-            self._outline = outline(_surface_of(self.model, entry["surface"]), corners[0], -corners[1])
+            self._outline = outline(surface_of(self.model, entry["surface"]), corners[0], -corners[1])
         points, cells = self._outline
         return self._centre + (points - self._start) @ self.rotation.T, cells
 
@@ -212,12 +212,17 @@ def smallest_gap(model: Model, surface: Surface) -> float:
     """See `Model.gap`."""
 
     def own() -> float:
-        return float(_core.smallest_gap(model._core, _checked(surface, model.mesh.dim)[0]))
+        return float(_core.smallest_gap(model._core, checked(surface, model.mesh.dim)[0]))
 
     return model.comm.allreduce(collectively(model.comm, own), MPI.MIN)
 
 
-def _checked(surface: Surface, dim: int) -> Any:
+def checked(surface: Surface, dim: int) -> Any:
+    """The surface in the core, and the point about which it rotates.
+
+    Raises:
+        InputError: no surface, or one of another dimension.
+    """
     if not isinstance(surface, tuple(KINDS.values())):
         raise InputError(f"surface is {surface!r}, expected a {', '.join(KINDS)}")
     return surface._checked(dim)
@@ -231,13 +236,13 @@ def add_contact(
 
     def entry() -> dict[str, Any]:
         dim = model.mesh.dim
-        about = _checked(surface, dim)[1] if centre is None else floats("centre", centre, (dim,))
+        about = checked(surface, dim)[1] if centre is None else floats("centre", centre, (dim,))
         positive("friction", friction, "(a coefficient)", zero=True)
         positive("adhesion", adhesion, "Pa", zero=True)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
         return {
-            "surface": _described(surface), "friction": float(friction), "adhesion": float(adhesion),
+            "surface": described(surface), "friction": float(friction), "adhesion": float(adhesion),
             "penalty": float(penalty),
             "body": describe(surface, about, velocity, spin, body, geometry=model.geometry, time=model.time),
         }  # fmt: skip
@@ -257,7 +262,7 @@ def add_contact(
     return RigidContact(model, len(model._contacts) - 1)
 
 
-def _described(surface: Surface) -> dict[str, Any]:
+def described(surface: Surface) -> dict[str, Any]:
     """A surface as checkpoints have it; triangles by their fingerprint."""
     if isinstance(surface, Triangles):
         return {"kind": "Triangles", "fingerprint": surface.fingerprint, "triangles": len(surface.triangles)}
@@ -269,17 +274,18 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, bool) else np.asarray(value, dtype=float).tolist()
 
 
-def require_surfaces(model: Model, entries: list[dict[str, Any]]) -> None:
-    """Raises InputError where the model does not have the triangles of a contact in a checkpoint."""
-    for surface in (entry["surface"] for entry in entries):
+def require_surfaces(model: Model, surfaces: list[dict[str, Any]]) -> None:
+    """Raises InputError where the model does not have the triangles of a surface in a checkpoint."""
+    for surface in surfaces:
         if surface["kind"] == "Triangles" and surface["fingerprint"] not in model._triangulated:
             raise InputError(
                 f"the checkpoint has contact with a surface of {surface['triangles']} triangles that the model does not have; "
-                "add it by model.add_contact before model.restore"
+                "add it by model.add_contact or add_field_contact before model.restore"
             )
 
 
-def _surface_of(model: Model, described: dict[str, Any]) -> Surface:
+def surface_of(model: Model, described: dict[str, Any]) -> Surface:
+    """The surface that a checkpoint describes."""
     if described["kind"] == "Triangles":
         return model._triangulated[described["fingerprint"]]
     surface: Surface = KINDS[described["kind"]](**{key: value for key, value in described.items() if key != "kind"})
@@ -290,7 +296,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     """Give the model these contacts; those that it has already, at the beginning of the list, keep their state."""
     dim, known = model.mesh.dim, len(model._contacts)
     for number, entry in list(enumerate(entries))[known:]:
-        surface, _ = _surface_of(model, entry["surface"])._checked(dim)
+        surface, _ = surface_of(model, entry["surface"])._checked(dim)
         slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
         if slip and slip not in {field["name"] for field in model.particles.schedule()}:
             model.add_field(slip, unit="m", meaning=f"Elastic slip on rigid surface {number}", components=dim)

@@ -82,15 +82,31 @@ def _is_known_by_fingerprint(surface: Any) -> bool:
     return isinstance(surface.get("fingerprint"), str) and _is_count(surface.get("triangles"))
 
 
+def _is_surface(value: Any) -> bool:
+    return (
+        isinstance(value, dict)
+        and value.get("kind") in KINDS
+        and (value["kind"] != "Triangles" or _is_known_by_fingerprint(value))
+    )
+
+
 def _is_contact(value: Any) -> bool:
     return (
         isinstance(value, dict)
         and set(value) == {"surface", "friction", "adhesion", "penalty", "body"}
-        and isinstance(value["surface"], dict)
-        and value["surface"].get("kind") in KINDS
-        and (value["surface"]["kind"] != "Triangles" or _is_known_by_fingerprint(value["surface"]))
+        and _is_surface(value["surface"])
         and all(_is_number(value[key]) for key in ("friction", "adhesion", "penalty"))
         and _is_body(value["body"])
+    )
+
+
+def _is_field_contact(value: Any) -> bool:
+    return (
+        isinstance(value, dict)
+        and set(value) == {"first", "second", "friction", "adhesion", "interface"}
+        and _is_surface(value["interface"])
+        and all(_is_count(value[key]) for key in ("first", "second"))
+        and all(_is_number(value[key]) for key in ("friction", "adhesion"))
     )
 
 
@@ -170,6 +186,7 @@ _OPTIONAL = (
     "added_fields",
     "contacts",
     "far_field",
+    "field_contacts",
     "water",
     "geometry",
     "velocity_fields",
@@ -193,6 +210,7 @@ _EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
     "contacts": (lambda v: _are(_is_contact, v), "a list of contacts with rigid surfaces"),
+    "field_contacts": (lambda v: _are(_is_field_contact, v), "a list of contacts between velocity fields"),
     "far_field": (_is_border, "null, or forces and displacements of its border"),
     "water": (_is_water, "null, or the properties of the pore water"),
     "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),

@@ -23,6 +23,7 @@ from .explicit import (
     steps_between,
 )
 from .far_field import refuse_far_field
+from .field_contact import FieldContact, add_field_contact
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
 from .mesh import floats
@@ -54,8 +55,8 @@ class Model(Body):
             request. In axial symmetry x is the radius; nodes on the axis x = 0 have no radial velocity; masses, forces and
             energies are per radian.
         velocity_fields: number of the velocity field of each law, from 0 without gaps; by default all particles move
-            with one. Bodies in different fields of one mesh do not interact. With several fields, only explicit runs are
-            possible.
+            with one. Bodies in different fields of one mesh do not interact unless `add_field_contact` says how. With several
+            fields, only explicit runs are possible.
 
     Raises:
         InputError: no law, or something that is none; a geometry that the mesh cannot have, a node at a negative
@@ -165,6 +166,50 @@ class Model(Body):
     def contacts(self) -> list[RigidContact]:
         """The rigid surfaces in the order in which they were added. Not collective."""
         return [RigidContact(self, number) for number in range(len(self._contacts))]
+
+    # --- several bodies of soil ----------------------------------------------------------------------------------
+
+    def add_field_contact(
+        self,
+        interface: Surface | ArrayLike,
+        *,
+        first: int = 0,
+        second: int = 1,
+        friction: float = 0.0,
+        adhesion: float = 0.0,
+    ) -> FieldContact:
+        """Let the bodies of two velocity fields touch along an interface, with friction and adhesion; explicit scheme only.
+
+        Without this, bodies in different velocity fields pass through one another. Where both have mass at a node and their
+        particles, each as wide as the side of a square or cube of its volume, touch, they do not approach any further, slide
+        against Coulomb friction, and separate without tension (Bardenhagen et al. 2000; docs/contact.md).
+
+        Args:
+            interface: direction from the first body to the second, shape (D,), where they touch along a plane; else a `Plane`,
+                `Polyline`, `Triangles` or other surface that does not move, with the second body on the side where soil
+                would be that touches it. Only its normals count.
+            first: number of a velocity field; the constructor's `velocity_fields` has that of each law.
+            second: number of another one.
+            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
+            adhesion: shear strength of the interface without pressure [Pa]; it acts only where the bodies touch, and does
+                not resist tension.
+
+        Returns:
+            Forces between the bodies, which follow the model.
+
+        Raises:
+            InputError: an argument out of its range, or fields that are in contact already.
+
+        Example:
+            >>> model = mpm.Model(mesh, [bedrock, soil], velocity_fields=[0, 1])
+            >>> weak = model.add_field_contact(interface=(0.0, 1.0), friction=np.tan(np.radians(12.0)))
+        """
+        return add_field_contact(self, interface, first, second, friction, adhesion)
+
+    @property
+    def field_contacts(self) -> list[FieldContact]:
+        """The contacts between velocity fields in the order in which they were added. Not collective."""
+        return [FieldContact(self, number) for number in range(len(self._field_contacts))]
 
     # --- runs ----------------------------------------------------------------------------------------------------
 

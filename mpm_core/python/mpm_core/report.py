@@ -38,6 +38,8 @@ class Report:
     """Work of prescribed velocities"""
     drag_work: float
     """Energy taken out by pore water that flows through the soil"""
+    friction_work: float
+    """Energy taken out by contact between velocity fields: friction, and impacts"""
     stress_work: float
     """Work of the particles' stresses on their strains and on their water: stored energy and plastic dissipation"""
     stored_energy: float
@@ -49,7 +51,7 @@ class Report:
     nodal_kinetic_energy: float
     """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
     unexplained_energy: float
-    """External and support work, less damping and drag work, PIC loss, stress work and the gain of kinetic energy: what the
+    """External and support work, less damping, drag and friction work, PIC loss, stress work and the gain of kinetic energy: what the
     discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but
     a step with inertia or flow"""
     energy_scale: float
