@@ -51,9 +51,9 @@ class Report:
     nodal_kinetic_energy: float
     """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
     unexplained_energy: float
-    """External and support work, less damping, drag and friction work, PIC loss, stress work and the gain of kinetic energy: what the
-    discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but
-    a step with inertia or flow"""
+    """External and support work, less damping, drag and friction work, PIC loss, stress work and the gain of kinetic energy: what
+    the discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but a step
+    with inertia or flow"""
     energy_scale: float
     """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy at the start
     and now"""
