@@ -57,8 +57,8 @@ double energy_balance(const Model<G, D>& model, double kinetic)
 {
   const Totals& totals = model.totals;
   const EnergyBook& book = model.energy;
-  return totals.external_work + totals.support_work - totals.damping_work - totals.drag_work -
-         totals.friction_work - (book.stress_work - book.ahead) - book.pic_loss - kinetic - book.outflow_kinetic;
+  return totals.external_work + totals.support_work - totals.damping_work - totals.drag_work - totals.friction_work -
+         (book.stress_work - book.ahead) - book.pic_loss - kinetic - book.outflow_kinetic;
 }
 
 template <class G, int D>

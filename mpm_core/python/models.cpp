@@ -52,12 +52,13 @@ py::dict as_dict(const Diagnostics& d)
       "particles"_a = static_cast<std::int64_t>(d.particles), "mass"_a = d.mass,
       "momentum"_a = std::vector<double>(d.momentum, d.momentum + 3), "kinetic_energy"_a = d.kinetic_energy,
       "external_work"_a = d.external_work, "internal_work"_a = d.internal_work, "damping_work"_a = d.damping_work,
-      "support_work"_a = d.support_work, "drag_work"_a = d.drag_work, "friction_work"_a = d.friction_work, "stress_work"_a = d.stress_work,
-      "stored_energy"_a = d.stored_energy, "plastic_work"_a = d.plastic_work, "pic_loss"_a = d.pic_loss,
-      "nodal_kinetic_energy"_a = d.nodal_kinetic_energy, "unexplained_energy"_a = d.unexplained_energy,
-      "energy_scale"_a = d.energy_scale, "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles),
-      "outflow_mass"_a = d.outflow_mass, "particle_steps"_a = d.particle_steps,
-      "plastic_fraction"_a = d.plastic_fraction, "resting_cells"_a = static_cast<std::int64_t>(d.resting_cells),
+      "support_work"_a = d.support_work, "drag_work"_a = d.drag_work, "friction_work"_a = d.friction_work,
+      "stress_work"_a = d.stress_work, "stored_energy"_a = d.stored_energy, "plastic_work"_a = d.plastic_work,
+      "pic_loss"_a = d.pic_loss, "nodal_kinetic_energy"_a = d.nodal_kinetic_energy,
+      "unexplained_energy"_a = d.unexplained_energy, "energy_scale"_a = d.energy_scale,
+      "outflow_particles"_a = static_cast<std::int64_t>(d.outflow_particles), "outflow_mass"_a = d.outflow_mass,
+      "particle_steps"_a = d.particle_steps, "plastic_fraction"_a = d.plastic_fraction,
+      "resting_cells"_a = static_cast<std::int64_t>(d.resting_cells),
       "converted_cells"_a = static_cast<std::int64_t>(d.converted_cells), "unbalanced_ratio"_a = d.unbalanced_ratio);
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,14 +90,15 @@ def add_field_contact(
             "interface": described(surface),
         }  # fmt: skip
 
-    surface = interface if isinstance(interface, tuple(KINDS.values())) else _plane(model, interface)
+    surface = cast("Surface", interface) if isinstance(interface, tuple(KINDS.values())) else _plane(model, interface)
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
     set_field_contacts(model, [*model._field_contacts, collectively(model.comm, entry)])
     return FieldContact(model, len(model._field_contacts) - 1)
 
 
-def _plane(model: Model, normal: Any) -> Plane:
+def _plane(model: Model, normal: ArrayLike) -> Plane:
+    """The plane with a normal."""
     dim = model.mesh.dim
     return collectively(model.comm, lambda: Plane((0.0,) * dim, floats("interface", normal, (dim,))))
 
