@@ -90,7 +90,8 @@ def add_field_contact(
             "interface": described(surface),
         }  # fmt: skip
 
-    surface = cast("Surface", interface) if isinstance(interface, tuple(KINDS.values())) else _plane(model, interface)
+    is_surface = isinstance(interface, tuple(KINDS.values()))
+    surface = cast("Surface", interface) if is_surface else _plane(model, cast("ArrayLike", interface))
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
     set_field_contacts(model, [*model._field_contacts, collectively(model.comm, entry)])
