@@ -57,6 +57,7 @@ class EquilibriumStep:
         displacement: fraction of the displacements that the supports prescribe at the step's end [-].
         viscosity: factor of the elastic stiffness; that times the strain increment is a stress added to that of the laws [-].
         scale: norm of forces by which residuals are divided; by default it is found at the start.
+        part: fraction of the way to the prescribed displacements that the step goes [-].
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class EquilibriumStep:
         displacement: float,
         viscosity: float = 0.0,
         scale: Any = None,
+        part: float = 1.0,
     ) -> None:
         self._body, self._laws, self._viscosity = body, laws, viscosity
         self._space = body.solution.function_space
@@ -78,7 +80,7 @@ class EquilibriumStep:
         self.scale = scale
         self.reason = ""
         """Why the last correction or move could not be made"""
-        self._moved = body.constraints.at(displacement) - body.solution.x.array[self._fixed]
+        self._moved = part * (body.constraints.at(displacement) - body.solution.x.array[self._fixed])
         self.moves_supports = self._comm.allreduce(bool(np.any(self._moved)), MPI.LOR)
         """Whether the step prescribes displacements other than zero"""
         self._base = np.zeros_like(body.increment.x.array)

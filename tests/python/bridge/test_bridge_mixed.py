@@ -42,18 +42,18 @@ def test_weight_goes_to_the_base():
     assert model.reaction(2)[1] == pytest.approx(-3.0 * area, rel=1e-6)
 
 
+def pressed_in(divisions):
+    """Undrained ground below a rigid footing that moves into it."""
+    domain, facet_tags = read("ground", divisions)
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (1, 0)), bridge.fixed(2), bridge.prescribed(5, (0, -4e-4))]
+    return bridge.MixedQuasiStatic(domain, soil(poisson=0.49), facet_tags, supports)
+
+
 def test_undrained_ground_yields_below_a_footing_where_prandtl_says():
     """(2 + pi) c, from above as the mesh is refined; the pressure stays as the rigid footing is pressed in further."""
     found = []
     for divisions in (2, 4):
-        domain, facet_tags = read("ground", divisions)
-        supports = [
-            bridge.roller(1, (1, 0)),
-            bridge.roller(3, (1, 0)),
-            bridge.fixed(2),
-            bridge.prescribed(5, (0, -4e-4)),
-        ]
-        model = bridge.MixedQuasiStatic(domain, soil(poisson=0.49), facet_tags, supports)
+        model = pressed_in(divisions)
         found.append([])
         for share in (0.5, 1.0):
             model.solve(bridge.Load(displacement=share), first_step=0.25)
@@ -62,6 +62,23 @@ def test_undrained_ground_yields_below_a_footing_where_prandtl_says():
     assert found[0][1] > found[1][1] > 2 + np.pi
     assert found[1][1] == pytest.approx(2 + np.pi, rel=0.06)
     assert found[1][1] == pytest.approx(found[1][0], rel=0.01)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_a_footing_that_is_pushed_far_feels_the_same_in_few_steps(steps):
+    """The pressure at collapse does not depend on the way there: a step too long for Newton's method is divided."""
+    few, many = pressed_in(2), pressed_in(2)
+    for model, number in ((few, steps), (many, 16)):
+        for k in range(number):
+            assert model.equilibrate(bridge.Load(displacement=(k + 1) / number)).converged
+    assert few.reaction(5)[1] == pytest.approx(many.reaction(5)[1], rel=1e-3)
+
+
+def test_a_divided_step_reports_the_displacement_of_all_of_it():
+    model = pressed_in(2)
+    report = model.equilibrate(bridge.Load(displacement=1.0))
+    assert report.relaxation is None and report.iterations > 25
+    assert model.increment.x.array.min() == pytest.approx(-4e-4, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", [soil(friction_angle=20.0), soil(tension_cutoff=0.0),
