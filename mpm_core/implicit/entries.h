@@ -5,6 +5,7 @@
 #include "implicit/system.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace mpm::implicit
 {
@@ -28,6 +29,8 @@ public:
   {
     entries.shape = shape;
     std::ranges::fill(entries.values, 0.0);
+    if (!_known)
+      _first.assign(numbers.size(), none);
   }
   BlockSum(const BlockSum&) = delete;
   BlockSum& operator=(const BlockSum&) = delete;
@@ -63,17 +66,11 @@ private:
 
   Index find_or_make(Index row, GlobalIndex column)
   {
-    if (static_cast<std::size_t>(row) >= _first.size())
-      _first.resize(row + 1, none);
-    Index last = none;
     for (Index block = _first[row]; block != none; block = _following[block])
-    {
       if (_entries.nodes[block][1] == column)
         return block;
-      last = block;
-    }
     const Index made = make(_numbers[row], column);
-    (last == none ? _first[row] : _following[last]) = made;
+    _following[made] = std::exchange(_first[row], made);
     return made;
   }
 
@@ -81,7 +78,7 @@ private:
   std::span<const GlobalIndex> _numbers;
   bool _known;
   std::size_t _next = 0;
-  std::vector<Index> _first, _following; ///< the first block of each row, and of each block the next one of its row
+  std::vector<Index> _first, _following; ///< the newest block of each row, and of each block the one before it
 };
 
 /// Rows and columns of the values of `entries`, in their order; negative where a node is not in the system.
