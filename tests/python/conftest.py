@@ -1,9 +1,18 @@
 """What tests of several files need."""
 
 import shutil
+import signal
 import subprocess
 
 import pytest
+
+
+def pytest_configure():
+    # What starts the tests in the background, or by nohup, may have these signals ignored, which programs that the tests start
+    # would inherit. A handler in Python is not inherited: studies then get the signals as they do in a terminal.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 @pytest.fixture

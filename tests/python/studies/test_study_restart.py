@@ -144,7 +144,6 @@ def test_ctrl_c_that_ends_the_reader_too_leaves_a_checkpoint(tmp_path, ranks):
 def test_the_end_of_the_terminal_leaves_a_checkpoint(tmp_path, ranks):
     child, terminal = pty.fork()
     if child == 0:
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup before the tests would have it ignored
         study = str(STUDIES / "run")
         os.execve(
             study,
