@@ -16,8 +16,8 @@ packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libptscotch-dev l
   python3-numpy python3-h5py libopenblas0-serial python3-matplotlib python3-pil python3-tqdm python3-jinja2
   python3-rasterio ffmpeg)
 # What the tests need besides.
-test_packages=(gfortran python3-pytest python3-hypothesis python3-meshio python3-pandas python3-scipy python3-vtk9
-  chromium chromium-driver python3-selenium clang-format black mypy zsh fish)
+test_packages=(gfortran python3-pytest python3-pytest-xdist python3-hypothesis python3-meshio python3-pandas python3-scipy
+  python3-vtk9 chromium chromium-driver python3-selenium clang-format black mypy zsh fish)
 docs_packages=(python3-sphinx python3-myst-parser python3-sphinx-rtd-theme libjs-mathjax)
 
 say() { printf "%s: %s\n" "$program" "$*" >&2; }
