@@ -51,6 +51,9 @@ def parser() -> ArgumentParser:
     add_number(p, "--start", 0.5, "-", "first factor to try; the slope must be stable with it", above=0)
     add_flow_options(p)
     add_site_option(p)
+    p.add_argument(
+        "--unreduced", nargs="*", default=[], metavar="SOIL", help="soils of the site that keep their strength"
+    )
     add_flag(p, "--particles", "also find the factor by particles on the same cells, which come to rest or flow")
     return p
 
@@ -59,6 +62,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_fem_slope_options(p, options)
+    check(p, options.site is not None or not options.unreduced,
+          lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site beside it: the slope has one soil")  # fmt: skip
     check(p, options.depth == 0 or not options.particles,
           lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
     return options
@@ -102,7 +107,7 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
 def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
     """The factor of a site by particles. Collective."""
     return bridge.particle_safety(
-        lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor)),
+        lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced))),
         start=a.start,
         progress=step_line("particles"),
     )
@@ -145,7 +150,8 @@ def main(arguments: list[str] | None = None) -> int:
     if a.site is not None:
 
         def factor(site, model, progress):
-            return bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress)
+            unreduced = site.tags_of(a.unreduced)
+            return bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress, unreduced=unreduced)
 
         return site_study(a, factor, "factor_of_safety", "Factor of safety [-]",
                           lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {})  # fmt: skip

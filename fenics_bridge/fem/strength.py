@@ -25,7 +25,8 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
     - Heterogeneous: the strength of all points.
     - Hencky and Undrained: the law that they are made of.
     - LinearElastic beside other laws: it has no strength to reduce and stays as it is.
-    - Any other (a UMAT, a law written in Python): give `factor_of_safety` a function of law and factor.
+    - Umat and PythonLaw: the parameters that they name as their strength, see there.
+    - Any other: give `factor_of_safety` a function of law and factor.
 
     Args:
         law: law of `mpm_core`, or laws by cell tag.

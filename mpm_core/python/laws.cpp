@@ -134,6 +134,28 @@ std::string file_hash(const std::string& path)
       .cast<std::string>();
 }
 
+/// The PROPS that are the strength of a UMAT, in the order in which they are named
+std::vector<std::pair<int, StrengthKind>> strength_of(const Parts& parts)
+{
+  using Named = std::vector<std::pair<int, std::string>>;
+  std::vector<std::pair<int, StrengthKind>> strength;
+  if (!parts.values.contains("strength_parameters"))
+    return strength;
+  const py::object given = parts.values["strength_parameters"];
+  const py::object items = py::isinstance<py::dict>(given) ? py::list(given.attr("items")()) : given;
+  try
+  {
+    for (const auto& [number, kind] : items.cast<Named>())
+      strength.emplace_back(number, strength_kind(kind));
+  }
+  catch (const py::cast_error&)
+  {
+    refuse_argument(parts.law, "strength_parameters", given,
+                    "a dictionary of numbers of properties, from one, and what they stand for");
+  }
+  return strength;
+}
+
 Umat loaded_umat(const Parts& parts)
 {
   const auto symbol = parts.get<std::string>("symbol", "a text", "umat_");
@@ -143,7 +165,8 @@ Umat loaded_umat(const Parts& parts)
           parts.get<int>("n_variables", "a whole number"),
           parts.get<int>("plastic_strain_variable", "a whole number", 0),
           0,
-          symbol + " of " + file_hash(library_file(function))};
+          symbol + " of " + file_hash(library_file(function)),
+          strength_of(parts)};
 }
 
 void bind_umat(py::module_& m)
@@ -158,7 +181,22 @@ one counts as a failure.)",
       .def_readonly("properties", &Umat::properties)
       .def_readonly("n_variables", &Umat::n_variables)
       .def_readonly("plastic_strain_variable", &Umat::plastic_strain_variable)
-      .def_readonly("code", &Umat::code, "Symbol and SHA-256 of the library's file");
+      .def_readonly("code", &Umat::code, "Symbol and SHA-256 of the library's file")
+      .def_property_readonly(
+          "library", [](const Umat& law) { return library_file(law.function); }, "Path of the shared library")
+      .def_property_readonly(
+          "symbol", [](const Umat& law) { return law.code.substr(0, law.code.find(" of ")); },
+          "Name of the subroutine in the library")
+      .def_property_readonly(
+          "strength_parameters",
+          [](const Umat& law)
+          {
+            py::dict named;
+            for (const auto& [number, kind] : law.strength)
+              named[py::int_(number)] = strength_kinds[static_cast<std::size_t>(kind)];
+            return named;
+          },
+          "What the PROPS are that a factor of safety divides, by their numbers from one");
 }
 
 void bind_declaration(py::module_& m)

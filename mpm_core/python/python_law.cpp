@@ -132,6 +132,49 @@ BatchReport called_one_by_one(const PythonObject& object, const PointBatch<D>& p
   return report;
 }
 
+ExternalLaw python_law(const py::object& law);
+
+/// A copy of a Python object with some other attributes; of a dataclass one that is constructed anew
+py::object with_attributes(const py::object& law, const py::dict& changed)
+{
+  if (py::module_::import("dataclasses").attr("is_dataclass")(law).cast<bool>())
+    return py::module_::import("dataclasses").attr("replace")(law, **changed);
+  py::object copy = py::module_::import("copy").attr("copy")(law);
+  for (const auto& [name, value] : changed)
+    py::setattr(copy, name, value);
+  return copy;
+}
+
+/// The function that divides the strength of a Python object which names its strength; empty where it does not
+std::function<ExternalLaw(double)> weakening(const py::object& law)
+{
+  if (!py::hasattr(law, "strength_parameters"))
+    return {};
+  std::vector<std::string> names;
+  std::vector<StrengthKind> kinds;
+  for (const auto& [name, kind] : law.attr("strength_parameters").cast<py::dict>())
+  {
+    names.push_back(name.cast<std::string>());
+    kinds.push_back(strength_kind(kind.cast<std::string>()));
+    if (!py::hasattr(law, names.back().c_str()))
+      throw InputError("law names " + names.back() + " in strength_parameters, but has no such attribute");
+  }
+  check(kinds);
+  if (names.empty())
+    return {};
+  return [law, names, kinds](double factor)
+  {
+    std::vector<double> values;
+    for (const std::string& name : names)
+      values.push_back(law.attr(name.c_str()).cast<double>());
+    values = reduced_values(kinds, std::move(values), factor);
+    py::dict changed;
+    for (std::size_t k = 0; k < names.size(); ++k)
+      changed[names[k].c_str()] = values[k];
+    return python_law(with_attributes(law, changed));
+  };
+}
+
 ExternalLaw python_law(const py::object& law)
 {
   for (const char* member : {"n_state", "p_wave_modulus", "update"})
@@ -157,7 +200,8 @@ ExternalLaw python_law(const py::object& law)
           [object](const PointBatch<2>& points) { return called(object, points); },
           [object](const PointBatch<3>& points) { return called(object, points); },
           law.ptr(),
-          {takes_increment, takes_increment}};
+          {takes_increment, takes_increment},
+          weakening(law)};
 }
 } // namespace
 
@@ -171,6 +215,10 @@ void bind_python_law(py::module_& m)
 - update(strain_increment, stress, state, tangent): updates in place, as the method `update` of any law;
   tangent is None in the explicit scheme.
 - state_names: names of the state variables, optional.
+- strength_parameters: what those attributes are that a factor of safety divides, by their names, optional: a dictionary
+  such as {"c": "strength", "phi": "friction angle", "psi": "dilation angle"}, angles in degrees. A strength is divided,
+  and so is the tangent of a friction angle; a dilation angle is at most the friction angle that is named before it. The
+  weaker law is a copy of the object with other attributes, or a dataclass constructed anew.
 
 If update has a further parameter `increment`, it receives an object with the attributes time [s], dt [s], cell_size [m],
 shape (n,) or None, and deformation, shape (n, D, D) or None: the time at the start, the duration (infinite where loading is

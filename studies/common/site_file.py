@@ -111,6 +111,18 @@ class Site:
         model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])
         return model
 
+    def tags_of(self, soils: Sequence[str]) -> list[int]:
+        """Cell tags of soils, whose laws they number.
+
+        Raises:
+            InputError: a soil is not one of the site's.
+        """
+        for soil in soils:
+            if soil not in self.soils:
+                raise mpm.InputError(f"soil {soil!r} is not among the soils {', '.join(self.soils)}")
+        names = bridge.names_of(self.cell_tags)
+        return [tag for soil in soils for tag in names.get(soil, (soil,))]
+
     def load(self, factor: float = 1.0) -> bridge.Load:
         """The weights of all soils times a factor."""
         return bridge.Load({soil: factor * weight for soil, weight in self.unit_weight.items()})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,9 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     )
     add_code(p, "--umat", "LIBRARY", "shared library with an Abaqus UMAT, instead of --material")
     p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
+    p.add_argument("--strength-properties", nargs="*", default=[], metavar="NUMBER:KIND",
+                   help="PROPS of the UMAT that a factor of safety divides, by number from one and kind (strength, friction, "
+                        "dilation), such as 3:strength 4:friction 5:dilation; angles in degrees")  # fmt: skip
     p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")
 
@@ -104,11 +108,34 @@ def _python_law(text: str) -> Any:
     return mpm.PythonLaw(getattr(module, name)())
 
 
+KINDS = {"strength": "strength", "friction": "friction angle", "dilation": "dilation angle"}
+"""What a property of a UMAT may stand for, and what the law calls it"""
+
+
+def _strength_properties(words: Sequence[str]) -> dict[int, str]:
+    """Kinds of properties by their numbers, "3:strength"."""
+    named = {}
+    for word in words:
+        number, _, kind = word.partition(":")
+        if not number.isdecimal() or kind not in KINDS:
+            raise mpm.InputError(
+                f"--strength-properties names '{word}', expected NUMBER:KIND with one of {', '.join(KINDS)}"
+            )
+        named[int(number)] = KINDS[kind]
+    return named
+
+
 def _skeleton(a: argparse.Namespace) -> Any:
     elastic = {"young": a.young, "poisson": a.poisson}
     if a.umat:
         modulus = mpm.LinearElastic(**elastic).p_wave_modulus
-        return mpm.Umat(a.umat, properties=a.properties, n_variables=a.variables, p_wave_modulus=modulus)
+        return mpm.Umat(
+            a.umat,
+            properties=a.properties,
+            n_variables=a.variables,
+            p_wave_modulus=modulus,
+            strength_parameters=_strength_properties(a.strength_properties),
+        )
     if a.python_law:
         return _python_law(a.python_law)
     strength = {"cohesion": a.cohesion, "friction_angle": a.friction_angle, "dilation_angle": a.dilation_angle}

@@ -22,6 +22,8 @@ struct ExternalLaw
   const void* identity;
   /// What the functions want to know of a batch
   Needs wants = {};
+  /// The law with its strength divided by a factor; empty where its strength is not known
+  std::function<ExternalLaw(double)> weaker = {};
 
   static constexpr std::array<Parameter<ExternalLaw>, 0> parameters() { return {}; }
   static constexpr std::array parts{Part{"law", "an object with the members listed below"}};

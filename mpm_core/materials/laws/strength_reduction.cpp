@@ -1,5 +1,7 @@
 #include "materials/laws/strength_reduction.h"
 
+#include "materials/laws/strength_parameters.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -19,6 +21,42 @@ double limited(double dilation, double friction_before, double friction)
   return dilation == friction_before ? friction : std::min(dilation, friction);
 }
 } // namespace
+
+StrengthKind strength_kind(std::string_view name)
+{
+  const auto found = std::find(std::begin(strength_kinds), std::end(strength_kinds), name);
+  if (found == std::end(strength_kinds))
+    throw InputError("strength_parameters names '" + std::string(name) +
+                     "', expected 'strength', 'friction angle' or 'dilation angle'");
+  return static_cast<StrengthKind>(found - std::begin(strength_kinds));
+}
+
+void check(const std::vector<StrengthKind>& kinds)
+{
+  const auto dilation = std::find(kinds.begin(), kinds.end(), StrengthKind::dilation_angle);
+  if (dilation != kinds.end() && std::find(kinds.begin(), dilation, StrengthKind::friction_angle) == dilation)
+    throw InputError(
+        "strength_parameters names a dilation angle, expected the friction angle that limits it before it");
+}
+
+std::vector<double> reduced_values(const std::vector<StrengthKind>& kinds, std::vector<double> values, double factor)
+{
+  double before = 0, friction = 0;
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    switch (kinds[k])
+    {
+    case StrengthKind::strength:
+      values[k] /= factor;
+      break;
+    case StrengthKind::friction_angle:
+      before = values[k];
+      friction = values[k] = divided(before, factor);
+      break;
+    case StrengthKind::dilation_angle:
+      values[k] = limited(values[k], before, friction);
+    }
+  return values;
+}
 
 MohrCoulomb reduced_strength(const MohrCoulomb& law, double factor)
 {
@@ -59,6 +97,31 @@ Heterogeneous reduced_strength(const Heterogeneous& law, double factor)
   std::visit([&](const auto& l) { reduced_strength(l, factor); }, law.law); // whether its strength is known
   Heterogeneous reduced = law;
   reduced.strength_factor *= factor;
+  return reduced;
+}
+
+ExternalLaw reduced_strength(const ExternalLaw& law, double factor)
+{
+  if (!law.weaker)
+    throw UnknownStrength(law_name(law));
+  return law.weaker(factor);
+}
+
+Umat reduced_strength(const Umat& law, double factor)
+{
+  if (law.strength.empty())
+    throw UnknownStrength(law_name(law));
+  std::vector<StrengthKind> kinds;
+  std::vector<double> values;
+  for (const auto& [number, kind] : law.strength)
+  {
+    kinds.push_back(kind);
+    values.push_back(law.properties[static_cast<std::size_t>(number - 1)]);
+  }
+  values = reduced_values(kinds, std::move(values), factor);
+  Umat reduced = law;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    reduced.properties[static_cast<std::size_t>(law.strength[k].first - 1)] = values[k];
   return reduced;
 }
 

@@ -18,19 +18,33 @@ DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
 /// The friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is
 CamClay reduced_strength(const CamClay& law, double factor);
 
+/// Of the parameters that it names
+/// @throws InputError it names none
+ExternalLaw reduced_strength(const ExternalLaw& law, double factor);
+Umat reduced_strength(const Umat& law, double factor);
+
 /// Of all points
 Heterogeneous reduced_strength(const Heterogeneous& law, double factor);
 /// Of the law that they are made of
 Hencky reduced_strength(const Hencky& law, double factor);
 Undrained reduced_strength(const Undrained& law, double factor);
 
+/// Says that the strength of a law is not known
+struct UnknownStrength : InputError
+{
+  explicit UnknownStrength(const std::string& law)
+      : InputError("law: the strength of " + law +
+                   " is not known here; name its strength_parameters (of a UMAT or a law in Python), or give "
+                   "factor_of_safety a function `reduce` of law and factor that returns the weaker law")
+  {
+  }
+};
+
 /// @throws InputError the strength of such a law is not known
 template <class L>
 L reduced_strength(const L& law, double)
 {
-  throw InputError("law: the strength of " + law_name(law) +
-                   " is not known here; give factor_of_safety a function `reduce` of law and factor that returns the "
-                   "weaker law");
+  throw UnknownStrength(law_name(law));
 }
 
 template <class... L>

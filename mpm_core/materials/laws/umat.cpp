@@ -174,6 +174,14 @@ void check(const Umat& law)
           law.plastic_strain_variable, "0, or the number of a state variable");
   for (double property : law.properties)
     require(std::isfinite(property), "properties", property, "finite numbers");
+  std::vector<StrengthKind> kinds;
+  for (const auto& [number, kind] : law.strength)
+  {
+    require(number >= 1 && number <= static_cast<int>(law.properties.size()), "strength_parameters", number,
+            "the number of one of the properties, from one");
+    kinds.push_back(kind);
+  }
+  check(kinds);
   check_parameters(law);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "materials/laws/batch.h"
+#include "materials/laws/strength_parameters.h"
 #include "materials/tools/parameter.h"
 
 namespace mpm::materials
@@ -39,6 +40,8 @@ struct Umat
   double wave_modulus;
   /// Symbol, and a hash of the library's file as it was loaded: another one under the same name is another law
   std::string code = {};
+  /// Numbers, from one, of the PROPS that are its strength, and what they stand for
+  std::vector<std::pair<int, StrengthKind>> strength = {};
 
   static constexpr std::string_view name = "Umat";
   static constexpr auto parameters()
@@ -49,10 +52,15 @@ struct Umat
   }
   static constexpr std::array parts{
       Part{"library", "path of the shared library, such as one made by ``gfortran -shared -fPIC -o umat.so umat.f``"},
-      Part{"properties", "PROPS, a list of numbers"}, Part{"n_variables", "NSTATV, a whole number from 0 to 55"},
+      Part{"properties", "PROPS, a list of numbers"},
+      Part{"n_variables", "NSTATV, a whole number from 0 to 55"},
       Part{"plastic_strain_variable",
            "number, from one, of the STATEV with the accumulated plastic deviatoric strain; 0 for none", false},
-      Part{"symbol", "name of the subroutine in the library; ``umat_`` is what Fortran compilers make of UMAT", false}};
+      Part{"symbol", "name of the subroutine in the library; ``umat_`` is what Fortran compilers make of UMAT", false},
+      Part{"strength_parameters",
+           "what the PROPS are that a factor of safety divides, by their numbers from one: ``{3: 'strength', "
+           "4: 'friction angle', 5: 'dilation angle'}``, angles in degrees",
+           false}};
 
   static constexpr Needs special_needs{.cell_size = true, .deformation = true};
 

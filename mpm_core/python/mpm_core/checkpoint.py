@@ -267,8 +267,8 @@ def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
     )
 
 
-_NEWER = ("needs_cell_size",)
-"""Properties that follow from the kind of a law, and that checkpoints of older versions do not have"""
+_NEWER = ("needs_cell_size", "strength_parameters", "library", "symbol")
+"""Properties on which no step depends beside the others, and that checkpoints of older versions do not have"""
 
 
 def _material(law: Any) -> str:

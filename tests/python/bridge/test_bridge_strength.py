@@ -1,7 +1,10 @@
 """Strength reduction of each law, and the strength of Davis."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -91,6 +94,75 @@ def test_some_soils_stay_as_they_are():
         bridge.reduced_strength(laws, 2.0, unreduced=[7])
 
 
+class Frictional:
+    """The Mohr-Coulomb law of the core, called from Python, which names its strength."""
+
+    n_state = 1
+    p_wave_modulus = sand().p_wave_modulus
+    strength_parameters = {"c": "strength", "phi": "friction angle", "psi": "dilation angle"}
+
+    def __init__(self, c=10.0, phi=30.0, psi=20.0):
+        self.c, self.phi, self.psi = c, phi, psi
+
+    def update(self, strain_increment, stress, state, tangent):
+        law = sand(cohesion=self.c, friction_angle=self.phi, dilation_angle=self.psi)
+        law.update(strain_increment, stress, state, tangent)
+
+
+@dataclass(frozen=True)
+class Prepared(Frictional):
+    """The same as a dataclass that cannot be changed and computes numbers when it is constructed."""
+
+    c: float = 10.0
+    phi: float = 30.0
+    psi: float = 20.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "slope", tangent(self.phi))
+
+
+@pytest.mark.parametrize("kind", [Frictional, Prepared])
+@pytest.mark.parametrize("factor", [1.2, 2.0])
+def test_a_law_in_python_that_names_its_strength(kind, factor):
+    law = mpm.PythonLaw(kind())
+    weak, expected = bridge.reduced_strength(law, factor).law, bridge.reduced_strength(sand(), factor)
+    assert (weak.c, weak.phi, weak.psi) == (expected.cohesion, expected.friction_angle, expected.dilation_angle)
+    assert getattr(weak, "slope", tangent(weak.phi)) == tangent(weak.phi)
+    assert (law.law.c, law.law.phi, law.law.psi) == (10.0, 30.0, 20.0)  # the law itself stays as it is
+    wet = bridge.reduced_strength(mpm.Undrained(mpm.Hencky(law), porosity=0.4), factor).skeleton.law.law
+    assert (wet.c, wet.phi) == (weak.c, weak.phi)
+
+
+def test_a_law_in_python_has_the_factor_of_safety_of_the_core_law():
+    body, _, facets = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, crest=1.0, cell_size=0.25))
+    held = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    strength = {"c": 4e3, "phi": 25.0, "psi": 25.0}
+    native = sand(cohesion=4e3, friction_angle=25.0, dilation_angle=25.0)
+    found = [
+        bridge.factor_of_safety(
+            bridge.QuasiStatic(body, law, facets, held), bridge.Load(unit_weight=20e3), start=1.5, tolerance=0.02
+        )
+        for law in (native, mpm.PythonLaw(Frictional(**strength)))
+    ]
+    assert found[0].failed and found[1].failed
+    assert found[1].value == found[0].value and found[1].curve == pytest.approx(found[0].curve, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ({"cohesion": "strength"}, "names cohesion in strength_parameters, but has no such attribute"),
+        ({"c": "shear"}, "names 'shear', expected 'strength', 'friction angle' or 'dilation angle'"),
+        ({"psi": "dilation angle", "phi": "friction angle"}, "expected the friction angle that limits it before it"),
+    ],
+)
+def test_strength_that_is_named_wrongly_is_refused(named, words):
+    law = Frictional()
+    law.strength_parameters = named
+    with pytest.raises(mpm.InputError, match=words):
+        mpm.PythonLaw(law)
+
+
 @pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, np.inf])
 def test_bad_factors_are_refused(factor):
     with pytest.raises(bridge.InputError, match="factor"):
@@ -98,8 +170,11 @@ def test_bad_factors_are_refused(factor):
 
 
 def test_laws_of_unknown_strength_are_refused_with_advice():
-    with pytest.raises(bridge.InputError, match="LinearElastic.*reduce"):
-        bridge.reduced_strength(mpm.LinearElastic(**ELASTIC), 1.0)
+    unknown = Frictional()
+    unknown.strength_parameters = {}
+    for law, name in ((mpm.LinearElastic(**ELASTIC), "LinearElastic"), (mpm.PythonLaw(unknown), "Frictional")):
+        with pytest.raises(bridge.InputError, match=f"{name}.*strength_parameters.*reduce"):
+            bridge.reduced_strength(law, 1.0)
 
 
 def test_strength_of_davis():

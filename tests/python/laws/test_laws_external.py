@@ -10,6 +10,7 @@ from core_cases import box, rollers, run
 from implicit_cases import floor
 from law_cases import Batch, assert_tangent, random_points
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 YOUNG, POISSON, STRENGTH = 20e6, 0.3, 30e3
@@ -157,3 +158,36 @@ def test_bad_input_is_named(library):
     broken.n_state = 0
     with pytest.raises(mpm.InputError, match="n_state 0, expected at least 1"):
         mpm.PythonLaw(broken)
+
+
+def test_a_umat_has_its_named_properties_reduced(library):
+    named = {3: "strength", 1: "friction angle", 2: "dilation angle"}  # of which the law knows nothing: numbers only
+    law = umat(library, properties=[30.0, 20.0, STRENGTH], strength_parameters=named)
+    assert law.strength_parameters == named and "friction angle" in repr(law)
+    angle = np.degrees(np.arctan(np.tan(np.radians(30.0)) / 2))
+    weak = bridge.reduced_strength(law, 2.0)
+    assert weak.properties == pytest.approx([angle, angle, STRENGTH / 2], rel=1e-14)
+    assert weak.strength_parameters == named and law.properties == [30.0, 20.0, STRENGTH]
+
+
+def test_a_umat_yields_at_its_reduced_strength(library):
+    stress, strain = random_points(2, 400, pressure=50e3, deviator=10e3, strain=1e-3)
+    weak = bridge.reduced_strength(umat(library, strength_parameters={3: "strength"}), 1.5)
+    native = mpm.von_mises(young=YOUNG, poisson=POISSON, yield_stress=STRENGTH / 1.5)
+    here, there = Batch(weak, stress, strain), Batch(native, stress, strain)
+    assert 100 < there.report.plastic and np.abs(here.stress - there.stress).max() < 1e-9 * 50e3
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ({4: "strength"}, "strength_parameters = 4, but it must be the number of one of the properties"),
+        ({0: "strength"}, "strength_parameters = 0, "),
+        ({3: "yield"}, "names 'yield', expected 'strength'"),
+        ({3: 2.0}, "strength_parameters of Umat is {3: 2.0}, expected a dictionary of numbers of properties"),
+        ([3], r"strength_parameters of Umat is \[3\], expected a dictionary"),
+    ],
+)
+def test_properties_that_are_named_wrongly_are_refused(library, named, words):
+    with pytest.raises(mpm.InputError, match=words):
+        umat(library, strength_parameters=named)

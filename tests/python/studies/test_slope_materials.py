@@ -14,7 +14,9 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
 from common.schemes import SCHEMES, run_scheme  # noqa: E402
 from common.slope_case import build_slope, initialise  # noqa: E402
-from common.soils import MATERIALS  # noqa: E402
+from common.soils import MATERIALS, law_of  # noqa: E402
+
+import mpm_core as mpm  # noqa: E402
 
 slope = importlib.import_module("slope")
 
@@ -45,6 +47,18 @@ def own_laws(tmp_path_factory):
     subprocess.run(["gfortran", "-shared", "-fPIC", "-O1", "-o", library, source], check=True)
     return {"Python": [f"{folder / 'mine.py'}:Soil"],
             "UMAT": [str(library), "--properties", "200e3", "0.33", "6e3", "--variables", "1"]}  # fmt: skip
+
+
+def test_a_umat_is_told_which_properties_are_its_strength(own_laws):
+    def law(*words):
+        return law_of(slope.parse([*OTHERS["UMAT"], *own_laws["UMAT"], "--strength-properties", *words]))
+
+    assert law("3:strength").strength_parameters == {3: "strength"} and law().strength_parameters == {}
+    assert law("1:friction", "2:dilation").strength_parameters == {1: "friction angle", 2: "dilation angle"}
+    with pytest.raises(
+        mpm.InputError, match="--strength-properties names '3', expected NUMBER:KIND with one of strength, "
+    ):
+        law("3")
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

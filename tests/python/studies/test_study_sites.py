@@ -133,6 +133,23 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
     assert high - low <= 4e-3 * low
 
 
+def test_a_soil_of_a_site_may_keep_its_strength(tmp_path):
+    """More strength never lowers the factor of soils that flow without a change of volume, by limit analysis."""
+    path, factors = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 1.0")), {}
+    for kept in ((), ("lower",), ("upper",)):
+        folder = tmp_path / "-".join(("safety", *kept))
+        options = ["--site", path, "--meshes", 1, "--output", folder, "--unreduced", *kept]
+        assert importlib.import_module("safety").main([str(word) for word in options]) == 0
+        factors[kept] = json.loads((folder / "summary.json").read_text())["factor_of_safety"]
+    assert factors[()] <= factors["lower",] * (1 + 4e-3) and 1.1 * factors[()] < factors["upper",]
+
+
+def test_a_soil_that_the_site_does_not_have_cannot_keep_its_strength(tmp_path):
+    options = ["--site", site_in(tmp_path), "--meshes", 1, "--output", tmp_path / "safety", "--unreduced", "rock"]
+    with pytest.raises(mpm.InputError, match="'rock' is not among the soils lower, upper"):
+        importlib.import_module("safety").main([str(word) for word in options])
+
+
 def test_particles_give_a_second_opinion(tmp_path):
     """Linear finite elements and particles on the same cells, of a site with room to move and of a slope."""
     path = site_in(tmp_path, SITE)
