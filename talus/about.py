@@ -1,4 +1,4 @@
-"""The command ``talus info``: versions, solvers, processors."""
+"""The command ``talus info``: versions, solvers, processors. It also runs where something is missing, and says what."""
 
 from __future__ import annotations
 
@@ -7,21 +7,25 @@ import importlib
 import os
 import shutil
 import sys
+from typing import Any
 
 from talus import find
 
 SOLVERS = ("mumps", "superlu_dist", "hypre", "ml")
 """Packages of PETSc that solve or precondition linear systems"""
 
+OTHERS = ("h5py", "gmsh", "matplotlib", "jinja2", "tqdm")
+"""Modules that files, meshes, pictures, pages and progress bars need"""
+
 
 def about() -> str:
     """Lines of text."""
     sys.path.insert(0, str(find.SHIPPED))
-    versions = importlib.import_module("common.summary").versions()
+    common = importlib.import_module("common.versions")
     lines = {
-        **{name.replace("_", " "): version for name, version in versions.items()},
-        "gmsh": _module_version("gmsh"),
-        "linear solvers": _solvers(),
+        **{name.replace("_", " "): version for name, version in common.versions().items()},
+        **{name: common.version_of(name) for name in OTHERS},
+        "linear solvers": common.version_of("petsc4py.PETSc", _solvers),
         "processors": f"{len(os.sched_getaffinity(0))} for this process; mpirun {shutil.which('mpirun') or 'not found'}",
         "films": "MP4 by ffmpeg" if shutil.which("ffmpeg") else "GIF (ffmpeg not found)",
         "meshes": "read by a process that may not start programs" if ctypes.util.find_library("seccomp") else
@@ -31,19 +35,7 @@ def about() -> str:
     return "\n".join(f"{name + ':':<16} {value}" for name, value in lines.items())
 
 
-def _module_version(name: str) -> str:
-    try:
-        return str(importlib.import_module(name).__version__)
-    except ImportError:
-        return "not found"
-
-
-def _solvers() -> str:
-    try:
-        system = importlib.import_module("petsc4py.PETSc").Sys
-    except ImportError:
-        return "PETSc not found"
-    if not hasattr(system, "hasExternalPackage"):
+def _solvers(petsc: Any) -> str:
+    if not hasattr(petsc.Sys, "hasExternalPackage"):
         return "PETSc"
-    there = [name for name in SOLVERS if system.hasExternalPackage(name)]
-    return ", ".join(["PETSc", *there])
+    return ", ".join(["PETSc", *(name for name in SOLVERS if petsc.Sys.hasExternalPackage(name))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -40,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if runs:
             return run_study(words[1:])
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `talus list | head` ends without a word
         if a.command == "list":
             print(listed())
         elif a.command == "new":

@@ -7,9 +7,12 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
+IN_SOURCES = (ROOT / "CMakeLists.txt").exists()
+"""Whether the studies are those of the source tree, not of an installed package"""
+
 NOT_WRITTEN: list[str] = []
 """Pictures and films that this run could not write, each with the reason; ``run_study`` prints them at the end."""
-
 
 PROGRAM = os.environ.get("TALUS_PROGRAM", "studies/run")
 """The command that runs studies, as messages name it"""

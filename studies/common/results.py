@@ -18,13 +18,10 @@ from typing import Any, TextIO
 
 from mpi4py import MPI
 
-from .files import NOT_WRITTEN, OutputError
+from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError
 from .options import Options
 from .parameters import write_parameters
 
-ROOT = Path(__file__).parents[2]
-IN_SOURCES = (ROOT / "CMakeLists.txt").exists()
-"""Whether the studies are those of the source tree, not of an installed package"""
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""
 ROOM = 1 << 16

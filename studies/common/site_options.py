@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from pathlib import Path
 
 from .options import add_choice, add_number
-from .results import ROOT
+from .files import ROOT
 
 
 def add_site_file(parser: ArgumentParser, site: str, contents: str, elements: tuple[str, tuple[str, ...], str]) -> None:

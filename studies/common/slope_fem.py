@@ -13,7 +13,7 @@ import fenics_bridge as bridge
 from fenics_bridge.types import MeshTags
 
 from .options import add_choice, add_count, add_number, check
-from .results import ROOT
+from .files import ROOT
 from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_slope_options, soil_of
 
 

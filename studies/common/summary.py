@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import platform
-import subprocess
 from argparse import Namespace
 from collections.abc import Mapping
 from datetime import datetime, timezone
@@ -17,45 +16,8 @@ from .figures import Pictures, draw_pictures
 from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
-from .results import IN_SOURCES, ROOT, note_what_was_written, release_reserved_space
-
-
-def versions() -> dict[str, str]:
-    """Versions of the program and what it stands on, by name."""
-    import mpm_core
-
-    found = {
-        "program": mpm_core.__version__,
-        "git_revision": git_revision(),
-        "compiler": f"GCC or compatible {mpm_core.compiler}",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "mpi": MPI.Get_library_version().split(",")[0].strip(),
-    }
-    try:
-        import dolfinx
-
-        found["dolfinx"] = dolfinx.__version__
-    except ImportError:
-        found["dolfinx"] = "not found"
-    try:
-        from petsc4py import PETSc
-
-        found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
-    except ImportError:
-        found["petsc"] = "not found"
-    return found
-
-
-def git_revision() -> str:
-    """Commit of the sources, with ``-changed`` when files differ from it; ``unknown`` outside a clone."""
-    if not IN_SOURCES:
-        return "installed"
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=-changed"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
+from .results import note_what_was_written, release_reserved_space
+from .versions import versions
 
 
 def write_summary(

@@ -12,7 +12,7 @@ from pathlib import Path
 from _case import Result
 from common.parameters import Parameter
 from common.report import Report, Section, save_report
-from common.summary import versions
+from common.versions import versions
 from PIL import Image
 
 DOCS_WIDTH = 900

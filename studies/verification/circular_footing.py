@@ -10,7 +10,7 @@ From mesh to mesh the error is more than halved, at different rates, so nothing 
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
-from common.summary import ROOT
+from common.files import ROOT
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -11,7 +11,7 @@ from _case import Check, Result, run_alone
 from _plots import save_comparison
 from common.figures import save_figure
 from common.plots import paper_style
-from common.summary import ROOT
+from common.files import ROOT
 from mpi4py import MPI
 
 import fenics_bridge as bridge

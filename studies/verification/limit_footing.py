@@ -9,7 +9,7 @@ pressure.
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from common.summary import ROOT
+from common.files import ROOT
 from footing import AXIS, BASE, FAR, FOOTING, footing, parse, prandtl_factor, prandtl_line
 from mpi4py import MPI
 

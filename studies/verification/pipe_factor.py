@@ -13,7 +13,7 @@ cells around it, so that coarse cells give higher loads.
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
-from common.summary import ROOT
+from common.files import ROOT
 from mpi4py import MPI
 
 import fenics_bridge as bridge

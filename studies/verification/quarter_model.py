@@ -11,7 +11,7 @@ out of a mesh of cubes; energies and moments are therefore compared per mass.
 import numpy as np
 from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison, save_refinement
-from common.summary import ROOT
+from common.files import ROOT
 from mpi4py import MPI
 
 import fenics_bridge as bridge

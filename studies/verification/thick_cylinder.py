@@ -10,7 +10,7 @@ in steps that begin with the cohesion and are bisected to 0.2 %.
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from common.summary import ROOT
+from common.files import ROOT
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -125,17 +125,37 @@ def test_info_names_versions_and_solvers(tmp_path):
     assert {"dolfinx", "petsc", "gmsh", "linear solvers", "processors", "studies"} <= set(lines)
 
 
+def test_info_names_what_is_missing_or_cannot_be_loaded(tmp_path):
+    """It is asked for where an installation does not work, and must answer there."""
+    for name, error in (("dolfinx", "ModuleNotFoundError('No module', name='dolfinx')"), ("matplotlib", "OSError('libfree')"),
+                        ("h5py", "ModuleNotFoundError('no numpy.core', name='numpy.core')")):  # fmt: skip
+        (tmp_path / f"{name}.py").write_text(f"raise {error}")
+    done = talus(tmp_path, "info", PYTHONPATH=os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]]))
+    lines = {name: text.strip() for name, text in (line.split(":", 1) for line in done.stdout.splitlines())}
+    assert done.returncode == 0 and lines["program"] == mpm_core.__version__
+    assert lines["dolfinx"] == "not found" and lines["matplotlib"] == "not loaded: libfree"
+    assert lines["h5py"] == "not loaded: no numpy.core"
+
+
+def test_a_reader_may_end_before_the_list(tmp_path):
+    script = f"{sys.executable} -m talus list | head -n 1"
+    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, env=ENVIRONMENT)
+    assert len(done.stdout.splitlines()) == 1 and done.stderr == ""
+
+
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_the_shell_completes_studies(tmp_path):
     script = "\n".join([
         f'talus() {{ {sys.executable} -m talus "$@"; }}', 'source <(talus completion bash)',
         'COMP_WORDS=(talus run slo) COMP_CWORD=2; _talus; echo "${COMPREPLY[@]}"',
         'COMP_WORDS=(talus in) COMP_CWORD=1; _talus; echo "${COMPREPLY[@]}"',
+        'COMP_WORDS=(talus run footing --half) COMP_CWORD=3; _talus; echo "${COMPREPLY[@]}"',
+        'COMP_WORDS=(talus run --ranks 2 footing --without) COMP_CWORD=5; _talus; echo "${COMPREPLY[@]}"',
     ])  # fmt: skip
     done = subprocess.run(
         ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, env=ENVIRONMENT
     )
-    assert done.stdout.split() == ["slope", "slope_schemes", "info"], done.stderr
+    assert done.stdout.split() == ["slope", "slope_schemes", "info", "--half-width", "--without-dilation"], done.stderr
 
 
 def test_zsh_takes_the_completion_without_further_preparation(tmp_path):
@@ -151,14 +171,21 @@ def test_zsh_takes_the_completion_without_further_preparation(tmp_path):
 def test_fish_completes_commands_and_studies(tmp_path):
     if shutil.which("fish") is None:
         pytest.skip("needs fish")
-    lines = ["talus in", "talus run slo", "talus completion f", "talus run --r"]
+    lines = [
+        "talus in",
+        "talus run slo",
+        "talus completion f",
+        "talus run --r",
+        "talus run footing --half",
+        "talus run --ranks 2 footing --half",
+    ]
     script = "\n".join([f"function talus; {sys.executable} -m talus $argv; end", "talus completion fish | source",
                         *(f"complete -C '{line}'" for line in lines)])  # fmt: skip
     done = subprocess.run(
         ["fish", "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, env=ENVIRONMENT
     )
     words = [line.split("\t")[0] for line in done.stdout.splitlines()]
-    assert words == ["info", "slope", "slope_schemes", "fish", "--ranks"], done.stderr
+    assert words == ["info", "slope", "slope_schemes", "fish", "--ranks", "--half-width", "--half-width"], done.stderr
 
 
 def test_the_installed_package_holds_all_that_studies_need(tmp_path):
