@@ -47,6 +47,13 @@ class Collapse:
     steps: list[LoadStep]
     """Every load step that was tried"""
 
+    def __repr__(self) -> str:
+        above = "failure shown" if self.failed else "no equilibrium found, failure not shown,"
+        return (
+            f"<Collapse: {self.value:.6g} at the last equilibrium, {above} at {self.failed_at:.6g}; {len(self.steps)} load steps, "
+            f"out-of-balance ratio up to {self.residual:.2g}>"
+        )
+
 
 def collapse_load(
     model: QuasiStatic | MixedQuasiStatic,

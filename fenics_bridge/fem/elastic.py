@@ -28,6 +28,7 @@ from fenics_bridge.fem.loads import elastic_load
 from fenics_bridge.fem.stiffness import Stiffness
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags
+from fenics_bridge.views import body_text
 from mpm_core import Geometry
 
 
@@ -50,6 +51,9 @@ class ElasticSolution:
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""
         self._radius = radius_of(domain, self.geometry)
+
+    def __repr__(self) -> str:
+        return body_text("ElasticSolution", self.displacement.function_space.mesh, geometry=self.geometry)
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function.

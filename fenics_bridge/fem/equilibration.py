@@ -41,6 +41,11 @@ class EquilibriumReport:
     motion: NDArray[np.float64] | None = field(default=None, repr=False)
     """Displacement of the step, or of the mechanism where it fails, per degree of freedom [m]"""
 
+    def __repr__(self) -> str:
+        balance = f", out-of-balance ratio {self.residuals[-1]:.2g}" if self.residuals else ""
+        why = f": {self.reason}" if self.reason else ""
+        return f"<EquilibriumReport: {self.outcome} after {self.iterations} linear systems{balance}{why}>"
+
     @property
     def converged(self) -> bool:
         """Whether the step ended in equilibrium."""

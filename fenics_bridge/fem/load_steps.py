@@ -31,6 +31,9 @@ class LoadStep(NamedTuple):
     report: EquilibriumReport
     """How the equilibrium was found, or why there is none"""
 
+    def __repr__(self) -> str:
+        return f"<LoadStep {self.number}: to {self.value:.6g} by {self.size:.3g}; {self.report!r}>"
+
     @property
     def converged(self) -> bool:
         """Whether the step ended in equilibrium."""

@@ -36,6 +36,11 @@ class Load:
     traction: dict[int | str, Sequence[float]] = field(default_factory=dict)
     """Force per area [Pa], shape (D,), by facet tag or name, on the undeformed outer boundary, for instance shear"""
 
+    def __repr__(self) -> str:
+        units = {"unit_weight": "N/m3", "pressure": "Pa", "traction": "Pa", "displacement": "of it", "held": "of it"}
+        shown = (f"{name}={getattr(self, name)} {unit}" for name, unit in units.items() if getattr(self, name))
+        return f"Load({', '.join(shown)})"
+
     def towards(self, other: Load, fraction: float) -> Load:
         """The load at a fraction of the way from this one to another.
 

@@ -29,6 +29,7 @@ from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags
+from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
@@ -92,6 +93,12 @@ class MixedQuasiStatic:
         """Tolerances of the solution"""
         self._facet_tags = facet_tags
         self._displacements = space.sub(0).collapse()
+
+    def __repr__(self) -> str:
+        state = "in equilibrium" if self.converged else "not in equilibrium"
+        return body_text(
+            "MixedQuasiStatic", self.domain, repr(self.load), state, geometry=self.geometry, lines=law_lines(self.law)
+        )
 
     @property
     def displacement(self) -> fem.Function:

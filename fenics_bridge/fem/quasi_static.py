@@ -34,6 +34,7 @@ from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
+from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
@@ -119,7 +120,13 @@ class QuasiStatic(PointFunctions):
         """Tolerances of the solution"""
         self._assemble(constraints)
 
-    def _assemble(self, constraints):
+    def __repr__(self) -> str:
+        return body_text(
+            "QuasiStatic", self.domain, f"displacement of degree {self.degree}", repr(self.load),
+            "in equilibrium" if self.converged else "not in equilibrium", geometry=self.geometry, lines=law_lines(self.law),
+        )  # fmt: skip
+
+    def _assemble(self, constraints: Constraints) -> None:
         """The Body that a step changes, with the present points and the given constraints. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
         parts = self.increment, self.points, constraints

@@ -75,6 +75,12 @@ class StageReport:
     largest_displacement: float
     """Largest displacement of a node, or of a particle, since displacements count [m]"""
 
+    def __repr__(self) -> str:
+        return (
+            f"<StageReport {self.number} {self.name!r}: {self.steps} steps, {self.iterations} iterations; largest displacement "
+            f"{self.largest_displacement:.4g} m>"
+        )
+
 
 class StageError(RuntimeError):
     """A stage has no equilibrium; the message names the stage, the fraction reached, the place and law of failure, and a remedy.

@@ -49,6 +49,13 @@ class ParticleSafety:
     steps: list[LoadStep]
     """Every step of the factor that was tried"""
 
+    def __repr__(self) -> str:
+        above = "the particles flow" if self.failed else "the particles did not come to rest, flow not shown,"
+        return (
+            f"<ParticleSafety: factor {self.value:.6g} at rest, {above} at {self.failed_at:.6g}; {len(self.steps)} trials, "
+            f"out-of-balance ratio up to {self.residual:.2g}>"
+        )
+
 
 def particle_safety(
     model_of: Callable[[float], mpm.Model],

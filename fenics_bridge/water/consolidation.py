@@ -27,6 +27,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.solver import Solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import Laws, MeshTags, OfPosition
+from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary
 from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, solve_step
@@ -132,7 +133,11 @@ class Consolidation(PointFunctions):
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self._assemble(options_prefix)
 
-    def _assemble(self, options_prefix):
+    def __repr__(self) -> str:
+        laws = map(repr, self._laws)
+        return body_text("Consolidation", self.domain, f"t = {self.time:g} s", geometry=self.geometry, lines=laws)
+
+    def _assemble(self, options_prefix: str) -> None:
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
         constraints = CoupledConstraints(self._supports, self._space, self._pressures[1])

@@ -39,6 +39,10 @@ class ConsolidationReport:
     reason: str = ""
     """Why the step was not made; empty where it was, and otherwise everything is as it was before"""
 
+    def __repr__(self) -> str:
+        why = f"; not made: {self.reason}" if self.reason else ""
+        return f"<ConsolidationReport: t = {self.time:g} s, step of {self.dt:.3g} s, {self.iterations} iterations{why}>"
+
     @property
     def converged(self) -> bool:
         """Whether the step was made."""

@@ -25,6 +25,7 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import MeshTags, OfPosition
+from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace, WaterBoundary
 from fenics_bridge.water.complementarity import BoundedProblem
@@ -108,7 +109,11 @@ class Seepage:
         """Iterations of Newton's method in the last solution"""
         self._reaction = np.zeros(len(self._applied.height))
 
-    def _take_boundary(self):
+    def __repr__(self) -> str:
+        facts = f"elements of degree {self._degree}", f"t = {self.time:g} s"
+        return body_text("Seepage", self.domain, *facts, lines=map(repr, self.boundary))
+
+    def _take_boundary(self) -> None:
         if self._applied.take(self.boundary):
             self._steady = self._transient = None
 

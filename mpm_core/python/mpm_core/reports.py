@@ -31,6 +31,12 @@ class Reports(Generic[R]):
         self._steps, self._scheme, self._begun = steps, scheme, False
         self._model, self._until = model, until
 
+    def __repr__(self) -> str:
+        return (
+            f"<Reports: Model.{self._scheme} from t = {self._model.time:g} s to {self._until:g} s; "
+            "iterate over it, or call last()>"
+        )
+
     def __iter__(self) -> Reports[R]:
         return self
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._core import InputError
+from ._core import Geometry, InputError
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -36,7 +36,8 @@ def mesh_text(mesh: Mesh) -> str:
 
 def particles_text(particles: Particles) -> str:
     """Particles in words: their number on this rank, and fields with units."""
-    fields = ", ".join(f"{field['name']} [{field['unit']}]" for field in particles.schedule())
+    units = _units(particles)
+    fields = ", ".join(f"{field['name']} [{units[field['name']]}]" for field in particles.schedule())
     return f"<Particles: {len(particles)} on this rank; {fields}>"
 
 
@@ -71,8 +72,9 @@ def _columns(name: str, values: np.ndarray, dim: int) -> dict[str, np.ndarray]:
 
 def _units(particles: Particles) -> dict[str, str]:
     """Units of the fields, including those that follow from others."""
-    derived = {"displacement": "m", "plastic_strain": "-"}
-    return {field["name"]: field["unit"] for field in particles.schedule()} | derived
+    units = {field["name"]: field["unit"] for field in particles.schedule()}
+    volume = "m2" if particles._geometry == Geometry.PLANE_STRAIN else "m3"  # of a slice 1 m thick, of one radian
+    return units | {"displacement": "m", "plastic_strain": "-", "volume": volume}
 
 
 def particle_table(particles: Particles, names: Sequence[str]) -> Any:

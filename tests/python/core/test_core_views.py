@@ -31,6 +31,17 @@ def test_texts_have_sizes_units_and_laws(model):
     assert f"{report.mass:.6g} kg" in repr(report) and f"kinetic energy {report.kinetic_energy:.4g} J" in repr(report)
 
 
+def test_texts_of_volumes_and_runs(model):
+    assert "volume [m2]" in repr(model.particles)
+    solid = mpm.Model(box((1, 1, 1)), model.laws[0])
+    assert "volume [m3]" in repr(solid.particles)
+    revolved = mpm.Model(box((2, 2)), model.laws[0], geometry=mpm.Geometry.AXISYMMETRIC)
+    assert "volume [m3]" in repr(revolved.particles)
+    run = model.explicit(0.02)
+    assert repr(run) == "<Reports: Model.explicit from t = 0.01 s to 0.02 s; iterate over it, or call last()>"
+    run.last()
+
+
 def test_a_table_has_a_column_for_each_component_with_its_unit(model):
     p = model.particles
     table = p.to_dataframe("position", "stress", "volume", "displacement")
