@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -133,11 +134,24 @@ def raise_load(
 ) -> list[LoadStep]:
     """Raise the load of a model from its present one to the given one, by `advance` over the fraction of the way.
 
-    Sets `converged` of the model to whether the load was reached. Collective.
+    Sets `converged` of the model to whether the load was reached, and warns if it was not. Collective.
     """
     start = model.load
     steps = advance(
         lambda fraction: model.equilibrate(start.towards(load, fraction)), 0.0, 1.0, first_step, tolerance, progress
     )
     model.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
+    if not model.converged and MPI.COMM_WORLD.rank == 0:
+        warnings.warn(_not_reached(steps), RuntimeWarning, stacklevel=3)
     return steps
+
+
+def _not_reached(steps: list[LoadStep]) -> str:
+    """What is left of a load that the body was to be given."""
+    reached = max((step.value for step in steps if step.converged), default=0.0)
+    failed = min((step for step in steps if not step.converged), key=lambda step: step.value, default=None)
+    reason = f": at {failed.value:.3%} {failed.report.reason}" if failed is not None else ""
+    return (
+        f"the load was not reached, `converged` is False: displacements and stresses are those of the last equilibrium, "
+        f"{reached:.3%} of the way from the load before{reason}"
+    )

@@ -154,7 +154,8 @@ class MixedQuasiStatic:
             progress: function that is called with each load step, e.g. `print_step`.
 
         Returns:
-            All steps. `converged` says whether the load was reached; if not, `load` is the last one in equilibrium.
+            All steps. `converged` says whether the load was reached; if not, there is a warning, and `load` is the last one in
+            equilibrium.
 
         Note:
             Collective.

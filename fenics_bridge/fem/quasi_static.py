@@ -301,7 +301,8 @@ class QuasiStatic(PointFunctions):
             progress: function that is called with each load step, e.g. `print_step`.
 
         Returns:
-            All steps. `converged` says whether the load was reached; if not, `load` is the last one in equilibrium.
+            All steps. `converged` says whether the load was reached; if not, there is a warning, and `load` is the last one in
+            equilibrium.
 
         Raises:
             InputError: an unknown tag, or a load that is not finite. Raised on all ranks alike.

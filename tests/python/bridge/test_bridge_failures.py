@@ -54,8 +54,11 @@ def test_a_failure_names_load_place_law_and_what_to_try(law, supports, load, out
 
 def test_the_load_that_is_named_is_above_the_last_one_carried():
     fem = bridge.QuasiStatic(BODY, soil(), FACETS, HELD)
-    steps = fem.solve(bridge.Load(unit_weight=80e3), tolerance=0.02)
+    with pytest.warns(RuntimeWarning, match="the load was not reached") as warned:
+        steps = fem.solve(bridge.Load(unit_weight=80e3), tolerance=0.02)
     failed = min(step.value for step in steps if not step.converged)
+    reached = max(step.value for step in steps if step.converged)
+    assert f"{reached:.3%} of the way" in str(warned[0].message) and f"at {failed:.3%}" in str(warned[0].message)
     named = [re.search(r"under unit weight (\S+) N/m3", step.report.reason) for step in steps if step.value == failed]
     assert float(named[0][1]) == pytest.approx(80e3 * failed, rel=1e-4) and fem.load.unit_weight < 80e3 * failed
 
