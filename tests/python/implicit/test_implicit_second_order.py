@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from core_cases import box
+from implicit_cases import slope
 
 import mpm_core as mpm
 
@@ -65,6 +66,20 @@ def test_energy_that_a_step_leaves_is_that_of_the_method():
     assert left[True] == pytest.approx(((1 + 2 * z) / (1 + z) ** 2) ** steps, abs=0.01)
     assert left[False] == pytest.approx((1 / (1 + (OMEGA * dt) ** 2)) ** steps, rel=0.2)
     assert left[True] > 0.95 and left[False] < 0.05
+
+
+def test_only_the_waves_of_a_sudden_load_lose_energy_in_a_slide():
+    # The elastic waves of gravity at once are shorter than the steps, which damp them. Gravity that rises over a second
+    # causes none; the soil slides and yields as well.
+    lost, plastic = {}, {}
+    for ramp, time in ((0.0, 0.2), (1.0, 1.2)):
+        model = slope(weight=60e3, per_cell=3)
+        model.set_gravity((0, -9.81), ramp=ramp)
+        report = model.implicit(time, dt=0.05, second_order=True, integration=mpm.Integration.MIXED).last()
+        lost[ramp] = report.unexplained_fraction
+        plastic[ramp] = report.plastic_work / report.external_work
+    assert plastic[1.0] > 0.2
+    assert lost[0.0] > 0.03 and abs(lost[1.0]) < 0.01
 
 
 def test_the_accuracy_wanted_is_reached_by_shorter_steps():
