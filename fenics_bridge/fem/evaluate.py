@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpm_core.rows import exchange_rows
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -38,19 +39,19 @@ class PointSearch:
         good = points.ndim == 2 and points.shape[1] == dim and np.all(np.isfinite(points))
         agree(self._comm, None if good else f"points: got shape {points.shape}, expected finite (n, {dim})")
         self.points = points
-        low, high = _owned_box(domain)
-        boxes = self._comm.allgather((low, high))
-        self._sent = [np.flatnonzero(np.all((points >= a) & (points <= b), axis=1)) for a, b in boxes]
-        asked = self._comm.alltoall([points[rows] for rows in self._sent])
-        cells = local_cells(domain, np.concatenate(asked))
-        self._asked = np.cumsum([len(p) for p in asked])[:-1]
+        boxes = self._comm.allgather(_owned_box(domain))
+        near = np.array([np.all((points >= low) & (points <= high), axis=1) for low, high in boxes])
+        self._ranks, self._rows = np.nonzero(near)  # that may have a point, by rising rank
+        asked, self._askers = exchange_rows(self._comm, self._ranks, points[self._rows])
+        cells = local_cells(domain, asked)
         self._inside = cells >= 0
         self._cells = cells[self._inside]
         self._at = np.zeros((len(self._cells), 3))
-        self._at[:, :dim] = np.concatenate(asked)[self._inside]
+        self._at[:, :dim] = asked[self._inside]
         self.found = np.zeros(len(points), dtype=bool)
-        for rows, inside in self._returned(self._inside):
-            self.found[rows] |= inside
+        # From the last rank down, so that the lowest one prevails where several have a point.
+        self._there = np.flatnonzero(self._returned(self._inside[:, None].astype(float)))[::-1]
+        self.found[self._rows[self._there]] = True
 
     def require_all(self, argument: str = "points") -> None:
         """Require that all points lie in the mesh.
@@ -91,9 +92,7 @@ class PointSearch:
         if len(self._cells):
             values[self._inside] = np.asarray(function.eval(self._at, self._cells)).reshape(-1, size)
         result = np.full((len(self.points), size), np.nan)
-        for rows, received in self._returned(values):
-            known = ~np.isnan(received[:, 0])
-            result[rows[known]] = received[known]
+        result[self._rows[self._there]] = self._returned(values)[self._there]
         return result
 
     def cell_sums(self, amounts: NDArray[np.float64]) -> NDArray:
@@ -110,17 +109,15 @@ class PointSearch:
         Note:
             Collective.
         """
-        returned, rank_of = self._returned(self._inside), np.full(len(self.points), -1)
-        for rank, (rows, inside) in zip(reversed(range(self._comm.size)), returned):
-            rank_of[rows[inside]] = rank  # on a border between ranks the lowest one counts
-        sent = [np.where(rank_of[rows] == rank, amounts[rows], 0.0) for rank, rows in enumerate(self._sent)]
-        received = np.concatenate(self._comm.alltoall(sent))
-        return np.bincount(self._cells, received[self._inside], owned_cells(self._domain))
+        rank_of = np.full(len(self.points), -1)
+        rank_of[self._rows[self._there]] = self._ranks[self._there]
+        sent = np.where(rank_of[self._rows] == self._ranks, amounts[self._rows], 0.0)
+        received, _ = exchange_rows(self._comm, self._ranks, sent[:, None])
+        return np.bincount(self._cells, received[self._inside, 0], owned_cells(self._domain))
 
-    def _returned(self, array):
-        """Values returned by each rank: (rows of this rank's points, values), the lowest rank last so that it prevails."""
-        returned = self._comm.alltoall(np.split(array, self._asked))
-        return reversed(list(zip(self._sent, returned)))
+    def _returned(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the points that were asked for, (m, k), as the ranks that asked get them; in the order of `_rows`. Collective."""
+        return exchange_rows(self._comm, self._askers, values)[0]
 
 
 def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArray[np.float64]]:

@@ -1,6 +1,6 @@
 #include "implicit/system.h"
 
-#include "parallel/row_slice.h"
+#include "parallel/messages.h"
 
 #include <algorithm>
 

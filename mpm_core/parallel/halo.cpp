@@ -1,6 +1,5 @@
 #include "parallel/halo.h"
 
-#include "parallel/lists.h"
 #include "parallel/migration.h"
 
 #include <algorithm>
@@ -30,7 +29,7 @@ Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm)
     for (Index node : mesh.cells[c])
       known[node] = true;
 
-  std::map<int, Halo::Link> cells, nodes;
+  std::map<int, Link> cells, nodes;
   int size = 1;
   MPI_Comm_size(comm, &size);
   std::vector<std::vector<GlobalIndex>> cells_asked(static_cast<std::size_t>(size)), corners_asked(cells_asked);
@@ -49,7 +48,7 @@ Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm)
       }
   }
   const auto numbers = owned_cell_numbers(mesh);
-  const auto cells_given = exchanged(cells_asked, comm), corners_given = exchanged(corners_asked, comm);
+  const auto cells_given = exchange_lists(cells_asked, comm), corners_given = exchange_lists(corners_asked, comm);
   for (int rank = 0; rank < size; ++rank)
   {
     for (GlobalIndex cell : cells_given[static_cast<std::size_t>(rank)])
@@ -67,24 +66,10 @@ Halos make_halos(const Mesh<D>& mesh, MPI_Comm comm)
 void update(const Halo& halo, double* values, int width)
 {
   const auto w = static_cast<std::size_t>(width);
-  std::vector<MPI_Request> requests;
-  std::vector<std::vector<double>> given(halo.links.size()), taken(halo.links.size());
-  for (std::size_t l = 0; l < halo.links.size(); ++l)
-  {
-    const auto& [rank, give, take] = halo.links[l];
-    taken[l].resize(take.size() * w);
-    MPI_Irecv(taken[l].data(), static_cast<int>(taken[l].size()), MPI_DOUBLE, rank, 4, halo.comm,
-              &requests.emplace_back());
-    for (Index entry : give)
-      given[l].insert(given[l].end(), values + static_cast<std::size_t>(entry) * w,
-                      values + (static_cast<std::size_t>(entry) + 1) * w);
-    MPI_Isend(given[l].data(), static_cast<int>(given[l].size()), MPI_DOUBLE, rank, 4, halo.comm,
-              &requests.emplace_back());
-  }
-  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
-  for (std::size_t l = 0; l < halo.links.size(); ++l)
-    for (std::size_t k = 0; k < halo.links[l].take.size(); ++k)
-      std::copy_n(&taken[l][k * w], w, values + static_cast<std::size_t>(halo.links[l].take[k]) * w);
+  exchange_values(halo.links, values, width, halo.comm);
+  for (const Link& link : halo.links)
+    for (std::size_t k = 0; k < link.take.size(); ++k)
+      std::copy_n(&link.received[k * w], w, values + static_cast<std::size_t>(link.take[k]) * w);
 }
 
 template Halos make_halos(const Mesh<2>&, MPI_Comm);

@@ -3,21 +3,15 @@
 /// Values at ghost cells, and at those of their nodes that no owned cell touches, from the ranks that own the cells.
 
 #include "mesh/mesh.h"
-
-#include <mpi.h>
+#include "parallel/messages.h"
 
 #include <type_traits>
 
 namespace mpm::parallel
 {
-/// Who gives whom which entries of an array; a link has the same length on both sides.
+/// Who gives whom which entries of an array.
 struct Halo
 {
-  struct Link
-  {
-    int rank;
-    std::vector<Index> give, take;
-  };
   MPI_Comm comm = MPI_COMM_SELF;
   std::vector<Link> links; ///< by rising rank
 };

@@ -3,8 +3,7 @@
 /// Sums over nodes that several ranks share.
 
 #include "mesh/mesh.h"
-
-#include <mpi.h>
+#include "parallel/messages.h"
 
 #include <algorithm>
 #include <type_traits>
@@ -14,26 +13,19 @@ namespace mpm::parallel
 /// Which nodes this rank shares with which others, and the buffers of their messages.
 struct NodeExchange
 {
-  /// Nodes shared with one neighbour, in the same order on both sides.
-  struct Neighbour
-  {
-    int rank;
-    std::vector<Index> nodes;
-    std::vector<double> send, receive;
-  };
   MPI_Comm comm = MPI_COMM_SELF;
   int rank = 0;
   int size = 1;
-  std::vector<Neighbour> neighbours; ///< by rising rank
-  std::vector<Index> shared_nodes;   ///< all nodes that have a neighbour
-  std::vector<double> own;           ///< this rank's part of them during a sum
-  std::vector<unsigned char> owned;  ///< per node: 1 on exactly one of the ranks that share it, for global sums
+  std::vector<Link> neighbours;     ///< by rising rank; the shared nodes are both given and taken
+  std::vector<Index> shared_nodes;  ///< all nodes that have a neighbour
+  std::vector<double> own;          ///< this rank's part of them during a sum
+  std::vector<unsigned char> owned; ///< per node: 1 on exactly one of the ranks that share it, for global sums
 };
 
 /// Whether a rank is this one or one of its neighbours.
 inline bool is_within_reach(const NodeExchange& exchange, int rank)
 {
-  const auto same = [rank](const NodeExchange::Neighbour& neighbour) { return neighbour.rank == rank; };
+  const auto same = [rank](const Link& neighbour) { return neighbour.rank == rank; };
   return rank == exchange.rank || std::any_of(exchange.neighbours.begin(), exchange.neighbours.end(), same);
 }
 

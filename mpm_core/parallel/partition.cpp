@@ -2,7 +2,6 @@
 
 #include "parallel/agreement.h"
 #include "parallel/halo.h"
-#include "parallel/row_slice.h"
 
 #ifdef TALUS_SCOTCH
 #include <cstdio> // which scotch.h needs before it

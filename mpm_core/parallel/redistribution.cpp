@@ -1,7 +1,5 @@
 #include "parallel/redistribution.h"
 
-#include "parallel/lists.h"
-
 #include <algorithm>
 #include <numeric>
 
@@ -17,7 +15,7 @@ std::vector<int> partners(const NodeExchange& exchange, const std::vector<Migrat
   Lists counts(static_cast<std::size_t>(exchange.size));
   for (const MigratingParticle& migrant : migrating)
     counts[static_cast<std::size_t>(migrant.rank)].resize(1, 1);
-  const Lists received = exchanged(counts, exchange.comm);
+  const Lists received = exchange_lists(counts, exchange.comm);
   std::vector<int> ranks;
   for (std::size_t r = 0; r < counts.size(); ++r)
     if (!counts[r].empty() || !received[r].empty())

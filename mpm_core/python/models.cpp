@@ -116,6 +116,27 @@ std::unique_ptr<Model<G>> new_model(const Mesh<D>& mesh, std::vector<Law> laws, 
   return model;
 }
 
+/// Rank and row of the first holder of each wanted item, shape (n, 2); -1 where no rank has it.
+/// @note Collective
+py::array_t<GlobalIndex> first_holders(const py::array& numbers, const py::array& rows, const py::array& wanted,
+                                       std::uintptr_t comm)
+{
+  check_array<GlobalIndex>("numbers", numbers, {-1});
+  check_array<GlobalIndex>("rows", rows, {numbers.shape(0)});
+  check_array<GlobalIndex>("wanted", wanted, {-1});
+  const auto holders = find_holders(values<GlobalIndex>(numbers), values<GlobalIndex>(rows),
+                                    values<GlobalIndex>(wanted), communicator(comm));
+  py::array_t<GlobalIndex> result({static_cast<py::ssize_t>(holders.size()), py::ssize_t{2}});
+  auto first = result.mutable_unchecked<2>();
+  for (py::ssize_t k = 0; k < result.shape(0); ++k)
+  {
+    const auto& found = holders[static_cast<std::size_t>(k)];
+    first(k, 0) = found.empty() ? -1 : found.front().rank;
+    first(k, 1) = found.empty() ? -1 : found.front().row;
+  }
+  return result;
+}
+
 template <int D>
 void bind_mesh(py::module_& m, const std::string& suffix)
 {
@@ -395,6 +416,7 @@ void bind_model(py::module_& m, const std::string& suffix)
 
 void bind_models(py::module_& m)
 {
+  m.def("first_holders", &first_holders);
   enum class Geometry
   {
     plane_strain,

@@ -21,7 +21,7 @@ from .description import parsed
 from .far_field import require_border
 from .field_contact import set_field_contacts
 from .fingerprint import fingerprint, mesh_fingerprint
-from .rows import found
+from .rows import find_items
 from .step_control import StepControl
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _state(model: Model, file: CheckpointFile, path: str) -> tuple[Arrays, Array
     equal_part = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
     particles = file.particles(columns, equal_part)
     own = _own_cells(model)
-    owners, _ = found(comm, own, np.arange(len(own)), particles["cell"])
+    owners, _ = find_items(comm, own, np.arange(len(own)), particles["cell"])
     collectively(comm, lambda: _require_owners(path, particles, owners), RunError)
     return particles, {}, file.totals(widths["ranks"], slice(0, n_ranks)), np.ascontiguousarray(owners)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .collective import collectively
-from .rows import found, requested
+from .rows import find_items, request_rows
 from .views import mesh_text
 
 Tag = int | str | Sequence[int | str]
@@ -188,12 +188,12 @@ class Mesh:
         if other not in self._places:
             self._places[other] = self._places_of(other)
         ranks, places = self._places[other]
-        return requested(self.comm, ranks, places, lambda asked: rows[asked[:, 0]]).reshape(-1, *array.shape[1:])
+        return request_rows(self.comm, ranks, places, lambda asked: rows[asked[:, 0]]).reshape(-1, *array.shape[1:])
 
     def _places_of(self, other: "Mesh") -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Ranks and rows, (nodes,) and (nodes, 1), at which the same mesh under another partition has these nodes. Collective."""
         known = np.unique(other.cells[: other.owned_cells])
-        ranks, rows = found(self.comm, other.global_nodes[known], known, self.global_nodes)
+        ranks, rows = find_items(self.comm, other.global_nodes[known], known, self.global_nodes)
 
         def require_all() -> None:
             if absent := self.global_nodes[ranks < 0].tolist():

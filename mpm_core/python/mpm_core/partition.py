@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError
 from .mesh import Mesh
-from .rows import exchanged, found
+from .rows import exchange_rows, find_items
 from .two_phase import set_impervious
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def repartition(body: Body) -> None:
 def is_partition(body: Body, cells: NDArray) -> bool:
     """Whether each cell of the mesh is among the numbers that the ranks give, once. Collective."""
     mesh, comm = body.mesh, body.comm
-    ranks, _ = found(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
+    ranks, _ = find_items(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
     missing = comm.allreduce(int((ranks < 0).sum()))
     return missing == 0 and comm.allreduce(len(cells)) == comm.allreduce(mesh.owned_cells)
 
@@ -70,7 +70,7 @@ def is_partition(body: Body, cells: NDArray) -> bool:
 def take_partition(body: Body, cells: NDArray) -> None:
     """Bring the model to a partition, given by the numbers of the cells that this rank is to own, in their order. Collective."""
     mesh, comm = body.mesh, body.comm
-    ranks, order = found(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
+    ranks, order = find_items(comm, cells, np.arange(len(cells)), mesh.global_cells[: mesh.owned_cells])
     take_mesh(body, redistributed(mesh, ranks, order), ranks)
 
 
@@ -116,7 +116,7 @@ def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
     ]).astype(np.int64, copy=False)  # fmt: skip
     wanted = np.column_stack([ranks, np.where(neighbours < 0, ranks[:, None], ghosted[neighbours])])
     pairs = np.unique(np.column_stack([np.repeat(np.arange(n), d + 2), wanted.ravel()]), axis=0)
-    rows, _ = exchanged(comm, pairs[:, 1], whole[pairs[:, 0]])
+    rows, _ = exchange_rows(comm, pairs[:, 1], whole[pairs[:, 0]])
 
     ghost = rows[:, 1] != comm.rank
     rows = rows[np.lexsort([np.where(ghost, rows[:, 0], rows[:, 2]), ghost])]

@@ -8,8 +8,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from . import _core
 
-def exchanged(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, NDArray]:
+
+def exchange_rows(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, NDArray]:
     """Send each row to a rank; returns the rows that came, by rising rank and in the order of that rank, and their ranks.
 
     Args:
@@ -30,7 +32,7 @@ def exchanged(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, N
     return came, np.repeat(np.arange(comm.size), received)
 
 
-def requested(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable[[NDArray], NDArray]) -> NDArray:
+def request_rows(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable[[NDArray], NDArray]) -> NDArray:
     """Send each rank its requests, a row each; returns its replies, a row each, in the order of the requests.
 
     Args:
@@ -42,15 +44,15 @@ def requested(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable
     Note:
         Collective.
     """
-    came, senders = exchanged(comm, ranks, requests)
-    replies, _ = exchanged(comm, senders, reply(came))
+    came, senders = exchange_rows(comm, ranks, requests)
+    replies, _ = exchange_rows(comm, senders, reply(came))
     back = np.empty_like(replies)
     back[np.argsort(ranks, kind="stable")] = replies
     return back
 
 
-def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> tuple[NDArray, NDArray]:
-    """Find items by their global numbers; rank (number mod size) keeps the directory.
+def find_items(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> tuple[NDArray, NDArray]:
+    """Find items by their global numbers; the core keeps the directory.
 
     Args:
         comm: the ranks that take part.
@@ -64,18 +66,6 @@ def found(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> t
     Note:
         Collective.
     """
-    entries = np.column_stack([numbers, np.full(len(numbers), comm.rank), rows]).astype(np.int64)
-    came, _ = exchanged(comm, entries[:, 0] % comm.size, entries)
-    known, first = np.unique(came[:, 0], return_index=True)
-
-    def places(asked: NDArray) -> NDArray:
-        at = np.searchsorted(known, asked[:, 0])
-        there = np.flatnonzero(at < len(known))
-        there = there[known[at[there]] == asked[there, 0]]
-        reply = np.full((len(asked), 2), -1)
-        reply[there] = came[first[at[there]], 1:]
-        return reply
-
-    requests = wanted.astype(np.int64)[:, None]
-    ranks, rows = requested(comm, requests[:, 0] % comm.size, requests, places).T
-    return ranks, rows
+    whole = (np.ascontiguousarray(one, np.int64) for one in (numbers, rows, wanted))
+    ranks, places = _core.first_holders(*whole, MPI._addressof(comm)).T
+    return ranks, places
