@@ -28,7 +28,7 @@ template <int D>
 std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
                                              const std::array<const DualStress<D>*, D + 1>& nodes)
 {
-  // Nodes, and the cell's share, that no particle has any weight in leave theirs to the others
+  // Nodes, and the cell's part, that no particle has any weight in leave theirs to the others
   const double own = cell.volume > 0 ? dual_fraction * bubble_mean<D> : 0;
   double known = 0;
   for (const DualStress<D>* node : nodes)

@@ -3,12 +3,12 @@
 /// The dual domain material point method (Zhang, Ma & Giguere 2011, J. Comput. Phys. 230, 6379): gradients of the shape
 /// functions that are continuous over the sides of cells.
 ///
-/// Of the gradient dN_i/dx at a place x, a share a(x) is that of the cell and the rest is taken from the nodes j of the
-/// cell, N_j(x) times the mean of dN_i/dx over the cells that share j. The share is a bubble, zero on all sides of the
-/// cell, so that a particle on its way into the next cell finds there what it had. All sums stay within a particle's
-/// cell and its nodes, on simplices as on any element.
+/// Of the gradient dN_i/dx at a place x, a fraction a(x) is that of the cell and the rest is taken from the nodes j of
+/// the cell, N_j(x) times the mean of dN_i/dx over the cells that share j. This fraction is a bubble, zero on all sides
+/// of the cell, so that a particle on its way into the next cell finds there what it had. All sums stay within a
+/// particle's cell and its nodes, on simplices as on any element.
 ///
-/// The stresses of the cell's share and of each node are means with the particles as weights, not sums. So a uniform
+/// The stresses of the cell's part and of each node are means with the particles as weights, not sums. So a uniform
 /// stress gives the exact force however unevenly the particles fill the cells.
 
 #include "mesh/mesh.h"
@@ -68,7 +68,7 @@ template <int D>
 void add_dual_stress(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
                      DualStress<D>& cell, const std::array<DualStress<D>*, D + 1>& nodes);
 
-/// The mean stress that a cell integrates: its own share and that of its nodes.
+/// The mean stress that a cell integrates: its own part and that of its nodes.
 template <int D>
 std::array<double, n_symmetric<D>> dual_mean(const DualStress<D>& cell,
                                              const std::array<const DualStress<D>*, D + 1>& nodes);

@@ -24,7 +24,7 @@ from .parameters import write_parameters
 
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""
-ROOM = 1 << 16
+RESERVED = 1 << 16
 """Bytes reserved on the disk, so that there is a summary however full it becomes."""
 NAMES = ("summary.json", "verification.json", "history.csv", "checkpoint.h5", "report.html")
 """By which results are known in a folder without that file."""
@@ -196,7 +196,9 @@ def _locked(folder: Path, keeps: bool, overwrite: bool) -> str | None:
             _remove(folder / name)
     others = sorted((names if known else names - set(NAMES)) - earlier - {"parameters.toml"})
     now = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    _store(lock, {"host": socket.gethostname(), "process": os.getpid(), "started": now, "there_before": others}, ROOM)
+    _store(
+        lock, {"host": socket.gethostname(), "process": os.getpid(), "started": now, "there_before": others}, RESERVED
+    )
     _locks[folder] = lock
     return None
 

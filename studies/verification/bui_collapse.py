@@ -21,7 +21,7 @@ RUN_OUT = SURFACE[-1, 0]
 THIN = 0.01  # m
 SIDE, GROUND = 1, 3
 TIME = 1.0  # s
-PIC_SHARE = 0.006
+PIC_FRACTION = 0.006
 """Of a critical time step"""
 
 
@@ -40,7 +40,7 @@ def run(quick: bool, folder) -> Result:
 
     # --- 2. Let go at once ------------------------------------------------------------------------------------------
     model.set_gravity((0.0, -9.81))
-    *_, report = model.explicit(TIME, pic=PIC_SHARE)
+    *_, report = model.explicit(TIME, pic=PIC_FRACTION)
 
     # --- 3. The final surface: the highest particle in each strip of a cell's width ---------------------------------
     x = np.concatenate(comm.allgather(model.particles.position))

@@ -68,7 +68,7 @@ class Beam:
 
     def __init__(self, squares: int, moving_mesh: bool) -> None:
         self.moving_mesh, self.h = moving_mesh, HEIGHT / squares
-        # Room for the whole way, or for that of one step.
+        # Space for the whole way, or for that of one step.
         beside, below, above = (0.5, 0.5, 0.5) if moving_mesh else (1.0, 7.0, 1.0)
         beside, below, above = (int(squares * height) for height in (beside, below, above))
         sides = np.array([round(LENGTH / self.h) + beside, below + squares + above])

@@ -59,10 +59,10 @@ def at_rest(cell: float, degree: int) -> list[Check]:
     scale = case.model.comm.allreduce(float(np.abs(fem.displacement.x.array).max()), MPI.MAX)
     list(case.model.explicit(REST, courant=0.5))
     name = "linear elements" if degree == 1 else "quadratic elements"
-    strayed = moved(case, np.zeros_like(case.model.particles.displacement)) / scale
+    drift = moved(case, np.zeros_like(case.model.particles.displacement)) / scale
     return [
         Check(f"out-of-balance ratio, {name}", 0.0, IDENTITY, report.unbalanced_ratio, 1e-8, scale=1.0),
-        Check(f"motion in {REST:g} s without damping, {name}", 0.0, f"{IDENTITY}; over that of the elements", strayed,
+        Check(f"motion in {REST:g} s without damping, {name}", 0.0, f"{IDENTITY}; over that of the elements", drift,
               1e-5, scale=1.0),
     ]  # fmt: skip
 

@@ -17,7 +17,7 @@ up to a fifth farther.
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from lube_runout import FRICTION, GRAVITY, PIC_SHARE, REPOSE, column
+from lube_runout import FRICTION, GRAVITY, PIC_FRACTION, REPOSE, column
 from lube_runout import WIDTH as RADIUS
 from mpi4py import MPI
 
@@ -49,7 +49,7 @@ def collapsed(ratio, cells, friction):
 
     # --- 2. Let go, until well after it has come to rest ------------------------------------------------------------
     fall = np.sqrt(2 * ratio * RADIUS / GRAVITY)
-    list(model.explicit(4 * fall + 2 * np.sqrt(RADIUS / GRAVITY), pic=PIC_SHARE))
+    list(model.explicit(4 * fall + 2 * np.sqrt(RADIUS / GRAVITY), pic=PIC_FRACTION))
 
     # --- 3. The foot, as of the columns in a channel, and the top ----------------------------------------------------
     x, y = np.concatenate(comm.allgather(model.particles.position)).T

@@ -27,7 +27,7 @@ import mpm_core as mpm
 WIDTH, REPOSE = 0.1, 31.0  # m, degrees: sand
 FRICTION = np.degrees(np.arcsin(np.tan(np.radians(REPOSE))))
 SAND = mpm.MohrCoulomb(young=0.5e6, poisson=0.3, cohesion=0.0, friction_angle=FRICTION)
-PIC_SHARE, LARGER_SHARE = 0.006, 0.02  # of a critical time step
+PIC_FRACTION, LARGER_FRACTION = 0.006, 0.02  # of a critical time step
 SIDE, GROUND, GRAVITY = 1, 3, 9.81
 RATIOS = (0.5, 1.0, 1.5, 3.0, 4.5, 6.0)
 
@@ -79,16 +79,16 @@ def run(quick: bool, folder) -> Result:
     # --- 4. The friction of the sand, and its columns ---------------------------------------------------------------
     checks = [Check("friction of a layer that shears", np.tan(np.radians(REPOSE)), f"angle of repose of {REPOSE:g}°",
                     layer_friction(), 1e-3)]  # fmt: skip
-    series = [(f"PIC {PIC_SHARE:.1%}", (1.0,) if quick else RATIOS, 1, PIC_SHARE)]
+    series = [(f"PIC {PIC_FRACTION:.1%}", (1.0,) if quick else RATIOS, 1, PIC_FRACTION)]
     if not quick:
         series += [
-            ("cells half as large", RATIOS[:3], 2, PIC_SHARE),
-            (f"PIC {LARGER_SHARE:.1%}", RATIOS, 1, LARGER_SHARE),
+            ("cells half as large", RATIOS[:3], 2, PIC_FRACTION),
+            (f"PIC {LARGER_FRACTION:.1%}", RATIOS, 1, LARGER_FRACTION),
         ]
     source, found = "experiments, Lube et al. 2005", {}
     for name, ratios, finer, pic in series:
         found[name] = [run_out(ratio, finer * (12 if ratio < 1.8 else 8), pic) for ratio in ratios], ratios
-        if pic == PIC_SHARE:
+        if pic == PIC_FRACTION:
             checks += [Check(f"run-out over the width, a = {ratio:g}, {name}", scaling(ratio), source, got, 0.2)
                        for got, ratio in zip(*found[name])]  # fmt: skip
 

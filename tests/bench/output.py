@@ -1,4 +1,4 @@
-"""What output and checkpoints cost: the share of frames in the time of a run, on all ranks that this runs on.
+"""What output and checkpoints cost: the fraction of frames in the time of a run, on all ranks that this runs on.
 
 Frames of all fields are written every so many explicit steps of the paper's slope. Beside them stands what the system takes to
 write as many bytes as a frame in single precision to a new plain file. On a virtual machine that can be nearly all of it: memory
@@ -80,12 +80,12 @@ def main() -> None:
     a = parser.parse_args()
     first = COMM.rank == 0
 
-    def tell(text: str) -> None:
+    def say(text: str) -> None:
         if first:
             print(text, flush=True)
 
-    tell(f"one frame in {a.every} steps, {COMM.size} rank(s)")
-    tell(
+    say(f"one frame in {a.every} steps, {COMM.size} rank(s)")
+    say(
         f"{'particles':>9} {'stored as':10} {'of the run':>12} {'ms per frame':>12} {'plain write':>12} {'MB per frame':>12} "
         f"{'checkpoint ms':>13}"
     )
@@ -107,7 +107,7 @@ def main() -> None:
                     if first:  # a disk is slow to make files where many have just been removed
                         for path in filter(Path.is_file, folder.glob("**/*")):
                             os.truncate(path, 0)
-                tell(f"{best['particles']:9d} {name:10} {best['frames'] / (best['steps'] + best['frames']):12.1%} "
+                say(f"{best['particles']:9d} {name:10} {best['frames'] / (best['steps'] + best['frames']):12.1%} "
                      f"{1e3 * best['frames'] / a.frames:12.2f} {1e3 * best['plain'] / a.frames:12.2f} "
                      f"{best['bytes'] / 1e6:12.2f} {1e3 * best['checkpoint']:13.1f}")  # fmt: skip
         COMM.barrier()

@@ -147,7 +147,7 @@ def test_relaxation_does_not_depend_on_the_number_of_ranks():
 
 
 def test_a_slope_on_a_mesh_of_gmsh_slides_alike_on_any_number_of_ranks():
-    """A thousand steps without damping, on DOLFINx's partition and cut anew."""
+    """A thousand steps without damping, on DOLFINx's partition and after a repartition."""
     runs = []
     for comm, threshold in ((COMM, 1.2), (MPI.COMM_SELF, None)):
         parts = bridge.read_mesh(MESHES / "slope.geo", comm, 2, {"cell_size": 0.1})

@@ -1,4 +1,4 @@
-"""Output on several ranks: each writes its share, and an error on one is one on all."""
+"""Output on several ranks: each writes its particles, and an error on one is one on all."""
 
 import h5py
 import meshio

@@ -1,4 +1,4 @@
-"""The mesh cut anew while soil slides: ranks have about as many particles, and nothing else changes."""
+"""The mesh is repartitioned while soil slides: ranks have about as many particles, and nothing else changes."""
 
 import h5py
 import numpy as np

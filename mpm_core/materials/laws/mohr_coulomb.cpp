@@ -19,7 +19,7 @@ namespace
 /// it would be slow, and might round differently, so that a point's result would depend on its neighbours.
 constexpr std::size_t lanes = 8;
 
-/// Share of candidates in a block from which on all of its points are treated as such, where they are: setting them
+/// Fraction of candidates in a block from which on all of its points are treated as such, where they are: setting them
 /// side by side would cost more than the points that do not yield after all.
 constexpr double dense_fraction = 0.45;
 

@@ -53,7 +53,7 @@ def test_multigrid_solves_the_tangent_of_yielding_soil(monkeypatch):
 
 
 def condition(shift, ghost):
-    """Condition number of the tangent of a block that has moved across the cells by a share of one; what sticks out into cells
+    """Condition number of the tangent of a block that has moved across the cells by a fraction of one; what sticks out into cells
     that are less than half full has failed in tension, and has no stiffness of its own."""
     n, per_side, h = 8, 6, 1 / 8
     soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1.0, friction_angle=30.0)

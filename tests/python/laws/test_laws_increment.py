@@ -1,4 +1,4 @@
-"""What laws are told of an increment: time, duration, size of the cell, deformation gradient; for particles and elements."""
+"""What laws get of an increment: time, duration, size of the cell, deformation gradient; for particles and elements."""
 
 import subprocess
 

@@ -147,7 +147,7 @@ def test_drained_strength_of_hencky_is_that_of_the_kirchhoff_stress(name):
 
 
 def admissible_excess(law, stress, state):
-    """How far stresses are outside of the strength, as a share of their size."""
+    """How far stresses are outside of the strength, as a fraction of their size."""
     if isinstance(law, mpm.Undrained):
         effective = stress + state[:, -1:] * (np.arange(stress.shape[1]) < 3)
         return admissible_excess(law.skeleton, effective, state[:, :-1])

@@ -1,4 +1,4 @@
-"""A disk that fills up: what was computed is told, the reason is the last line, and pictures cost only themselves."""
+"""A disk that fills up: what was computed is stored, the reason is the last line, and pictures cost only themselves."""
 
 import contextlib
 import json

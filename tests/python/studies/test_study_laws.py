@@ -84,7 +84,7 @@ def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
         assert run["initial_out_of_balance_ratio"] < 1e-6
         assert run["time_s"] == 3 or run["at_rest"]
         last = (tmp_path / f"history_{size.removesuffix('_m')}.csv").read_text().splitlines()[-1]
-        assert float(last.split(",")[5]) > 0  # share of particles that yield
+        assert float(last.split(",")[5]) > 0  # fraction of particles that yield
         assert float(last.split(",")[3]) > 0
     for name in ("meshes.png", "history_0.5.csv", "displacement_1.png"):
         assert (tmp_path / name).stat().st_size > 0
