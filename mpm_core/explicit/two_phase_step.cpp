@@ -25,6 +25,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
 
   // Particles to nodes: masses (11), momenta, forces of effective stresses (14) and tractions (15); of pore pressures
   clock.begin(Phase::node_sums);
+  model.water->time = model.time;
   map_to_nodes(model);
   find_start_velocity(soil);
   find_start_velocity(water.motion);

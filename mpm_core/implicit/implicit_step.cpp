@@ -8,6 +8,7 @@
 #include "implicit/ghost.h"
 #include "implicit/inertia.h"
 #include "implicit/internal_force.h"
+#include "implicit/pore_drying.h"
 #include "implicit/pore_preparation.h"
 #include "implicit/pore_update.h"
 #include "implicit/pore_water.h"
@@ -42,6 +43,8 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.options = options;
   step.time = model.time;
   step.length = dt;
+  if (model.water)
+    model.water->time = model.time + dt;
   field.integration.kind = options.integration;
   field.integration.averaged_by_law.assign(options.average_stress ? model.laws.size() : 0, 1.0);
   map_to_nodes(model); // (11), (15)
@@ -88,6 +91,8 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
     average_stresses<G>(mesh, exchange, field, step.stress);
   if (step.pore.flows)
     update(step.halos.nodes, step.pore.rate);
+  if (model.water && model.water->may_dry())
+    try_drying(mesh, model.particles, model.order.runs, field, *model.water, step);
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);
@@ -120,7 +125,7 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
   add_inertia_entries(field, step, system.owned, stiffness);
   add_border_entries(field.far_field, system, stiffness);
   add_support_entries(system, stiffness);
-  add_pore_entries(mesh, step, stiffness);
+  add_pore_entries(mesh, field, step, stiffness);
   if (!step.options.nmd)
     return;
   volumetric_force_entries(mesh, step, system, tangent.volumetric_force);
@@ -204,8 +209,14 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   model.time += step.dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();
-  if (options.quasi_static && !step.pore.flows) // what the loads do beyond the stresses' work goes nowhere
+  const bool books = step.pore.flows && !model.water->may_dry(); // the energy of suction has no account
+  if (options.quasi_static && !books) // what the loads do beyond the stresses' work goes nowhere
     start_energy_balance(model);
+  if (model.water && model.water->may_dry()) // the masses have changed
+  {
+    model.ready = false;
+    prepare(model);
+  }
   map_to_nodes_again(model);
   return true;
 }

@@ -19,15 +19,8 @@ template <int D>
 struct PoreSums
 {
   double volume = 0;     ///< 1
-  double pressure = 0;   ///< p
   double mobility = 0;   ///< k / gamma_w
-  double compliance = 0; ///< 1 / M + n / K_w, the compliance of the soil without drainage
-};
-
-/// Means over the particles around a node; plain doubles.
-struct NodalWater
-{
-  double volume, pressure, mobility, compliance;
+  double compliance = 0; ///< 1 / M + n / K_w + n dS/dp, the compliance of the soil without drainage
 };
 
 double longest_edge_squared(const auto& points, const auto& cell)
@@ -49,14 +42,19 @@ template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
                   double modulus, double factor, PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
 {
+  const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
   const auto n = shape_functions<D>(mesh.shapes[run.cell], x);
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
-  const double mobility = particles.conductivity[0][p] / water.unit_weight, compliance = 1 / modulus + storage;
+  const double mobility = particles.conductivity[0][p] / water.unit_weight;
+  double compliance = 1 / modulus + storage;
+  if (dries)
+    compliance += particles.porosity[0][p] *
+                  wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
+  add_pore_load(mesh.shapes[run.cell], particles, water, run.material, p, volume, cell.load);
   sums.volume += volume;
-  sums.pressure += volume * pressure;
   sums.mobility += volume * mobility;
   sums.compliance += volume * compliance;
   for (int k = 0; k <= D; ++k)
@@ -66,7 +64,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
     for (int a = 0; a < D; ++a)
       there += particles.pressure_gradient[a][p] * (mesh.points[node][a] - x[a]);
     cell.mean[k] += volume * n[k];
-    for (int l = 0; l <= D; ++l)
+    for (int l = 0; l <= D && !dries; ++l)
       cell.capacity[k][l] += volume * storage * n[k] * n[l];
     const double weight = volume * n[k];
     NodalWater& sum = nodes[node];
@@ -109,7 +107,6 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   {
     PoreCell<D>& cell = step.pore.cells[c];
     const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
-    cell.pressure = of_cell.pressure;
     cell.flux = step.dt * of_cell.mobility;
     cell.compliance = of_cell.compliance;
     add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
@@ -154,8 +151,11 @@ void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<
     for (std::size_t i = 0; i < on_facet.size(); ++i)
       if (on_facet[i] > 0 && step.active[i])
       {
+        const double pressure = pressure_at(condition, mesh.points[i][D - 1], model.water->time);
+        if (model.water->may_dry() && condition.slope != 0 && pressure <= 0)
+          continue; // dry ground beside the water
         pore.held[i] = 1;
-        pore.prescribed[i] = pressure_at(condition, mesh.points[i][D - 1]);
+        pore.prescribed[i] = pressure;
       }
   }
 }
@@ -197,20 +197,16 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
 {
   auto& pore = step.pore;
   pore.cells.clear();
-  pore.flows = false;
+  pore.surface.clear();
+  pore.flows = pore.drained = false;
   if (!model.water)
     return;
   std::vector<NodalWater> nodes = sum_particles(model, step);
   if (step.options.at_rest)
     return;
   sum_shared(model.exchange, nodes);
-  if (model.water->drained_surface)
-  {
-    std::vector<double> filled(nodes.size());
-    std::ranges::transform(nodes, filled.begin(), [](const NodalWater& node) { return node.volume; });
-    drain_surface(model.mesh, model.exchange, filled, step);
-  }
   pore.start.assign(nodes.size(), 0.0);
+  pore.rate.assign(nodes.size(), 0.0);
   for (std::size_t i = 0; i < nodes.size(); ++i)
     if (NodalWater& node = nodes[i]; node.volume > 0)
     {
@@ -218,6 +214,9 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
       node.mobility /= node.volume;
       node.compliance /= node.volume;
     }
+  pore.drained = model.water->drained_surface;
+  if (pore.drained)
+    find_surface(model.mesh, model.exchange, nodes, *model.water, step);
   update(step.halos.nodes, pore.start);
   weigh_ghosts(nodes, step);
   pore.flows = true;
@@ -226,10 +225,9 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   pore.unit = 0;
   for (const Law& law : model.laws)
     pore.unit = std::max(pore.unit, p_wave_modulus(law));
-  pore.rate.assign(nodes.size(), 0.0);
   hold_pressures(model, model.exchange, step);
   impose_pressures(step.dt, pore);
-  if (std::isinf(model.water->modulus) &&
+  if (std::isinf(model.water->modulus) && !model.water->may_dry() &&
       pressure_is_free(model.mesh, model.exchange, model.fields.front(), step, model.water->drained_surface))
     throw InputError("no pore pressure is prescribed, the water is incompressible and supports are all around: the "
                      "pressure is undetermined; prescribe one by hold_pore_pressure(), or let water be compressible");

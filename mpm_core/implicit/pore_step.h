@@ -2,7 +2,7 @@
 /// @file
 /// The pore water of an implicit step, as plain data; docs/implicit.md has the equations (W1) to (W4).
 
-#include "mesh/mesh.h"
+#include "model/pore_forces.h"
 
 #include <numeric>
 
@@ -12,26 +12,62 @@ namespace mpm::implicit
 template <int D>
 struct PoreCell
 {
-  double pressure;                ///< sum V p at the start [N m]
+  PoreLoad<D> load;               ///< of the pressures at the start, and of standing water
   double flux;                    ///< sum V k dt / gamma_w [m5/Pa]
   double compliance;              ///< sum V (1 / M + n / K_w), of the soil without drainage [m3/Pa]
   double grains;                  ///< largest 1 - n of its particles: a volume below that has no pores
   std::array<double, D + 1> mean; ///< W_k = sum V N_k [m3]
   /// Volume of water by the pressure increments: storage, and the pressure projection [m3/Pa]
   std::array<std::array<double, D + 1>, D + 1> capacity;
-  /// Volume of water that leaves at the free surface, by the pressures at the end [m3/Pa]
-  std::array<std::array<double, D + 1>, D + 1> outflow;
+};
+
+/// What the particles of a cell whose soil may dry contribute under the iterate, in the place of the sums at the start.
+template <int D>
+struct DryingCell
+{
+  double pressure;                       ///< sum V (S_e p - p_s) [N m]
+  std::array<double, D + 1> by_pressure; ///< its derivatives by the pressures of the vertices [m3]
+  std::array<double, D + 1> content;     ///< water that is stored by the end, less that at the start [m3]
+  std::array<double, D + 1> wet;         ///< sum V S N_k, its derivatives by the volumetric strain [m3]
+  std::array<std::array<double, D + 1>, D + 1> capacity; ///< and by the pressures, without the projection [m3/Pa]
+  double flux;                                           ///< sum V k_r k dt / gamma_w [m5/Pa]
+  std::array<double, D + 1> flux_by_pressure;            ///< [m5/Pa2]
+};
+
+/// Means over the particles around a node, over all ranks, the pressure and the others by volume; plain doubles.
+struct NodalWater
+{
+  double volume;     ///< sum V N_i [m3]
+  double pressure;   ///< [Pa]
+  double mobility;   ///< k / gamma_w [m4/Ns]
+  double compliance; ///< of the soil without drainage [1/Pa]
+};
+
+/// A part of the free surface within a cell, by its middle.
+template <int D>
+struct SurfacePoint
+{
+  Index cell;
+  std::array<double, D + 1> shape; ///< N_k there
+  double weight;   ///< outflow over a step by the pressure above that of the water that stands there [m3/Pa]
+  double standing; ///< pressure of that water [Pa]
+  double rain;     ///< that falls in the step [m3]
+  bool open;       ///< whether water also enters as the pressure says: under standing water
+  bool takes_rain; ///< whether it does not, and takes no more than the rain; see `revise_surface`
 };
 
 /// Flow of the pore water over a step. The unknowns are pressure increments dp = dt rate at the nodes.
 template <int D>
 struct PoreStep
 {
-  bool flows = false; ///< whether pressures are unknowns of the step; otherwise they stay as they are
-  double unit = 1;    ///< of the pressures in the linear system [Pa]
-  double density = 0; ///< of water [kg/m3]
+  bool drained = false; ///< whether water leaves at the free surface
+  bool flows = false;   ///< whether pressures are unknowns of the step; otherwise they stay as they are
+  double unit = 1;      ///< of the pressures in the linear system [Pa]
+  double density = 0;   ///< of water [kg/m3]
   Vector<D> gravity{};
-  std::vector<PoreCell<D>> cells;  ///< of each owned cell
+  std::vector<PoreCell<D>> cells;    ///< of each owned cell
+  std::vector<DryingCell<D>> drying; ///< likewise, under the iterate; empty where all soil stays saturated
+  std::vector<SurfacePoint<D>> surface;
   std::vector<double> ghosts;      ///< weight of each stabilised facet [m5/Pa]
   std::vector<double> start;       ///< pressure of each node at the start [Pa]
   std::vector<double> rate;        ///< of the iterate [Pa/s]
@@ -52,5 +88,23 @@ template <int D>
 inline double end_pressure(const PoreStep<D>& pore, Index node, double dt)
 {
   return pore.start[static_cast<std::size_t>(node)] + dt * pore.rate[static_cast<std::size_t>(node)];
+}
+
+/// Pressure at a point of the free surface at the end of the step, under the iterate, over that of standing water [Pa].
+template <int D>
+inline double excess_pressure(const Mesh<D>& mesh, const PoreStep<D>& pore, const SurfacePoint<D>& point, double dt)
+{
+  double pressure = -point.standing;
+  for (int k = 0; k <= D; ++k)
+    pressure += point.shape[k] * end_pressure(pore, mesh.cells[point.cell][k], dt);
+  return pressure;
+}
+
+/// Water that leaves at the surface over the step [m3]: as much as keeps the pressure close to that of standing water
+/// or, where no water stands and the soil takes all the rain that falls, that rain.
+template <int D>
+inline double outflow_at(const SurfacePoint<D>& point, double excess)
+{
+  return point.takes_rain ? -point.rain : point.weight * excess;
 }
 } // namespace mpm::implicit

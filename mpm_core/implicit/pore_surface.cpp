@@ -9,6 +9,9 @@ namespace
 {
 constexpr double penalty = 100;
 
+/// By how much a pressure at the surface may be on the wrong side [Pa].
+constexpr double slack = 1e-3;
+
 /// Filled fraction up to which a node at an empty cell is at the surface, though the cells below may be a little too
 /// full; above it the cell is a gap between particles within the soil.
 constexpr double most_at_surface = 0.7;
@@ -28,13 +31,13 @@ double distance(double fraction)
 
 /// Distances at all nodes; those next to zero are zero.
 template <class G, int D = G::dim>
-std::vector<double> distances(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const double> filled,
+std::vector<double> distances(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const NodalWater> nodes,
                               const ImplicitStep<G>& step)
 {
   std::vector<unsigned char> has_soil(static_cast<std::size_t>(mesh.owned_cells), 0);
   for (Index c : step.cells)
     has_soil[static_cast<std::size_t>(c)] = 1;
-  std::vector<Around> around(filled.size(), Around{});
+  std::vector<Around> around(nodes.size(), Around{});
   for (Index c = 0; c < mesh.owned_cells; ++c)
     for (Index node : mesh.cells[c])
     {
@@ -42,12 +45,12 @@ std::vector<double> distances(const Mesh<D>& mesh, NodeExchange& exchange, std::
       around[node].empty += has_soil[static_cast<std::size_t>(c)] ? 0 : 1;
     }
   sum_shared(exchange, around);
-  std::vector<double> result(filled.size(), -1.0);
+  std::vector<double> result(nodes.size(), -1.0);
   for (std::size_t i = 0; i < result.size(); ++i)
   {
     if (around[i].volume == 0)
       continue;
-    const double fraction = filled[i] / around[i].volume;
+    const double fraction = nodes[i].volume / around[i].volume;
     result[i] = distance(fraction);
     if (std::abs(result[i]) < 1e-3 || (result[i] > 0 && around[i].empty > 0 && fraction < most_at_surface))
       result[i] = 0;
@@ -101,31 +104,108 @@ double measure(const Mesh<D>& mesh, Index cell, const Cut<D>& cut)
 }
 } // namespace
 
-template <class G, int D>
-void drain_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const double> filled, ImplicitStep<G>& step)
+namespace
 {
-  const std::vector<double> d = distances<G>(mesh, exchange, filled, step);
-  for (Index c : step.cells)
+/// Height that the surface gains per length of its upward normal: the area of its plan over its own.
+template <int D>
+double upward(const Mesh<D>& mesh, Index cell, const std::array<double, D + 1>& distance)
+{
+  Vector<D> inward{};
+  for (int k = 0; k <= D; ++k)
+    for (int a = 0; a < D; ++a)
+      inward[a] += distance[k] * mesh.shapes[cell].gradient[k][a];
+  const double length = norm<D>(inward);
+  return length > 0 ? std::max(0.0, -inward[D - 1] / length) : 0;
+}
+/// Outflow over a step by pressure, per area: from the cell's own soil, or from that around its nodes where it has
+/// none.
+template <class G, int D = G::dim>
+double outflow_per_area(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::span<const NodalWater> nodes, Index c)
+{
+  const PoreCell<D>& cell = step.pore.cells[c];
+  const double h = cell_size<D>(mesh.shapes[c].volume), volume = volume_of(cell);
+  if (volume > 0)
+    return penalty * (cell.flux / h + cell.compliance * h) / volume;
+  double largest = 0;
+  for (Index node : mesh.cells[c])
+    largest = std::max(largest, step.dt * nodes[node].mobility / h + nodes[node].compliance * h);
+  return penalty * largest;
+}
+
+/// Gives the nodes of soil their parts of a point of the surface in a cell without particles.
+template <class G, int D = G::dim>
+void add_at_nodes(const Mesh<D>& mesh, const SurfacePoint<D>& point, ImplicitStep<G>& step)
+{
+  double there = 0;
+  for (int k = 0; k <= D; ++k)
+    there += step.active[mesh.cells[point.cell][k]] ? point.shape[k] : 0;
+  for (int k = 0; k <= D; ++k)
+    if (step.active[mesh.cells[point.cell][k]] && point.shape[k] > 0)
+    {
+      SurfacePoint<D> at_node = point;
+      at_node.shape = {};
+      at_node.shape[k] = 1;
+      at_node.weight *= point.shape[k] / there;
+      at_node.rain *= point.shape[k] / there;
+      step.pore.surface.push_back(at_node);
+    }
+}
+} // namespace
+
+template <class G, int D>
+void find_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const NodalWater> nodes,
+                  const PoreWater& water, ImplicitStep<G>& step)
+{
+  const std::vector<double> d = distances<G>(mesh, exchange, nodes, step);
+  const double rain = water.rain.empty() ? 0 : step.dt * value_at(water.rain, water.time);
+  for (Index c = 0; c < mesh.owned_cells; ++c)
   {
+    const bool has_soil = volume_of(step.pore.cells[c]) > 0;
     std::array<double, D + 1> of_cell;
     for (int k = 0; k <= D; ++k)
       of_cell[k] = d[mesh.cells[c][k]];
     const Cut<D> cut = cut_of<D>(of_cell);
-    if (cut.count == 0)
+    if (cut.count == 0 || !(has_soil || rain > 0))
       continue;
-    PoreCell<D>& cell = step.pore.cells[c];
-    const double h = cell_size<D>(mesh.shapes[c].volume);
-    const double per_area = penalty * (cell.flux / h + cell.compliance * h) / volume_of(cell);
-    const double each = per_area * measure(mesh, c, cut) * thickness<G>(mesh.shapes[c].centre) / cut.count;
+    const double area = measure(mesh, c, cut) * thickness<G>(mesh.shapes[c].centre) / cut.count;
+    const double plan = rain > 0 ? area * upward(mesh, c, of_cell) : 0;
     for (int i = 0; i < cut.count; ++i)
-      for (int k = 0; k <= D; ++k)
-        for (int l = 0; l <= D; ++l)
-          cell.outflow[k][l] += each * cut.points[i][k] * cut.points[i][l];
+    {
+      const double standing = standing_pressure(water, point_in_cell<D>(mesh, c, cut.points[i])[D - 1]);
+      const bool open = standing > 0 || !water.may_dry();
+      const double weight = area * outflow_per_area(mesh, step, nodes, c);
+      SurfacePoint<D> point{c, cut.points[i], weight, standing, rain * plan, open, false};
+      point.takes_rain = !open && excess_pressure(mesh, step.pore, point, 0) < 0;
+      if (has_soil)
+        step.pore.surface.push_back(point);
+      else if (!point.open)
+        add_at_nodes(mesh, point, step);
+    }
   }
 }
 
+template <class G, int D>
+bool revise_surface(const Mesh<D>& mesh, MPI_Comm comm, ImplicitStep<G>& step)
+{
+  int revised = 0;
+  for (SurfacePoint<D>& point : step.pore.surface)
+  {
+    if (point.open)
+      continue;
+    const double excess = excess_pressure(mesh, step.pore, point, step.dt);
+    const bool wrong = point.takes_rain ? point.weight * excess > -point.rain + slack * point.weight
+                                        : point.weight * excess < -point.rain - slack * point.weight;
+    point.takes_rain = point.takes_rain != wrong;
+    revised |= wrong;
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &revised, 1, MPI_INT, MPI_MAX, comm);
+  return revised != 0;
+}
+
 #define INSTANTIATE(G)                                                                                                 \
-  template void drain_surface(const Mesh<G::dim>&, NodeExchange&, std::span<const double>, ImplicitStep<G>&);
+  template void find_surface(const Mesh<G::dim>&, NodeExchange&, std::span<const NodalWater>, const PoreWater&,        \
+                             ImplicitStep<G>&);                                                                        \
+  template bool revise_surface(const Mesh<G::dim>&, MPI_Comm, ImplicitStep<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

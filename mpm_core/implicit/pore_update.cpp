@@ -99,6 +99,26 @@ double add_increments(Particles<D>& particles, double modulus, const Run& run, c
   }
   return work;
 }
+
+/// Lets saturation and mass follow the water that particles take up over the step.
+/// @pre pressures are those of the end, volumes and porosities of the start
+template <class G, int D = G::dim>
+void dry_particles(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double growth,
+                   const CellPressure<D>& pressure, const Vector<G::dim>& centre, Particles<D>& particles)
+{
+  const Retention& retention = water.retention[static_cast<std::size_t>(run.material)];
+  for (Index p = run.first; p < run.last; ++p)
+  {
+    double increment = pressure.increment;
+    for (int a = 0; a < D; ++a)
+      increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
+    const double porosity = particles.porosity[0][p], before = particles.saturation[0][p];
+    const double after = wetness_at(retention, particles.pore_pressure[0][p]).saturation;
+    const double gained = after * (growth + porosity / water.modulus * increment) + (after - before) * porosity;
+    particles.mass[p] += step.pore.density * particles.volume[p] * gained;
+    particles.saturation[0][p] = after;
+  }
+}
 } // namespace
 
 template <class G>
@@ -110,9 +130,14 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
   for (const Run& run : model.order.runs)
   {
     if (step.pore.flows)
-      model.energy.stress_work +=
-          add_increments<G::dim>(model.particles, model.water->modulus, run, mesh.shapes[run.cell].centre,
-                                 cell_pressure(mesh, model.fields.front(), step, run.cell));
+    {
+      const auto& centre = mesh.shapes[run.cell].centre;
+      const auto pressure = cell_pressure(mesh, model.fields.front(), step, run.cell);
+      model.energy.stress_work += add_increments<G::dim>(model.particles, model.water->modulus, run, centre, pressure);
+      if (model.water->may_dry())
+        dry_particles(run, *model.water, step, volume_strain(mesh, model.fields.front(), step.dt, run.cell), pressure,
+                      centre, model.particles);
+    }
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,
                          model.water->kozeny_carman);
@@ -137,13 +162,20 @@ void add_flow(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Imp
   for (Index c : step.cells)
   {
     const auto& nodes = mesh.cells[c];
+    const auto& load = pore.cells[c].load; // standing water works on the surface
+    totals.external_work += load.standing * volume_strain(mesh, field, step.dt, c);
     for (std::size_t k = 0; k < nodes.size(); ++k)
-      for (std::size_t l = 0; l < nodes.size(); ++l)
-        enter(-pore.cells[c].outflow[k][l] * end_pressure(pore, nodes[l], step.dt), nodes[k]);
+      totals.external_work += step.dt * load.buoyancy[k] * field.velocity[nodes[k]][G::dim - 1];
     const auto drive = driving_gradient(mesh, field, step, c);
     const auto weight = water_weight(mesh, field, step, c);
-    totals.external_work -= pore.cells[c].flux * dot<G::dim>(drive, weight);
-    totals.drag_work += pore.cells[c].flux * dot<G::dim>(drive, drive);
+    totals.external_work -= flux_of(pore, c) * dot<G::dim>(drive, weight);
+    totals.drag_work += flux_of(pore, c) * dot<G::dim>(drive, drive);
+  }
+  for (const auto& point : pore.surface)
+  {
+    const double outflow = outflow_at(point, excess_pressure(mesh, pore, point, step.dt));
+    for (std::size_t k = 0; k < point.shape.size(); ++k)
+      enter(-point.shape[k] * outflow, mesh.cells[point.cell][k]);
   }
 }
 

@@ -9,7 +9,7 @@ namespace mpm::implicit
 {
 /// Adds the increments of pressure to the particles, with what they store in the water, n V p dp / K_w, gives them the
 /// gradient at the end, and lets porosity follow the volume (grains do not change theirs) and, where the model says so,
-/// conductivity the porosity.
+/// conductivity the porosity. Where soil may dry its saturation follows the pressure, and its mass the water in it.
 /// @pre particles are where they were at the step's start
 template <class G>
 void update_pore_water(Model<G>& model, const ImplicitStep<G>& step);

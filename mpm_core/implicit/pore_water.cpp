@@ -1,4 +1,5 @@
 #include "implicit/pore_water.h"
+
 namespace mpm::implicit
 {
 template <class G>
@@ -38,17 +39,38 @@ Vector<G::dim> driving_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>
   return gradient;
 }
 
-namespace
-{
-/// Of the cell itself, whose vertices average it: also with nodal mixed discretisation, and where volumes do not
-/// change.
-template <class G, int D = G::dim>
+template <class G, int D>
 double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double dt, Index cell)
 {
   double strain = 0;
   for (int k = 0; k <= D; ++k)
     strain += dt * dot<D>(dilation_gradient<G>(mesh.shapes[cell], k), field.velocity[mesh.cells[cell][k]]);
   return strain;
+}
+
+namespace
+{
+/// Sum V (S_e p - p_s) of a cell under the iterate.
+template <class G, int D = G::dim>
+double pressure_of(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c)
+{
+  if (!step.pore.drying.empty())
+    return step.pore.drying[c].pressure;
+  double pressure = step.pore.cells[c].load.pressure;
+  for (int k = 0; k <= D && step.pore.flows; ++k)
+    pressure += step.pore.cells[c].mean[k] * step.dt * step.pore.rate[mesh.cells[c][k]];
+  return pressure;
+}
+
+template <class G, int D = G::dim>
+void add_surface_content(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<double>& content)
+{
+  for (const SurfacePoint<D>& point : step.pore.surface)
+  {
+    const double outflow = outflow_at(point, excess_pressure(mesh, step.pore, point, step.dt));
+    for (int k = 0; k <= D; ++k)
+      content[mesh.cells[point.cell][k]] += point.shape[k] * outflow;
+  }
 }
 
 template <class G, int D = G::dim>
@@ -74,14 +96,14 @@ void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vect
   for (Index c : step.cells)
   {
     const PoreCell<D>& cell = step.pore.cells[c];
-    double pressure = cell.pressure;
-    for (int k = 0; k <= D && step.pore.flows; ++k)
-      pressure += cell.mean[k] * step.dt * step.pore.rate[mesh.cells[c][k]];
+    const double pressure = pressure_of(mesh, step, c);
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D> dilation = dilation_gradient<G>(mesh.shapes[c], k);
+      Vector<D>& internal = forces[mesh.cells[c][k]].internal;
       for (int a = 0; a < D; ++a)
-        forces[mesh.cells[c][k]].internal[a] -= pressure * dilation[a];
+        internal[a] -= pressure * dilation[a];
+      internal[D - 1] -= cell.load.buoyancy[k];
     }
   }
 }
@@ -103,41 +125,75 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
     for (int k = 0; k <= D; ++k)
     {
       double& content = pore.content[nodes[k]];
-      content += cell.mean[k] * dilation;
-      content += cell.flux * dot<D>(mesh.shapes[c].gradient[k], drive);
+      content += pore.drying.empty() ? cell.mean[k] * dilation : pore.drying[c].content[k];
+      content += flux_of(pore, c) * dot<D>(mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
-        content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]] +
-                   cell.outflow[k][l] * end_pressure(pore, nodes[l], step.dt);
+        content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]];
     }
   }
+  add_surface_content(mesh, step, pore.content);
   add_ghost_content(step, pore.content);
   sum_shared(exchange, pore.content);
 }
 
 namespace
 {
-/// Derivatives of the water balance of vertex k of a cell by displacement and pressure of vertex l; see (W4).
+/// What leaves at the free surface by the pressures at the end [m3/Pa]: of each owned cell, and of nodes alone.
+template <int D>
+struct SurfaceEntries
+{
+  std::vector<std::array<std::array<double, D + 1>, D + 1>> cells; ///< empty where the surface is not drained
+  std::vector<double> nodes;
+};
+
 template <class G, int D = G::dim>
-void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, int k, int l, TangentSum<D>& tangent)
+SurfaceEntries<D> surface_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step)
 {
   const PoreStep<D>& pore = step.pore;
+  SurfaceEntries<D> entries;
+  if (!pore.drained)
+    return entries;
+  entries.cells.resize(pore.cells.size());
+  entries.nodes.resize(mesh.points.size());
+  for (const SurfacePoint<D>& point : pore.surface)
+    for (int k = 0; k <= D && !point.takes_rain; ++k)
+    {
+      if (volume_of(pore.cells[point.cell]) == 0)
+        entries.nodes[mesh.cells[point.cell][k]] += point.weight * point.shape[k];
+      for (int l = 0; l <= D; ++l)
+        entries.cells[point.cell][k][l] += point.weight * point.shape[k] * point.shape[l];
+    }
+  return entries;
+}
+
+/// Derivatives of the water balance of vertex k of a cell by displacement and pressure of vertex l; see (W4).
+template <class G, int D = G::dim>
+void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, const Vector<G::dim>& drive, int k,
+                    int l, const SurfaceEntries<D>& surface, TangentSum<D>& tangent)
+{
+  const PoreStep<D>& pore = step.pore;
+  const bool dries = !pore.drying.empty();
   const PoreCell<D>& cell = pore.cells[c];
   const CellShape<D>& shape = mesh.shapes[c];
   const Index row = mesh.cells[c][k], column = mesh.cells[c][l];
   const double unit = pore.unit;
-  const double volume = volume_of(cell);
+  const double volume = volume_of(cell), flux = flux_of(pore, c);
   const double inertia = step.options.quasi_static ? 0
-                                                   : cell.flux * pore.density * cell.mean[l] /
+                                                   : flux * pore.density * cell.mean[l] /
                                                          (volume * step.stage.weight * step.stage.dt * step.dt);
   Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
   for (int a = 0; a < D; ++a)
   {
-    forces[a] *= pore.held[column] ? 0 : -unit * cell.mean[l];
-    volumes[a] = pore.held[row] ? 0 : -unit * (cell.mean[k] * volumes[a] + inertia * shape.gradient[k][a]);
+    forces[a] *= pore.held[column] ? 0 : -unit * (dries ? pore.drying[c].by_pressure[l] : cell.mean[l]);
+    const double wet = dries ? pore.drying[c].wet[k] : cell.mean[k];
+    volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * shape.gradient[k][a]);
   }
-  double by_pressure =
-      -unit * unit *
-      (cell.capacity[k][l] + cell.outflow[k][l] + cell.flux * dot<D>(shape.gradient[k], shape.gradient[l]));
+  double water = cell.capacity[k][l] + flux * dot<D>(shape.gradient[k], shape.gradient[l]);
+  if (dries)
+    water += pore.drying[c].capacity[k][l] + pore.drying[c].flux_by_pressure[l] * dot<D>(shape.gradient[k], drive);
+  if (pore.drained)
+    water += surface.cells[c][k][l];
+  double by_pressure = -unit * unit * water;
   if (pore.held[row] || pore.held[column])
     by_pressure = row == column ? -unit * cell.mean[k] : 0;
   tangent.add_coupled(row, column, forces, volumes, by_pressure);
@@ -163,14 +219,23 @@ void add_ghost_pressures(const ImplicitStep<G>& step, TangentSum<D>& tangent)
 } // namespace
 
 template <class G, int D>
-void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent)
+void add_pore_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                      TangentSum<D>& tangent)
 {
   if (!step.pore.flows)
     return;
+  const SurfaceEntries<D> surface = surface_entries(mesh, step);
   for (Index c : step.cells)
+  {
+    const Vector<D> drive = step.pore.drying.empty() ? Vector<D>{} : driving_gradient(mesh, field, step, c);
     for (int k = 0; k <= D; ++k)
       for (int l = 0; l <= D; ++l)
-        add_cell_block(mesh, step, c, k, l, tangent);
+        add_cell_block(mesh, step, c, drive, k, l, surface, tangent);
+  }
+  for (Index i = 0; i < static_cast<Index>(surface.nodes.size());
+       ++i) // whichever have an entry: contributions keep order
+    if (step.active[i])
+      tangent.add_pressure(i, i, step.pore.held[i] ? 0 : -step.pore.unit * step.pore.unit * surface.nodes[i]);
   add_ghost_pressures(step, tangent);
 }
 
@@ -190,7 +255,9 @@ template void impose_pressures(double, PoreStep<3>&);
                                            Index);                                                                     \
   template void add_pore_forces(const Mesh<G::dim>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);       \
   template void find_water_balance(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);     \
-  template void add_pore_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);
+  template double volume_strain(const Mesh<G::dim>&, const VelocityField<G>&, double, Index);                          \
+  template void add_pore_entries(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitStep<G>&,                 \
+                                 TangentSum<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

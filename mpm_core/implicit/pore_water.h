@@ -11,6 +11,9 @@
 /// functions; gradients and volumes are those of the start. A polynomial pressure projection of the increment (Bochev
 /// and Dohrmann 2006; White and Borja 2008) keeps pressures from oscillating, with the factor that
 /// `fenics_bridge.water.Consolidation` has.
+///
+/// Soil that may dry (`drying.h`) has S_e p in the total stress, S (n + e + n p / K_w) of water in a unit of volume
+/// that has grown by e, and the conductivity k_r k.
 
 #include "implicit/entries.h"
 
@@ -38,9 +41,22 @@ template <class G>
 Vector<G::dim> water_weight(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
                             Index cell);
 
+/// Volumetric strain of a cell under the iterate: of the cell itself, whose vertices average it, also with nodal mixed
+/// discretisation, and where volumes do not change.
+template <class G, int D = G::dim>
+double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double dt, Index cell);
+
+/// Sum V k_r k dt / gamma_w of a cell under the iterate.
+template <int D>
+inline double flux_of(const PoreStep<D>& pore, Index cell)
+{
+  return pore.drying.empty() ? pore.cells[cell].flux : pore.drying[cell].flux;
+}
+
 /// The blocks of displacement and pressure, of pressure and displacement, and of pressures alone.
 template <class G, int D = G::dim>
-void add_pore_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent);
+void add_pore_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step,
+                      TangentSum<D>& tangent);
 
 /// Makes the iterate have the prescribed pressures.
 template <int D>

@@ -130,8 +130,6 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
     else
       add_resting_sums(mesh, integrated, field);
   }
-  add_pore_forces(mesh, particles, runs, field);
-  add_pore_forces(mesh, particles, field.resting.runs, field);
 }
 
 template <class G>
@@ -141,7 +139,10 @@ void map_to_nodes(Model<G>& model)
   {
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     if (model.water)
+    {
+      add_pore_forces(model.mesh, model.particles, *model.water, model.order.runs, field);
       add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
+    }
     sum_shared(model.exchange, field.nodes);
   }
   if (!has_two_phases(model))

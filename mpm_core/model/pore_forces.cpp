@@ -5,24 +5,27 @@
 namespace mpm::model
 {
 template <class G, int D>
-void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const std::vector<Run>& runs,
-                     VelocityField<G>& field)
+void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,
+                     const std::vector<Run>& runs, VelocityField<G>& field)
 {
-  if (!particles.pore_pressure.present || particles.water_velocity.present)
+  if (particles.water_velocity.present)
     return;
   for (const Run& run : runs)
   {
-    double sum = 0;
+    const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    PoreLoad<D> load{};
     for (Index p = run.first; p < run.last; ++p)
-      sum += particles.volume[p] * particles.pore_pressure[0][p];
+      add_pore_load(mesh.shapes[run.cell], particles, water, run.material, p, factor * particles.volume[p], load);
     Working<G> stress{};
     for (int k : normal_component<G>)
-      stress[k] = -sum * integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+      stress[k] = -load.pressure;
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D> force = internal_force<G>(stress, mesh.shapes[run.cell], k);
+      Vector<D>& internal = field.nodes[mesh.cells[run.cell][k]].internal;
       for (int a = 0; a < D; ++a)
-        field.nodes[mesh.cells[run.cell][k]].internal[a] += force[a];
+        internal[a] += force[a];
+      internal[D - 1] -= load.buoyancy[k];
     }
   }
 }
@@ -45,14 +48,15 @@ double product_integral(int i, int j, const std::array<double, D>& r)
 
 /// Forces of a pressure on the facet of a cell opposite to vertex k.
 template <class G, int D = G::dim>
-void press(const Mesh<D>& mesh, const PressureCondition& condition, Index cell, int k, Array<NodeSums<D>>& nodes)
+void press(const Mesh<D>& mesh, const PressureCondition& condition, double time, Index cell, int k,
+           Array<NodeSums<D>>& nodes)
 {
   const auto corners = facet_nodes<D>(mesh.cells[cell], k);
   const CellShape<D>& shape = mesh.shapes[cell];
   std::array<double, D> pressure, weight;
   for (int i = 0; i < D; ++i)
   {
-    pressure[i] = pressure_at(condition, mesh.points[corners[i]][D - 1]);
+    pressure[i] = pressure_at(condition, mesh.points[corners[i]][D - 1], time);
     weight[i] = thickness<G>(mesh.points[corners[i]]);
   }
   for (int i = 0; i < D; ++i)
@@ -74,14 +78,14 @@ void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, boo
     for (Index c = 0; c < mesh.owned_cells && condition.*acting; ++c)
       for (int k = 0; k <= G::dim && field.moments[c].volume > 0; ++k)
         if (mesh.facet_tags[c][k] == condition.facet_tag)
-          press<G>(mesh, condition, c, k, field.nodes);
+          press<G>(mesh, condition, water.time, c, k, field.nodes);
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, bool PressureCondition::*,                \
                                       VelocityField<G>&);                                                              \
-  template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const std::vector<Run>&,                \
-                                VelocityField<G>&);
+  template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const PoreWater&,                       \
+                                const std::vector<Run>&, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -7,12 +7,43 @@
 
 namespace mpm::model
 {
-/// Adds the internal forces of pore pressures, -B^T sum V_p p_p, to those of the stresses of a field; this rank's part.
-/// Nothing where particles have no pore pressure, or water of its own velocity, which `water_to_nodes` looks after.
+/// What the particles of a cell say of the total stress beside their effective ones. Water that stands over the free
+/// surface presses on it by p_s, wherever the surface is: div(s - p_a I) + rho g with p_a = p_s there is the same as
+/// div(s - (p_a - p_s) I) + rho g - grad p_s with no load there, and - grad p_s is the buoyancy, gamma_w upwards.
+template <int D>
+struct PoreLoad
+{
+  double pressure;                    ///< sum V (S_e p - p_s) [N m]
+  double standing;                    ///< sum V p_s [N m]
+  std::array<double, D + 1> buoyancy; ///< sum V gamma_w N_k under standing water [N]
+};
+
+/// Adds a particle of a law, at a pressure, to its cell's.
+template <int D>
+inline void add_pore_load(const CellShape<D>& shape, const Particles<D>& particles, const PoreWater& water,
+                          Index material, Index p, double volume, PoreLoad<D>& load)
+{
+  double pressure = particles.pore_pressure[0][p];
+  if (water.may_dry())
+    pressure = acting_pressure(water.retention[static_cast<std::size_t>(material)], pressure);
+  if (const double above = standing_pressure(water, particles.position[D - 1][p]); above > 0)
+  {
+    pressure -= above;
+    load.standing += volume * above;
+    const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
+    for (int k = 0; k <= D; ++k)
+      load.buoyancy[k] += volume * water.unit_weight * n[k];
+  }
+  load.pressure += volume * pressure;
+}
+
+/// Adds the internal forces of pore pressures, -B^T sum V_p (S_e p - p_s), to those of the stresses of a field, and the
+/// buoyancy of standing water; this rank's part. Nothing where water has its own velocity, which `water_to_nodes` looks
+/// after.
 /// @pre the internal forces of the stresses have been integrated: with mixed integration the full cells are known
 template <class G, int D = G::dim>
-void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const std::vector<Run>& runs,
-                     VelocityField<G>& field);
+void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,
+                     const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Adds the forces of pressures on the surface of the soil to the tractions, those of standing water among them; this
 /// rank's part. On facets between filled cells those from both sides cancel.

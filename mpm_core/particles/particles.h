@@ -40,6 +40,7 @@ struct Particles
   OptionalColumns<D> resting_displacement;
   OptionalColumns<D * D> displacement_gradient;
   OptionalColumns<1> pore_pressure, porosity, conductivity; ///< of water in the soil
+  OptionalColumns<1> saturation;                            ///< where soil may dry
   OptionalColumns<D> pressure_gradient;
   OptionalColumns<D> water_velocity; ///< of water that moves by itself; `mass` is then that of the grains
   OptionalColumns<1> water_mass;
@@ -86,6 +87,8 @@ void for_each_field(P& particles, F&& f)
   f(Field{"pressure_gradient", "Pa/m", "Gradient of the pore pressure", settable}, particles.pressure_gradient);
   f(Field{"porosity", "-", "Volume of the pores over that of the soil", settable}, particles.porosity);
   f(Field{"conductivity", "m/s", "Hydraulic conductivity", settable}, particles.conductivity);
+  f(Field{"saturation", "-", "Degree of saturation where soil may dry; it follows from the pore pressure", settable, 1},
+    particles.saturation);
   f(Field{"water_velocity", "m/s", "Velocity of the pore water where it has its own, in explicit runs", settable},
     particles.water_velocity);
   f(Field{"water_mass", "kg", "Mass of the pore water where it has its own velocity, per metre in plane strain"},

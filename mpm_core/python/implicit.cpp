@@ -1,4 +1,5 @@
 #include "explicit/run.h"
+#include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
 #include "implicit/relaxation.h"
 #include "implicit/stages.h"
@@ -130,6 +131,8 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
       .def(
           "assemble", [](I& i) { find_tangent(i.model.mesh, i.model.fields.front(), i.step, i.system, i.tangent); },
           Release())
+      .def(
+          "revise_surface", [](I& i) { return revise_surface(i.model.mesh, i.model.exchange.comm, i.step); }, Release())
       .def(
           "start_second_stage", [](I& i) { start_second_stage(i.model, i.step); }, Release())
       .def(

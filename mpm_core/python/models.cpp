@@ -416,6 +416,8 @@ void bind_model(py::module_& m, const std::string& suffix)
 
 void bind_models(py::module_& m)
 {
+  using Curves = std::array<std::vector<double>, model::Retention::n_curves>;
+  using OneRetention = std::tuple<std::vector<double>, Curves, Curves>;
   m.def("first_holders", &first_holders);
   enum class Geometry
   {
@@ -440,8 +442,28 @@ dimensions.)")
       .def_readwrite("suction_limit", &PoreWater::suction_limit)
       .def_readwrite("drained_surface", &PoreWater::drained_surface)
       .def_readwrite("inflow", &PoreWater::inflow)
+      .def_readwrite("time", &PoreWater::time)
+      .def_readwrite("standing", &PoreWater::standing)
+      .def_readwrite("rain", &PoreWater::rain)
+      .def_property_readonly("may_dry", &PoreWater::may_dry)
+      .def("set_retention",
+           [](PoreWater& water, const std::vector<OneRetention>& curves)
+           {
+             water.retention.clear();
+             for (const auto& [suction, values, slopes] : curves)
+               water.retention.push_back({suction, values, slopes});
+           })
+      .def("saturation",
+           [](const PoreWater& water, const std::vector<Index>& material, const std::vector<double>& pressure)
+           {
+             std::vector<double> saturation(pressure.size());
+             for (std::size_t p = 0; p < pressure.size(); ++p)
+               saturation[p] =
+                   wetness_at(water.retention[static_cast<std::size_t>(material[p])], pressure[p]).saturation;
+             return saturation;
+           })
       .def("set_conditions",
-           [](PoreWater& water, const std::vector<std::tuple<Index, double, double, bool, bool>>& conditions)
+           [](PoreWater& water, const std::vector<std::tuple<Index, TimeTable, double, bool, bool>>& conditions)
            {
              water.conditions.clear();
              for (const auto& [tag, value, slope, held, presses] : conditions)

@@ -7,6 +7,7 @@ from partitions import all_by_id, assert_same, bands, one_does_all, scattered, s
 from petsc4py import PETSc
 
 import mpm_core as mpm
+from fenics_bridge.water import VanGenuchten
 
 FIELDS = (
     "position",
@@ -21,12 +22,19 @@ FIELDS = (
 )
 
 
-def wet_slope(comm, owners_of=bands):
-    """A block that slides on an incline, whose water drains at its free surface and at its left side."""
+def wet_slope(comm, owners_of=bands, dries=False):
+    """A block that slides on an incline, whose water drains at its free surface and at its left side.
+
+    Where it dries, rain falls on it, and the level of water that stands before it falls.
+    """
     model = sliding_slope(comm, owners_of)
-    model.add_water(porosity=0.4, conductivity=1e-4, modulus=2.2e8, kozeny_carman=True, drained_surface=True)
+    model.add_water(porosity=0.4, conductivity=1e-4, modulus=2.2e8, kozeny_carman=True, drained_surface=True,
+                    retention=VanGenuchten(alpha=4e-4, n=2.0) if dries else None)  # fmt: skip
     model.set_pore_pressure(lambda x: 9810.0 * (0.4 - x[:, 1]))
     model.hold_pore_pressure(1, level=0.3)
+    if dries:
+        model.rain(1e-5)
+        model.stand_water([(0.0, 0.3), (0.1, 0.2)])
     return model
 
 
@@ -35,9 +43,10 @@ def slide(model, until=0.1):
     return report
 
 
+@pytest.mark.parametrize("dries", [False, True], ids=["saturated", "dries"])
 @pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
-def test_a_wet_slide_is_the_same_on_any_partition(comm, owners_of):
-    model, alone = wet_slope(comm, owners_of), wet_slope(MPI.COMM_SELF)
+def test_a_wet_slide_is_the_same_on_any_partition(comm, owners_of, dries):
+    model, alone = wet_slope(comm, owners_of, dries), wet_slope(MPI.COMM_SELF, dries=dries)
     report, expected = slide(model), slide(alone)
     assert report.iterations == expected.iterations and report.plastic_fraction > 0
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-10)

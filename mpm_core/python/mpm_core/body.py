@@ -79,6 +79,7 @@ class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._velocity_fields = fields or [0] * len(self.laws)
         self._space_watch: SpaceWatch | None = None
         self._water_conditions = []
+        self._retention = []
         self._absorbing, self._incoming = [], None
         self._border = None
         self._free_fields, self._columns, self._tables = [], [], []

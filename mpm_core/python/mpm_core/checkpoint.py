@@ -242,6 +242,8 @@ _WATER = ("unit_weight", "modulus", "suction_limit", "kozeny_carman", "drained_s
 
 _MAY_BE_INFINITE = ("modulus", "suction_limit")
 
+_OF_SURFACE = ("standing", "rain")
+
 
 def _water(model: Model) -> dict[str, Any] | None:
     """Properties and boundary conditions of the pore water."""
@@ -250,21 +252,37 @@ def _water(model: Model) -> dict[str, Any] | None:
         return None
     values = {name: getattr(water, name) for name in _WATER}
     texts = {name: repr(getattr(water, name)) for name in _MAY_BE_INFINITE}
-    return {**values, **texts, "conditions": [list(one) for one in model._water_conditions]}
+    surface = {name: [list(pair) for pair in getattr(water, name)] for name in _OF_SURFACE}
+    curves = [[values.tolist() for values in of_law] for of_law in model._retention]
+    return {
+        **values,
+        **texts,
+        **surface,
+        "conditions": [list(one) for one in model._water_conditions],
+        "retention": curves,
+    }
 
 
 def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
-    model._core.water, model._water_conditions = None, []
+    model._core.water, model._water_conditions, model._retention = None, [], []
     if entry is None:
         return
     water = _core.PoreWater()
     for name in _WATER:
         if name in entry:  # older checkpoints have no suction_limit
             setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
+    for name in _OF_SURFACE:
+        setattr(water, name, [(time, value) for time, value in entry.get(name, [])])
+    model._set_retention(water, [[np.asarray(values) for values in of_law] for of_law in entry.get("retention", [])])
     model._core.water = water
     model._set_water_conditions(
-        [(tag, value, slope, held, loads) for tag, value, slope, held, loads in entry["conditions"]]
+        [(tag, _history(value), slope, held, loads) for tag, value, slope, held, loads in entry["conditions"]]
     )
+
+
+def _history(value: Any) -> list[tuple[float, float]]:
+    """A pressure over time; older checkpoints have a number."""
+    return [(time, number) for time, number in value] if isinstance(value, list) else [(0.0, value)]
 
 
 _NEWER = ("needs_cell_size", "strength_parameters", "library", "symbol")

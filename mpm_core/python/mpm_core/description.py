@@ -137,15 +137,22 @@ def _is_history(value: Any) -> bool:
 def _is_water(value: Any) -> bool:
     if value is None:
         return True
-    texts = {"modulus", "suction_limit"}  # as they may be infinite; files of before explicit runs had it lack the limit
+    texts = {"modulus", "suction_limit"}  # as they may be infinite
+    newer = {"suction_limit", "standing", "rain", "retention"}  # which older files lack
     return (
         isinstance(value, dict)
-        and set(value) | {"suction_limit"} == texts | {"unit_weight", "kozeny_carman", "drained_surface", "conditions"}
+        and set(value) | newer == texts | newer | {"unit_weight", "kozeny_carman", "drained_surface", "conditions"}
         and _is_number(value["unit_weight"])
         and all(isinstance(value[key], str) for key in texts & set(value))
         and all(isinstance(value[key], bool) for key in ("kozeny_carman", "drained_surface"))
         and _are(_is_water_condition, value["conditions"])
+        and all(_are(_is_pair, value.get(key, [])) for key in ("standing", "rain"))
+        and _are(lambda curves: _are(lambda one: _are(_is_number, one), curves), value.get("retention", []))
     )
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and _are(_is_number, value)
 
 
 def _is_water_condition(value: Any) -> bool:
@@ -153,7 +160,8 @@ def _is_water_condition(value: Any) -> bool:
         isinstance(value, list)
         and len(value) == 5
         and _is_tag(value[0])
-        and _are(_is_number, value[1:3])
+        and (_is_number(value[1]) or _are(_is_pair, value[1]))
+        and _is_number(value[2])
         and all(isinstance(one, bool) for one in value[3:])
     )
 

@@ -43,6 +43,10 @@ class System(Protocol):
         """Make this the last point."""
 
 
+MOST_SURFACES = 30
+"""Guesses of where water leaves the surface of soil that may dry, in a step"""
+
+
 class NewtonReport(NamedTuple):
     """Course of an iteration.
 
@@ -149,13 +153,19 @@ class NewtonSolver:
         if changed:
             self._tangent = None
         o, system = self._options, _StepSystem(self, step, dt)
-        report = newton(system, o.tolerance, o.max_iterations, o.max_halvings, min_iterations=0)
+        iterations = 0
+        for _ in range(MOST_SURFACES):
+            report = newton(system, o.tolerance, o.max_iterations, o.max_halvings, min_iterations=0)
+            iterations += report.iterations
+            revised = report.converged and step.revise_surface()
+            if not revised:
+                break
         return Solution(
             report.residuals,
-            iterations=report.iterations,
-            converged=report.converged,
-            easy=report.iterations <= EASY_ITERATIONS,
-            reason=report.reason,
+            iterations=iterations,
+            converged=report.converged and not revised,
+            easy=iterations <= EASY_ITERATIONS,
+            reason=f"where water leaves was not found in {MOST_SURFACES} guesses" if revised else report.reason,
             linear_iterations=system.linear_iterations,
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,10 +17,17 @@ from .conditions import Conditions
 from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
+from .retention import curves_of_laws, joined
 
-WaterCondition: TypeAlias = tuple[int, float, float, bool, bool]
-"""Facet tag; pressure at height 0 [Pa] and its increase with height [Pa/m]; whether the pore water has it; whether it presses on
-the soil"""
+History: TypeAlias = list[tuple[float, float]]
+"""Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
+
+WaterCondition: TypeAlias = tuple[int, History, float, bool, bool]
+"""Facet tag; pressure at height 0 [Pa] over time and its increase with height [Pa/m]; whether the pore water has it; whether it
+presses on the soil"""
+
+Value: TypeAlias = float | Sequence[tuple[float, float]]
+"""A number, or a table ((time [s], value), ...) of rising times, before and after which the end values hold"""
 
 
 STANDARD_GRAVITY = 9.81
@@ -42,6 +49,7 @@ class PoreWater(Conditions):
     laws: list[Any]
     particles: Particles
     _water_conditions: list[WaterCondition]
+    _retention: list[list[NDArray[np.float64]]]
 
     def add_water(
         self,
@@ -53,6 +61,7 @@ class PoreWater(Conditions):
         kozeny_carman: bool = False,
         suction_limit: float = np.inf,
         drained_surface: bool = False,
+        retention: Any = None,
     ) -> None:
         """Fill the pores of all particles with water, which from then on flows in implicit and explicit steps.
 
@@ -69,7 +78,12 @@ class PoreWater(Conditions):
             suction_limit: largest suction of the water [Pa], 0 or more, in explicit runs: where soil grows beyond it, its pores
                 are not full, and pressure comes back when they are; no water enters at free surfaces then. By default
                 it bears any.
-            drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh.
+            drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh, or at that
+                of the water of `stand_water`. Soil that may dry lets water out there, and takes in the rain of `rain`.
+            retention: retention curve of soil that dries under suction in implicit runs, or a list with one for each law (None
+                where soil stays saturated): an object with functions ``saturation``, ``effective`` and
+                ``relative_permeability`` of the suction [Pa], such as `fenics_bridge.water.VanGenuchten`. Effective stress is
+                Bishop's, with the effective saturation; particles become lighter as they dry.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
@@ -87,6 +101,7 @@ class PoreWater(Conditions):
             water.drained_surface = bool(drained_surface)
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             _require_pores(n, k)
+            self._set_retention(water, curves_of_laws(retention, self.laws))
             if any(isinstance(law, _core.Undrained) for law in self.laws):
                 raise InputError(
                     "laws has an Undrained one, whose pores hold water already; expected laws of effective stress"
@@ -101,6 +116,8 @@ class PoreWater(Conditions):
         self.particles.set("conductivity", k)
         self.particles.set("pore_pressure", np.zeros(len(n)))
         self.particles.set("pressure_gradient", np.zeros((len(n), self.mesh.dim)))
+        if water.may_dry:
+            self.particles.set("saturation", np.ones(len(n)))
         self._set_water_conditions([])
 
     @property
@@ -145,6 +162,8 @@ class PoreWater(Conditions):
     def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
         """Give the particles pore pressures: those at the nodes, and linear in each cell.
 
+        Where soil may dry its saturation and mass follow.
+
         Args:
             pressure: [Pa], compression positive: a number, or a function of positions, shape (n, D), that returns shape (n,).
 
@@ -164,9 +183,60 @@ class PoreWater(Conditions):
         gradient = np.linalg.solve(x[:, 1:] - x[:, :1], (values[:, 1:] - values[:, :1])[..., None])[..., 0]
         self.particles.set("pore_pressure", values[:, 0] + np.einsum("pa,pa->p", gradient, position - x[:, 0]))
         self.particles.set("pressure_gradient", gradient)
+        if self._core.water.may_dry:
+            self._saturate()
+
+    def _saturate(self) -> None:
+        """Give particles the saturation of their pressures, and the mass of the water that they then have. Collective."""
+        p, water = self.particles, self._core.water
+        after = np.asarray(water.saturation(p.material, p.pore_pressure), dtype=float)
+        pores = water.unit_weight / STANDARD_GRAVITY * p.porosity * p.volume
+        p.set("mass", p.mass + pores * (after - p.saturation))
+        p.set("saturation", after)
+
+    def stand_water(self, level: Value) -> None:
+        """Let water stand over the free surface of the soil in implicit runs, wherever that is and however it moves.
+
+        Its pressure is that of the pore water at the surface, where water enters or leaves, and presses on the soil. A further
+        call changes the level. Along facets with a tag, at the sides of the mesh, use `hold_pore_pressure` besides.
+
+        Args:
+            level: of the water along the last axis [m]; a table lets it fall or rise.
+
+        Raises:
+            InputError: on all ranks, for a model whose free surface is not drained, or a level that is not finite.
+        """
+        self._set_surface("standing", "level", level)
+
+    def rain(self, rate: Value) -> None:
+        """Let rain fall on the free surface of soil that may dry, in implicit runs; what it cannot take runs off.
+
+        Args:
+            rate: on the horizontal [m/s], 0 or more; may be a table. A further call changes it.
+
+        Raises:
+            InputError: on all ranks, for a model without `retention` or with a free surface that is not drained, or a rate
+                below zero.
+        """
+        self._require_water()
+        if not self._core.water.may_dry:
+            raise InputError(
+                "the model has no retention curve, which says how rain enters; expected add_water(retention=...)"
+            )
+        self._set_surface("rain", "rate", rate, least=0.0)
+
+    def _set_surface(self, entry: str, name: str, value: Value, least: float = -np.inf) -> None:
+        self._require_water()
+        history = collectively(self.comm, lambda: history_of(name, value, least))
+        if not self._core.water.drained_surface:
+            raise InputError(f"{name}: the free surface is not drained, expected add_water(drained_surface=True)")
+        water = self._core.water
+        setattr(water, entry, history)
+        self._core.water = water
+        self._set_water_conditions(self._water_conditions)
 
     def hold_pore_pressure(
-        self, facet_tag: Tag, pressure: float | None = None, *, level: float | None = None, presses: bool | None = None
+        self, facet_tag: Tag, pressure: Value | None = None, *, level: Value | None = None, presses: bool | None = None
     ) -> None:
         """Prescribe the pore pressure at the nodes on facets with a tag, where water then enters or leaves.
 
@@ -175,7 +245,8 @@ class PoreWater(Conditions):
         Args:
             facet_tag: by number or name.
             pressure: [Pa], the same at all nodes; 0 where water leaves freely.
-            level: height of standing water [m] along the last axis instead: hydrostatic pressure below it, zero above.
+            level: height of standing water [m] along the last axis instead: hydrostatic pressure below it, zero above; where
+                soil may dry the facets above it are impervious. Both may be tables, ((time [s], value), ...).
             presses: whether this pressure also loads the surface of the soil, as a total stress, which standing water does; by
                 default with ``level``.
 
@@ -185,14 +256,19 @@ class PoreWater(Conditions):
         """
         self._require_water()
 
-        def checked() -> tuple[tuple[int, ...], float, float, bool]:
+        def checked() -> tuple[tuple[int, ...], History, float, bool]:
             if (pressure is None) == (level is None):
                 raise InputError(f"pressure is {pressure} and level is {level}, expected one of them")
             tags = self.mesh.tags_of("facet", facet_tag)
             if pressure is not None:
-                return tags, float(floats("pressure", pressure, ())), 0.0, bool(presses)
-            weight, height = self._core.water.unit_weight, float(floats("level", 0.0 if level is None else level, ()))
-            return tags, weight * height, -weight, presses is None or bool(presses)
+                return tags, history_of("pressure", pressure), 0.0, bool(presses)
+            weight, heights = self._core.water.unit_weight, history_of("level", 0.0 if level is None else level)
+            return (
+                tags,
+                [(time, weight * height) for time, height in heights],
+                -weight,
+                presses is None or bool(presses),
+            )
 
         tags, value, slope, loads = collectively(self.comm, checked)
         self._replace(tags, True, (value, slope, True, loads))
@@ -213,9 +289,9 @@ class PoreWater(Conditions):
         tags, value = collectively(
             self.comm, lambda: (self.mesh.tags_of("facet", facet_tag), float(floats("pressure", pressure, ())))
         )
-        self._replace(tags, False, (value, 0.0, False, True))
+        self._replace(tags, False, ([(0.0, value)], 0.0, False, True))
 
-    def _replace(self, tags: tuple[int, ...], held: bool, values: tuple[float, float, bool, bool]) -> None:
+    def _replace(self, tags: tuple[int, ...], held: bool, values: tuple[History, float, bool, bool]) -> None:
         """Replace the conditions at facets with these tags, of the pore water or of loads."""
         kept = [one for one in self._water_conditions if one[0] not in tags or one[3] != held]
         self._set_water_conditions([*kept, *((tag, *values) for tag in tags)])
@@ -236,9 +312,11 @@ class PoreWater(Conditions):
         self._set_water_conditions(collectively(self.comm, remaining))
 
     def water_volume(self) -> float:
-        """Volume of the pores [m3], per metre or per radian in two dimensions. Collective."""
+        """Volume of the water in the pores at atmospheric pressure [m3], per metre or per radian in two dimensions. Collective."""
         self._require_water()
-        return self.comm.allreduce(float(self.particles.porosity @ self.particles.volume))
+        p = self.particles
+        pores = p.porosity * p.volume
+        return self.comm.allreduce(float(np.sum(pores * p.saturation if self._core.water.may_dry else pores)))
 
     def water_inflow(self) -> float:
         """Water that has entered the soil since `add_water` [m3], as `water_volume`; negative where it left. Collective."""
@@ -248,7 +326,12 @@ class PoreWater(Conditions):
     def _set_water_conditions(self, conditions: list[WaterCondition]) -> None:
         water = self._core.water
         water.set_conditions(conditions)
+        water.time = self._core.time
         self._core.water, self._water_conditions = water, conditions
+
+    def _set_retention(self, water: Any, curves: list[list[NDArray[np.float64]]]) -> None:
+        water.set_retention([joined(values) for values in curves])
+        self._retention = curves
 
     def _require_water(self) -> None:
         if self._core.water is None:
@@ -259,6 +342,24 @@ class PoreWater(Conditions):
         if self._core.water is not None:
             p = self.particles
             collectively(self.comm, lambda: _require_pores(p.porosity, p.conductivity))
+
+
+def history_of(name: str, value: Value, least: float = -np.inf) -> History:
+    """A number or a table over time as pairs.
+
+    Raises:
+        InputError: numbers that are not finite or below the least, or times that do not rise.
+    """
+    numbers = np.asarray(value, dtype=float)
+    pairs = np.array([[0.0, numbers]]) if numbers.ndim == 0 else numbers
+    good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and len(pairs) > 0 and bool(np.isfinite(pairs).all())
+    if not good or np.any(np.diff(pairs[:, 0]) <= 0):
+        raise InputError(
+            f"{name} is {value!r}, expected a finite number or a table ((time, value), ...) of rising times"
+        )
+    if np.any(pairs[:, 1] < least):
+        raise InputError(f"{name} is {value!r}, expected {least:g} or more")
+    return [(float(time), float(number)) for time, number in pairs]
 
 
 def _require_pores(porosity: NDArray, conductivity: NDArray) -> None:

@@ -37,6 +37,8 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
         "resting cells": model._core.has_resting_cells,
         "rigid surfaces": bool(model._contacts),
         "absorbing sides": bool(model._absorbing),
+        "retention curves": model._core.water.may_dry,
+        "standing water over its free surface": bool(model._core.water.standing),
         "Rayleigh damping": rayleigh != Rayleigh(),
         "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
         f"stress_update {stress_update}": stress_update != StressUpdate.MODIFIED_LAST,

@@ -30,6 +30,7 @@ def seeded(dim, rests=False):
         "pressure_gradient": (n, dim),
         "porosity": (n,),
         "conductivity": (n,),
+        "saturation": (n,),
     }.items():
         model.particles.set(name, rng.random(shape))
     return model
