@@ -4,6 +4,7 @@ from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFac
 from fenics_bridge.water.consolidation import Consolidation
 from fenics_bridge.water.consolidation_step import ConsolidationReport
 from fenics_bridge.water.coupled import Element
+from fenics_bridge.water.motion import Newmark
 from fenics_bridge.water.particles import apply_reservoirs
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
@@ -19,6 +20,7 @@ __all__ = [
     "FreeSurface",
     "Gardner",
     "Head",
+    "Newmark",
     "PorousSoil",
     "Rain",
     "Reservoir",

@@ -39,6 +39,8 @@ from fenics_bridge.water.coupled import (
     pressure_is_free,
 )
 from fenics_bridge.water.initial_state import set_initial_state
+from fenics_bridge.water.motion import Motion, Newmark
+from fenics_bridge.water.positions import at_positions
 from fenics_bridge.water.projection import PressureProjection
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.seepage import Seepage
@@ -48,7 +50,7 @@ from mpm_core import Geometry
 
 
 class Consolidation(PointFunctions):
-    """Quasi-static deformation of soil coupled with the flow of its water: displacement u and pore pressure p.
+    """Deformation of soil, quasi-static or with inertia, coupled with the flow of its water: displacement u, pore pressure p.
 
     Args:
         domain: mesh of the body.
@@ -67,6 +69,8 @@ class Consolidation(PointFunctions):
         water_modulus: bulk modulus of water [Pa], may be infinite.
         solver: solver, of which tolerance and iterations count.
         options_prefix: prefix of the PETSc options of the linear solver.
+        inertia: Newmark's method for steps with inertia of soil and water, which move together; soils then need a density.
+            None for quasi-static steps.
 
     Raises:
         InputError: an unknown tag, cells without law or soil, or another argument out of range. Raised on all ranks alike.
@@ -91,8 +95,9 @@ class Consolidation(PointFunctions):
         water_modulus: float = WATER_MODULUS,
         solver: Solver | None = None,
         options_prefix: str = "consolidation_",
+        inertia: Newmark | None = None,
     ) -> None:
-        agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus, geometry))
+        agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus, geometry, inertia))
         self.domain = domain
         """Mesh of the body"""
         self.geometry = geometry_of(domain, geometry)
@@ -131,13 +136,15 @@ class Consolidation(PointFunctions):
         self.pressure = fem.Function(self._pressures[0], name="pore_pressure")
         """Pore pressure [Pa], a function that is linear in each cell, compression positive"""
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
-        self._assemble(options_prefix)
+        self.motion: Motion | None = None
+        """Velocity and acceleration; None in quasi-static steps"""
+        self._assemble(options_prefix, inertia)
 
     def __repr__(self) -> str:
         laws = map(repr, self._laws)
         return body_text("Consolidation", self.domain, f"t = {self.time:g} s", geometry=self.geometry, lines=laws)
 
-    def _assemble(self, options_prefix: str) -> None:
+    def _assemble(self, options_prefix: str, inertia: Newmark | None) -> None:
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
         constraints = CoupledConstraints(self._supports, self._space, self._pressures[1])
@@ -147,8 +154,18 @@ class Consolidation(PointFunctions):
         self._owned = [dofs[: m.index_map.size_local * m.index_map_bs] for m, dofs in maps]
         # Stabilised elements take one point for all: FFCx 0.5 mixes up the radii of integrals of degree 1 and others.
         degree = 3 if self.points.degree == 2 and self.radius is not None else self.points.degree
+        if inertia is not None:
+            self.motion = Motion(inertia, self._displacements[0], ufl.split(increment)[0])
         self._terms = WaterTerms(
-            solution, increment, self._soils[0], self._soils[1], self._weights, self._unit, self.radius, degree
+            solution,
+            increment,
+            self._soils[0],
+            self._soils[1],
+            self._weights,
+            self._unit,
+            self.radius,
+            degree,
+            self.motion,
         )
         self._gravity = self._terms.gravity_flow(self._space)
         self._take_boundary(first=True)
@@ -210,11 +227,15 @@ class Consolidation(PointFunctions):
         self._applied.set_time(end)
         self._terms.dt.value = self.points.duration = dt
         if self._projection is not None:
-            self._projection.write(self._terms.projection, dt)
+            self._projection.write(self._terms.projection, dt, self.motion and self.motion.method.beta)
+        if self.motion is not None:
+            self.motion.begin(dt)
         report, active, iterations, reason = self._solved(external, load.displacement, end, dt)
         if reason:
             return ConsolidationReport(self.time, dt, iterations, report.residuals, reason=reason)
         self._inflow = self._step_state(dt)[1]
+        if self.motion is not None:
+            self.motion.accept(self._body.increment.x.array[self._displacements[1]], dt)
         self._body.accept()
         self.points.time = self.time = end
         self._external, self._active = external, active
@@ -328,6 +349,26 @@ class Consolidation(PointFunctions):
             points, displacement=self.displacement, pressure=self.pressure, stress=self.stress_function()
         )
 
+    def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
+        """The pore pressure as a function of positions, for stages, collapse loads and factors of safety, as of `Seepage`.
+
+        Args:
+            suction: False for zero where it is negative; True for the suction there times the effective saturation at the nodes.
+            outside: function of positions (n, D) [m] for points outside the body; None for zero there.
+
+        Returns:
+            Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
+
+        Note:
+            Collective.
+        """
+        acting = fem.Function(self.pressure.function_space, name="pore_pressure")
+        acting.x.array[:] = np.maximum(self.pressure.x.array, 0.0)
+        for soil, cells in zip(self._soils[0], self._soils[2]) if suction else ():
+            part = soil.retention.effective(-self.pressure) * self.pressure
+            acting.interpolate(fem.Expression(part, compat.interpolation_points(acting.function_space)), cells)
+        return at_positions(acting, outside)
+
     def stored_water(self) -> float:
         """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure.
 
@@ -369,6 +410,8 @@ class Consolidation(PointFunctions):
             Collective.
         """
         self._body.increment.x.array[:] = 0.0
+        if self.motion is not None:
+            self.motion.rest_on()
         forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
         space, dofs = self._displacements
         return force_on(space, forces[dofs], self._facet_tags, facet_tag)
@@ -383,13 +426,17 @@ def _largest_conductivity(soils):
     return max(np.linalg.eigvalsh(soil.tensor(soil.conductivity, 3)).max() for soil in soils)
 
 
-def _first_mistake(element, soil, unit_weight, water_modulus, geometry):
+def _first_mistake(element, soil, unit_weight, water_modulus, geometry, inertia):
     if not isinstance(element, Element):
         return f"element: got {element!r}, expected one of {', '.join(map(str, Element))}"
     for one in soil.values() if isinstance(soil, dict) else [soil]:
         retention = getattr(one, "retention", None)
         if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):
             return f"soil: it has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
+        if inertia is not None and getattr(one, "density", 1.0) is None:
+            return f"soil: {one!r} has no density, expected one for steps with inertia"
+    if not isinstance(inertia, (Newmark, type(None))):
+        return f"inertia: got {inertia!r}, expected a Newmark, or None"
     if not (np.isfinite(unit_weight) and unit_weight > 0):
         return f"unit_weight: got {unit_weight!r} N/m3, expected a positive number"
     if not water_modulus > 0:

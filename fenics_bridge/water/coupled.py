@@ -3,7 +3,8 @@
     div(sigma' - p I) + rho g = 0,    d/dt(div u) + (n / K_w) dp/dt + div q = 0,    q = -(k / gamma_w) (grad p + gamma_w grad z)
 
 with the pressure p positive in compression (Biot 1941; Zienkiewicz and Shiomi 1984). Backward Euler takes the second equation
-over a step; times minus the unit of pressure it makes the system symmetric where the law's tangent is.
+over a step; times minus the unit of pressure it makes the system symmetric where the law's tangent is. Where soil and water are
+accelerated together by a, g becomes g - a in both.
 
 Soil with a retention curve is unsaturated under suction -p, its air at atmospheric pressure: with the degree of saturation S,
 the effective one S_e and the relative permeability k_r,
@@ -26,6 +27,7 @@ from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.water.boundary import Reservoir, value_at
+from fenics_bridge.water.motion import Motion, inertia, over_gravity
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.soils import PorousSoil
 
@@ -60,6 +62,7 @@ class WaterTerms:
         unit: unit of pressure [Pa].
         radius: radius of an axisymmetric body, a UFL expression.
         degree: degree of the quadrature.
+        motion: Motion of the body; None without inertia.
     """
 
     def __init__(
@@ -72,10 +75,12 @@ class WaterTerms:
         unit: float,
         radius: Any,
         degree: int,
+        motion: Motion | None = None,
     ) -> None:
         domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
+        self._motion, self._driving = motion, self._up + over_gravity(motion) if motion else self._up
         self._soils, (self._gamma, self._modulus) = soils, weights
         rule = {"quadrature_degree": degree}
         curved = [_may_dry(soil) for soil in soils]
@@ -98,9 +103,11 @@ class WaterTerms:
             v, q = ufl.split(test)
             end = self._p + self._dp
             forces = self._sum(lambda s: self._pressing(s, end) * self._volume(v) + self._missing(s, end, v))
+            if self._motion is not None:
+                forces -= self._sum(lambda s: inertia(self._motion, s.density / self._unit, v))
             water = self._sum(lambda s: q * self._stored(s), self._storing)
             pushed = (self._unit / self._gamma) * ufl.grad(end)
-            water += self.dt * (self._flow(pushed + self._up, q, end) - applied.unit * applied.inflow_form(q))
+            water += self.dt * (self._flow(pushed + self._driving, q, end) - applied.unit * applied.inflow_form(q))
             spread = ufl.as_matrix(
                 [[self.projection[i * self._dim + j] for j in range(self._dim)] for i in range(self._dim)]
             )
@@ -140,7 +147,7 @@ class WaterTerms:
         if not _may_dry(soil):
             return 0.0
         lost = soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
-        return lost * ufl.inner(self._up, v)
+        return lost * ufl.inner(self._driving, v)
 
     def _pores(self, soil):
         """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""

@@ -52,18 +52,28 @@ class PressureProjection:
         longest = np.sum((corners[:, :, None] - corners[:, None]) ** 2, axis=3).max(axis=(1, 2))
         from_centroid = corners - corners.mean(axis=1, keepdims=True)
         moments = np.einsum("cki,ckj->cij", from_centroid, from_centroid) / ((dim + 1) * (dim + 2))
-        flexibility, mobility = np.empty(n), np.empty(n)
-        flexibility[points.cells] = 1 / np.array([law.p_wave_modulus for law in laws])[points.material]
+        self._stiffness, storage, mobility, density = (np.zeros(n) for _ in range(4))
+        self._stiffness[points.cells] = np.array([law.p_wave_modulus for law in laws])[points.material]
         for soil, own in zip(soils, cells):
             own = own[own < n]
-            flexibility[own] += soil.porosity / modulus
+            storage[own], density[own] = soil.porosity / modulus, soil.density or 0.0
             mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / gamma
         self._moments = MARGIN * (dim + 1) * moments.reshape(n, -1)
-        self._undrained, self._per_second = 1.5 * flexibility, 6 * mobility / longest
+        self._storage, self._per_second = storage, 6 * mobility / longest
+        self._mass = density * longest / (12 * dim)
 
-    def write(self, function: fem.Function, dt: float) -> None:
-        """Write tau T of a step of dt [s] to a function that is constant in each cell. Collective."""
-        values = np.maximum(0.0, self._undrained - self._per_second * dt)[:, None] * self._moments
+    def write(self, function: fem.Function, dt: float, beta: float | None = None) -> None:
+        """Write tau T of a step to a function that is constant in each cell. Collective.
+
+        Args:
+            function: the function.
+            dt: length of the step [s].
+            beta: Newmark's parameter of steps with inertia. The mass of a cell then resists as a stiffness does, rho h^2 / (12 beta
+                dt^2) for displacements that alternate from node to node; without it waves would be too slow.
+        """
+        stiffness = self._stiffness + (0.0 if beta is None else self._mass / (beta * dt**2))
+        undrained = 1.5 * (1 / stiffness + self._storage)
+        values = np.maximum(0.0, undrained - self._per_second * dt)[:, None] * self._moments
         rows = compat.cell_dofs(function.function_space)[: len(values), 0]
         function.x.array.reshape(-1, values.shape[1])[rows] = values
         function.x.scatter_forward()

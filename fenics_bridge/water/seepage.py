@@ -23,12 +23,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace, WaterBoundary
 from fenics_bridge.water.complementarity import BoundedProblem
+from fenics_bridge.water.positions import at_positions
 from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
 
 QUADRATURE = {1: 3, 2: 5}
@@ -315,16 +315,7 @@ class Seepage:
         effective = (
             [s.retention.effective(-self.unit_weight * self.pressure_head) for s in self._soils] if suction else None
         )
-        pressure = self._pressure(effective)
-
-        def at(points):
-            points = np.ascontiguousarray(points, dtype=float)
-            search = PointSearch(self.domain, points)
-            values = search.values(pressure)[:, 0]
-            elsewhere = np.zeros(len(points)) if outside is None else np.broadcast_to(outside(points), len(points))
-            return np.where(search.found, values, elsewhere)
-
-        return at
+        return at_positions(self._pressure(effective), outside)
 
     def _pressure(self, effective):
         """Pore pressure [Pa]: continuous and cut off at zero or, with effective saturations, with that part of the suction."""

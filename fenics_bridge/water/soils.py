@@ -39,6 +39,8 @@ class PorousSoil:
     """Compressibility of the skeleton m_v [1/Pa], the inverse of the oedometric modulus; for transient flow only"""
     retention: Any = field(default_factory=AlwaysSaturated)
     """Retention curve of `fenics_bridge.water.retention`; without one the soil stays saturated"""
+    density: float | None = None
+    """Density of the saturated soil [kg/m3]; for steps with inertia only"""
 
     def __post_init__(self):
         k = np.asarray(self.conductivity, dtype=float)
@@ -52,6 +54,8 @@ class PorousSoil:
             raise InputError(f"porosity: got {self.porosity!r}, expected more than 0 and less than 1")
         if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
             raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
+        if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
+            raise InputError(f"density: got {self.density!r} kg/m3, expected a positive number")
 
     @staticmethod
     def tensor(conductivity: ArrayLike, dim: int) -> NDArray[np.float64]:

@@ -216,3 +216,22 @@ def test_bad_calls_are_named(call, words):
     model = make()
     with pytest.raises(InputError, match=words):
         call(model)
+
+
+def test_a_bank_that_consolidates_gains_strength():
+    """The factor of safety under the pore pressures of `Consolidation`: undrained pressures of a load, and none in the end."""
+    domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, height=2.0, angle=30.0, crest=2.0,
+                                                                  cell_size=0.5, kind="fitted"))  # fmt: skip
+    soil = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=4e3, friction_angle=28.0)
+    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    model = water.Consolidation(
+        domain, mpm.LinearElastic(young=20e6, poisson=0.3), water.PorousSoil(1e-8), facet_tags, supports, [water.SeepageFace(bridge.SLOPE)],
+        load=bridge.Load(unit_weight=20e3), element=water.Element.STABILISED,
+    )  # fmt: skip
+    factors = []
+    for dt in (1.0, 1e9):
+        assert model.advance(dt).converged
+        fem = bridge.QuasiStatic(domain, soil, facet_tags, supports)
+        fem.reconfigure(pore_pressure=model.pore_pressure())
+        factors.append(bridge.factor_of_safety(fem, bridge.Load(unit_weight=20e3), tolerance=0.05).value)
+    assert factors[1] > 1.2 * factors[0]
