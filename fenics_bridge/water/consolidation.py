@@ -227,7 +227,7 @@ class Consolidation(PointFunctions):
         self._applied.set_time(end)
         self._terms.dt.value = self.points.duration = dt
         if self._projection is not None:
-            self._projection.write(self._terms.projection, dt, self.motion and self.motion.method.beta)
+            self._projection.write(self._terms.projection, dt, None if self.motion is None else self.motion.method.beta)
         if self.motion is not None:
             self.motion.begin(dt)
         report, active, iterations, reason = self._solved(external, load.displacement, end, dt)
