@@ -9,7 +9,7 @@ storage, whose test RichardsMechanics/LiakopoulosHM keeps its smallest pressure 
 stresses are those of Bishop.
 
 Steady rain of half the conductivity above a water table, with k_r = e^(αψ), has a closed form (Gardner 1958; Srivastava and
-Yeh 1991).
+Yeh 1991). On particles it falls on the free surface.
 """
 
 from __future__ import annotations
@@ -111,11 +111,95 @@ def rain(element, cells):
     ]  # fmt: skip
 
 
+def particles(cells, law, porosity, conductivity, curve, weight, air=0):
+    """The column as particles, with rows of empty cells above it."""
+    size = 1.0 / cells
+    domain, cell_tags, facet_tags = bridge.box_mesh(
+        comm, (0.1, 1.0 + air * size), (2, cells + air), body=((0.0, 0.0), (0.1, 1.0))
+    )
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), law)
+    model.seed(density=weight / GRAVITY, per_cell=3, cell_tag=bridge.BODY)
+    model.roller(LEFT, (1, 0))
+    model.roller(RIGHT, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -GRAVITY))
+    model.add_water(
+        porosity=porosity,
+        conductivity=conductivity,
+        modulus=2e9,
+        unit_weight=WATER,
+        retention=curve,
+        drained_surface=air > 0,
+    )
+    model.hold_pore_pressure(BASE, 0.0)
+    stress = np.zeros_like(model.particles.stress)
+    stress[:, 1] = -weight * (1.0 - model.particles.position[:, 1])
+    model.particles.set("stress", stress)
+    return model
+
+
+def line_at(model, values, heights):
+    """Values of particles at heights, from straight lines through those of a layer of 0.1 m around each, on all ranks."""
+    y = np.concatenate(comm.allgather(model.particles.position[:, 1]))
+    values = np.concatenate(comm.allgather(values))
+    lines = [np.polyfit(y[near] - h, values[near], 1) for h in heights for near in [np.abs(y - h) < 0.05]]
+    return np.array([line[1] for line in lines])
+
+
+def march(model, dt):
+    """A step to which small displacements are enough."""
+    for _ in model.implicit(model.time + dt, dt=dt, quasi_static=True, small_displacements=True):
+        pass
+
+
+def drainage_of_particles(cells):
+    """The same checks by particles."""
+    weight = ((1 - POROSITY) * 2000.0 + POROSITY * 1000.0) * GRAVITY
+    law = mpm.LinearElastic(young=1.3e6, poisson=0.4)
+    model, checks, name = particles(cells, law, POROSITY, CONDUCTIVITY, del_monte_sand(), weight), [], "particles"
+    for count, dt in STEPS:
+        for _ in range(count):
+            held, entered = model.water_volume(), model.water_inflow()
+            march(model, dt)
+            time = round(model.time)
+            if abs(model.time - time) < 1e-6 and time in PUBLISHED:
+                published, moved_there = PUBLISHED[time]
+                pressure, moved = (line_at(model, values, [1.0])[0] for values in
+                                   (model.particles.pore_pressure, model.particles.displacement[:, 1]))  # fmt: skip
+                checks.append(Check(f"pressure of the water at the top after {time} s", published / 1e3, "OpenGeoSys",
+                                    pressure / 1e3, 0.01, "kPa", method=name))  # fmt: skip
+                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved, 0.01, "mm",
+                                    method=name))  # fmt: skip
+                error = model.water_volume() - held - (model.water_inflow() - entered)
+                checks.append(Check(f"water that is missing after the step to {time} s, over the pores", 0.0, "balance",
+                                    error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
+    return checks
+
+
+def rain_on_particles(cells):
+    part, alpha = 0.5, 2.0
+    law = mpm.LinearElastic(young=5e6, poisson=0.3)
+    model = particles(cells, law, 0.4, 1e-5, water.Gardner(alpha / WATER), 20e3, air=2)
+    model.rain(part * 1e-5)
+    dt = 100.0
+    while model.time < 1e7:
+        march(model, dt)
+        dt *= 2
+    heights = np.array([0.25, 0.5, 1.0])
+    found = alpha * line_at(model, model.particles.pore_pressure, heights) / WATER
+    exact = np.log(part + (1 - part) * np.exp(-alpha * heights))
+    return [
+        Check(f"steady rain, α times the pressure head at α z = {alpha * z:g}", e, "ln(r + (1 - r) exp(-α z))", f, 0.005, method="particles")
+        for z, e, f in zip(heights, exact, found)
+    ]  # fmt: skip
+
+
 def run(quick: bool, folder) -> Result:
     checks, profiles = [], {}
     for element in METHODS:
         found, curves = drainage(element, 20 if quick else 40)
         checks, profiles = checks + found + rain(element, 20 if quick else 40), profiles | curves
+    checks += drainage_of_particles(20 if quick else 40) + rain_on_particles(20 if quick else 40)
     if comm.rank == 0:
         shown = {name: curve for name, curve in profiles.items() if "P1-P1" in name}
         rest = {"at rest in the end": (np.array([0.0, -WATER / 1e3]), np.array([0.0, 1.0]))}
