@@ -56,7 +56,7 @@ def create_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.i
     return mesh.create_mesh(comm, cells, points, element, ghost_mode=GhostMode.shared_facet)
 
 
-def _partitioner():
+def _partitioner() -> Any:
     try:
         return mesh.create_cell_partitioner(GhostMode.shared_facet)
     except TypeError:  # newer ones also ask how many cells share a facet at most

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from itertools import permutations, product
+from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
@@ -48,7 +49,7 @@ def box_mesh(
     return distributed_mesh(comm, result if result is not None else empty_arrays(dim), dim)
 
 
-def _arrays(lengths, counts, diagonals, body):
+def _arrays(lengths: Any, counts: Any, diagonals: str, body: Any) -> Any:
     lengths, counts = np.asarray(lengths, dtype=float), np.asarray(counts)
     dim = len(lengths)
     if dim not in (2, 3) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
@@ -65,7 +66,7 @@ def _arrays(lengths, counts, diagonals, body):
     return MeshArrays(points, cells, np.where(inside, BODY, 0).astype(np.int32), *_sides(grid, cells, counts))
 
 
-def _simplices(counts, alternating):
+def _simplices(counts: Any, alternating: bool) -> NDArray[np.integer]:
     """Each cube is cut along its diagonal from a corner to the opposite one; (m, D + 1) numbers of nodes."""
     dim = len(counts)
     cubes = np.indices(counts).reshape(dim, -1).T
@@ -81,7 +82,7 @@ def _simplices(counts, alternating):
     return np.stack(cells, axis=1).reshape(-1, dim + 1).astype(np.int64)
 
 
-def _sides(grid, cells, counts):
+def _sides(grid: Any, cells: NDArray[np.integer], counts: Any) -> tuple[Any, ...]:
     """Facets on the sides of the box, (k, D) nodes, and their tags."""
     facets, tags = [], []
     for vertex, axis, end in product(range(cells.shape[1]), range(len(counts)), (0, 1)):

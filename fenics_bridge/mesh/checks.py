@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,18 +72,18 @@ def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], na
         )
 
 
-def _place(point):
+def _place(point: Any) -> str:
     return "(" + ", ".join(f"{x:g}" for x in point) + ")"
 
 
-def _boundary_facets(cells):
+def _boundary_facets(cells: NDArray[np.integer]) -> NDArray[np.integer]:
     """Facets of one cell alone, as rows of nodes in ascending order: (k, D)."""
     facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])]), axis=1)
     first, counts = _distinct(facets)
     return facets[first[counts == 1]]
 
 
-def _distinct(rows):
+def _distinct(rows: NDArray[np.integer]) -> tuple[Any, ...]:
     """Where each distinct row is first, in ascending order of the rows, and how often it is there."""
     order = np.lexsort(rows.T[::-1])
     starts = np.ones(len(rows), dtype=bool)
@@ -90,7 +92,12 @@ def _distinct(rows):
     return order[starts], np.diff(np.append(starts, len(rows)))
 
 
-def _point_on_facet(places, nodes, points, facets):
+def _point_on_facet(
+    places: NDArray[np.float64],
+    nodes: NDArray[np.integer] | None,
+    points: NDArray[np.float64],
+    facets: NDArray[np.integer],
+) -> int | None:
     """Row of the first of some places that lies on a facet; None if none does.
 
     Args:
@@ -114,7 +121,7 @@ def _point_on_facet(places, nodes, points, facets):
     return first if first < len(places) else None
 
 
-def _lies_on(corners, size, places):
+def _lies_on(corners: NDArray[np.float64], size: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether each place lies on the side or triangle beside it; corners: (k, D, D), size: (k,), places: (k, D)."""
     edges, offset = corners[:, 1:] - corners[:, :1], places - corners[:, 0]
     gram = edges @ edges.transpose(0, 2, 1)
@@ -126,7 +133,7 @@ def _lies_on(corners, size, places):
     return ~flat & inside & (distance < NEAR * size)
 
 
-def _near_pairs(centres, size, places):
+def _near_pairs(centres: NDArray[np.float64], size: float, places: NDArray[np.float64]) -> Iterator[Any]:
     """Pairs of numbers (facets, places) that hold all places within `size` of the centre of a facet, in portions."""
     level = np.ceil(np.log2(np.maximum(size, 1e-300)))
     for each in np.unique(level):

@@ -13,6 +13,7 @@ import resource
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import gmsh  # noqa: F401  # loaded at once: it starts programs, which are forbidden later
 import gmsh_reader  # type: ignore[import]  # beside this file, which is started as a script
@@ -22,10 +23,10 @@ ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.EPERM
 """SCMP_ACT_ALLOW and SCMP_ACT_ERRNO(EPERM) of libseccomp"""
 
 
-def end_with_parent():
+def end_with_parent() -> None:
     """End this process when the parent has: then its end of our standard input is closed, however it ended."""
 
-    def wait():
+    def wait() -> None:
         while os.read(0, 1024):  # not sys.stdin, whose lock would be held when this process ends
             pass
         os._exit(1)
@@ -33,7 +34,7 @@ def end_with_parent():
     threading.Thread(target=wait, daemon=True).start()
 
 
-def limit_memory(size):
+def limit_memory(size: int) -> None:
     """No more than `size` bytes of address space beyond what is used by now."""
     used = (
         int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if sys.platform == "linux" else 0
@@ -41,7 +42,7 @@ def limit_memory(size):
     resource.setrlimit(resource.RLIMIT_AS, (used + size, used + size))
 
 
-def forbid_programs():
+def forbid_programs() -> bool:
     """From now on this process and its children cannot start programs. Returns whether the system can do that."""
     try:
         library = ctypes.CDLL("libseccomp.so.2")
@@ -56,7 +57,7 @@ def forbid_programs():
     return library.seccomp_load(rules) == 0
 
 
-def children():
+def children() -> tuple[Any, ...]:
     """What the children of this process have used. It changes when one is started, even if it could not become a program."""
     return tuple(resource.getrusage(resource.RUSAGE_CHILDREN))
 
@@ -65,7 +66,7 @@ COMMANDS = re.compile(rb"\b(?:NonBlocking)?System(?:Call)?\b|\bOnelabRun\b")
 NAMED = re.compile(rb"\b(?:Include|Merge|MergeWithBoundingBox|Open)\s+(?:\"([^\"\n]*)\"\s*;|[^;]*;)")
 
 
-def command_in(path, seen=()):
+def command_in(path: Path, seen: Any = ()) -> str | None:
     """Why a .geo file, or one that it names, may run commands; None when no word of theirs says so. Their comments count too.
 
     Args:
@@ -86,7 +87,7 @@ def command_in(path, seen=()):
     return None
 
 
-def main(path, dim, result, memory, allow_commands):
+def main(path: Path, dim: str, result: str, memory: str, allow_commands: str) -> Any:
     end_with_parent()
     limit_memory(int(memory))
     confined = allow_commands == "no" and forbid_programs()

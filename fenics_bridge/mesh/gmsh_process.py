@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ class Limits:
     memory: float | None
     allow_commands: bool
 
-    def memory_bytes(self):
+    def memory_bytes(self) -> int:
         """The limit in bytes; half of the machine's memory if none was given."""
         if self.memory is not None:
             return int(self.memory)
@@ -61,7 +62,7 @@ def read_apart(path: Path, dim: int, result: Path, name: str, limits: Limits) ->
         return dict(arrays)
 
 
-def _ran(path, dim, result, name, limits):
+def _ran(path: Path, dim: int, result: Path, name: str, limits: Limits) -> tuple[Any, ...]:
     """Exit code and standard error of the process."""
     errors = result.with_name("errors")
     words = [str(path), str(dim), str(result), str(limits.memory_bytes()), "yes" if limits.allow_commands else "no"]

@@ -10,12 +10,15 @@ import importlib.util
 import re
 import signal
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 
 @contextlib.contextmanager
-def _own_ctrl_c():
+def _own_ctrl_c() -> Iterator[None]:
     """Ctrl-C stays what it is, a KeyboardInterrupt usually, while gmsh would have it end Python at once."""
     handler = signal.getsignal(signal.SIGINT)
     try:
@@ -24,7 +27,7 @@ def _own_ctrl_c():
         signal.signal(signal.SIGINT, handler if handler is not None else signal.SIG_DFL)
 
 
-def _imported_when_used(name):
+def _imported_when_used(name: str) -> Any:
     """Module that is loaded when one of its attributes is first used: gmsh takes a fifth of a second."""
     spec = importlib.util.find_spec(name) if name not in sys.modules else None
     if spec is None or spec.loader is None:
@@ -52,7 +55,7 @@ class MeshError(Exception):
 
 
 @contextlib.contextmanager
-def gmsh_session():
+def gmsh_session() -> Iterator[Any]:
     """gmsh, silent."""
     with _own_ctrl_c():
         gmsh.initialize(["gmsh", "-v", "0"], False)
@@ -63,12 +66,12 @@ def gmsh_session():
             gmsh.finalize()
 
 
-def gmsh_message(error):
+def gmsh_message(error: Exception) -> str:
     """What gmsh says about an error, on one line."""
     return " ".join(str(error).split()) or gmsh.logger.getLastError()
 
 
-def read_file(path, dim):
+def read_file(path: Path, dim: int) -> dict[str, Any]:
     """Arrays of a file, see `model_arrays`; a .geo file is meshed."""
     if path.suffix.lower() == ".msh":
         _check_written_tags(path)
@@ -82,7 +85,7 @@ def read_file(path, dim):
         return model_arrays(dim)
 
 
-def _check_written_tags(path):
+def _check_written_tags(path: Path) -> None:
     """Refuse a file in text form whose tags do not fit into 32 bits, by the line. Raises MeshError."""
     text = path.read_bytes()
     if re.match(rb"\s*\$MeshFormat\s+\S+\s+0\s", text) is None:
@@ -97,7 +100,7 @@ def _check_written_tags(path):
                                 f"to {LAST_TAG}")  # fmt: skip
 
 
-def model_arrays(dim):
+def model_arrays(dim: int) -> dict[str, Any]:
     """The current model of gmsh: points (n, dim), cells (m, dim + 1), cell_values (m,), facets (k, dim), facet_values (k,).
 
     Cells and facets are rows of points. cell_names, facet_names: names of physical groups, with their numbers in
@@ -123,7 +126,7 @@ def model_arrays(dim):
     }  # fmt: skip
 
 
-def _names(kind, dim):
+def _names(kind: str, dim: int) -> Any:
     """Names of the physical groups of one dimension and their numbers."""
     named = [(gmsh.model.getPhysicalName(dim, tag), tag) for _, tag in gmsh.model.getPhysicalGroups(dim)]
     named = [(name, tag) for name, tag in named if name]
@@ -133,7 +136,7 @@ def _names(kind, dim):
     }
 
 
-def _entities(dim, only_groups=False):
+def _entities(dim: int, only_groups: bool = False) -> tuple[Any, ...]:
     """Node tags (m, dim + 1) and physical groups (m,) of the model's elements of one dimension."""
     groups = gmsh.model.getPhysicalGroups(dim)
     blocks = [(entity, tag) for _, tag in groups for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
@@ -159,7 +162,7 @@ def _entities(dim, only_groups=False):
     return np.concatenate(nodes), np.concatenate(values)
 
 
-def _check_element(kind, dim):
+def _check_element(kind: int, dim: int) -> None:
     if kind == _GMSH_SIMPLEX[dim]:
         return
     text, _, order, *_ = gmsh.model.mesh.getElementProperties(kind)
@@ -169,7 +172,7 @@ def _check_element(kind, dim):
     raise MeshError(f"has elements of type {text!r}, expected only {expected}")
 
 
-def _check_cells(nodes, dim):
+def _check_cells(nodes: Any, dim: int) -> None:
     found = sum(len(block) for block in nodes)
     higher = dim == 2 and len(gmsh.model.mesh.getElements(3)[0]) > 0
     if higher:

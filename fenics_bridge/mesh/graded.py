@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
@@ -71,7 +73,7 @@ def graded_tags(
     return name_tags(graded, {**kept, name: new}), dict(zip(new, low + width * (np.array(present) + 0.5)))
 
 
-def _without(numbers, old, new):
+def _without(numbers: Any, old: Any, new: Any) -> Any:
     """Tags of a name, with those of the graded soil replaced by those of its classes."""
     rest = tuple(number for number in numbers if number not in old)
     return (*rest, *new) if len(rest) < len(numbers) else numbers

@@ -6,6 +6,7 @@ import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
@@ -65,7 +66,7 @@ def read_mesh(
     return distributed_mesh(comm, arrays if arrays is not None else empty_arrays(dim), dim)
 
 
-def arrays_from_model(dim, name):
+def arrays_from_model(dim: int, name: str) -> Any:
     """MeshArrays of gmsh's current model; `name` stands for the model in error messages."""
     try:
         arrays = gmsh_reader.model_arrays(dim)
@@ -74,7 +75,7 @@ def arrays_from_model(dim, name):
     return _mesh_arrays(arrays, name)
 
 
-def _check_arguments(comm, path, dim, parameters):
+def _check_arguments(comm: MPI.Comm, path: str | Path, dim: int, parameters: Mapping[str, float] | None) -> None:
     message = None
     suffix = Path(path).suffix.lower()
     if dim not in (2, 3):
@@ -86,7 +87,7 @@ def _check_arguments(comm, path, dim, parameters):
     agree(comm, message)
 
 
-def _arrays_from_file(path, dim, parameters, limits):
+def _arrays_from_file(path: Path, dim: int, parameters: Mapping[str, float], limits: Limits) -> Any:
     if not path.is_file():
         raise InputError(f"path: there is no file {str(path)!r}")
     try:
@@ -102,14 +103,14 @@ def _arrays_from_file(path, dim, parameters, limits):
     return _mesh_arrays(arrays, str(path))
 
 
-def _mesh_arrays(arrays, name):
+def _mesh_arrays(arrays: dict[str, Any], name: str) -> Any:
     check_cells_fit(arrays["cells"], name)
     check_conforming(arrays["points"], arrays["cells"], name)
     keys = "points", "cells", "cell_values", "facets", "facet_values"
     return MeshArrays(*(arrays[key] for key in keys), *(_names(arrays, kind) for kind in ("cell", "facet")))
 
 
-def _names(arrays, kind):
+def _names(arrays: dict[str, Any], kind: str) -> dict[str, Any]:
     """{name: tags} of the physical groups of cells or facets."""
     names: dict[str, tuple[int, ...]] = {}
     for name, number in zip(arrays[f"{kind}_names"].tolist(), arrays[f"{kind}_numbers"].tolist()):
@@ -117,7 +118,7 @@ def _names(arrays, kind):
     return names
 
 
-def _constants(parameters, text, path):
+def _constants(parameters: Mapping[str, float], text: Any, path: Path) -> str:
     """Lines of a .geo file that set its constants: `DefineConstant` leaves alone what has a value."""
     lines = []
     for name, value in parameters.items():
@@ -129,7 +130,7 @@ def _constants(parameters, text, path):
     return "".join(lines)
 
 
-def _with_constants(path, constants, folder):
+def _with_constants(path: Path, constants: str, folder: str) -> Path:
     """A file that sets the constants and includes `path`.
 
     If the constants came by gmsh's command line, it would keep them from one session to the next.

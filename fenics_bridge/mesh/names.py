@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,18 +39,18 @@ def names_of(tags: MeshTags | None) -> dict[str, tuple[int, ...]]:
     return getattr(tags, "names", {})
 
 
-def label(tags, number):
+def label(tags: Any, number: int | None) -> str:
     """A tag as messages show it: its own name if it has one, else the number."""
     return next((repr(name) for name, numbers in names_of(tags).items() if numbers == (number,)), str(number))
 
 
-def known_tags(comm, tags):
+def known_tags(comm: MPI.Comm, tags: Any) -> list[int]:
     """All tags that entities have on any rank, in order. Collective."""
     every = comm.allgather(set(np.unique(tags.values).tolist()) if tags is not None else set())
     return sorted(set().union(*every))
 
 
-def described(tags, known):
+def described(tags: Any, known: Iterable[int]) -> str:
     """Tags and names that a mesh has, for messages."""
     return ", ".join(label(tags, number) for number in known) or "none"
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError, on_root
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
@@ -68,7 +70,7 @@ def slope_mesh(
     """
     headroom = cell_size if headroom is None else headroom
 
-    def arrays():
+    def arrays() -> Any:
         shape = _checked(height, angle, crest, cell_size, runout, headroom, depth)
         makers = {"crossed": _crossed, "fitted": _fitted, "gmsh": _unstructured}
         if kind not in makers:
@@ -80,7 +82,15 @@ def slope_mesh(
     return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
 
 
-def _checked(height, angle, crest, cell_size, runout, headroom, depth):
+def _checked(
+    height: float,
+    angle: float,
+    crest: float,
+    cell_size: float,
+    runout: Any,
+    headroom: Any,
+    depth: Any,
+) -> tuple[Any, ...]:
     for name, value in (("height", height), ("crest", crest), ("cell_size", cell_size), ("runout", runout)):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"{name}: got {value!r} m, expected a positive length")
@@ -96,7 +106,9 @@ def _checked(height, angle, crest, cell_size, runout, headroom, depth):
     return height, crest, crest + slope_length, cell_size, runout, headroom, depth
 
 
-def _crossed(height, crest, base, size, runout, headroom, depth):
+def _crossed(
+    height: float, crest: float, base: float, size: float, runout: float, headroom: float, depth: float
+) -> tuple[Any, ...]:
     _require_multiple("height", height, size)
     _require_multiple("crest", crest, size)
     run = base - crest
@@ -108,7 +120,7 @@ def _crossed(height, crest, base, size, runout, headroom, depth):
     return _fitted(height, crest, base, size, runout, headroom, depth)
 
 
-def _require_multiple(name, value, cell_size):
+def _require_multiple(name: str, value: float, cell_size: float) -> None:
     if abs(round(value / cell_size) * cell_size - value) > 1e-9 * value:
         raise InputError(
             f"{name}: {value!r} m is not a multiple of cell_size={cell_size!r} m, as kind='crossed' "
@@ -116,11 +128,13 @@ def _require_multiple(name, value, cell_size):
         )
 
 
-def _angle(height, run):
+def _angle(height: float, run: float) -> float:
     return math.degrees(math.atan2(height, run))
 
 
-def _fitted(height, crest, base, size, runout, headroom, depth):
+def _fitted(
+    height: float, crest: float, base: float, size: float, runout: float, headroom: float, depth: float
+) -> tuple[Any, ...]:
     """Rectangles cut in four; under the slope there are as many columns as rows, so that it runs along diagonals."""
     run = base - crest
     if run > 0 and not 0.2 <= height / run <= 5:
@@ -152,7 +166,7 @@ def _fitted(height, crest, base, size, runout, headroom, depth):
     return MeshArrays(points, cells, np.where(soil, SOIL, EMPTY).astype(np.int32), facets, values)
 
 
-def _crossed_rectangles(x, y):
+def _crossed_rectangles(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, ...]:
     """The rectangles of a grid, each cut in four by its diagonals: corner nodes first, then the centres."""
     centres = 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:])
     points = np.vstack([np.column_stack([a.ravel() for a in np.meshgrid(*axes)]) for axes in ((x, y), centres)])
@@ -165,7 +179,9 @@ def _crossed_rectangles(x, y):
     return points, np.stack(cells, axis=1).reshape(-1, 3)
 
 
-def _tagged_edges(points, cells, soil, crest):
+def _tagged_edges(
+    points: NDArray[np.float64], cells: NDArray[np.integer], soil: NDArray[np.bool_], crest: Any
+) -> tuple[Any, ...]:
     """Edges of the outer boundary and of the soil's free surface, (k, 2) nodes, with their tags."""
     edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, inverse, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
@@ -184,7 +200,9 @@ def _tagged_edges(points, cells, soil, crest):
     return edges[values > 0], values[values > 0]
 
 
-def _unstructured(height, crest, base, size, runout, headroom, depth):
+def _unstructured(
+    height: float, crest: float, base: float, size: float, runout: float, headroom: float, depth: float
+) -> tuple[Any, ...]:
     if depth > 0:
         raise InputError(f"depth: got {depth!r} m, expected 0 with kind='gmsh'; use kind='fitted'")
     with gmsh_session():
@@ -196,7 +214,7 @@ def _unstructured(height, crest, base, size, runout, headroom, depth):
         return arrays_from_model(2, "slope_mesh")
 
 
-def _slope_geometry(height, crest, base, size, runout, headroom):
+def _slope_geometry(height: float, crest: float, base: float, size: float, runout: float, headroom: float) -> None:
     geo = gmsh.model.geo
     right, top = base + runout, height + headroom
     origin, toe, shoulder, back, end, corner, above = (

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dolfinx import la
 from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
@@ -51,7 +54,7 @@ def soil_mesh(
     return body, body_cells, body_facets
 
 
-def _numbered_nodes(domain, nodes):
+def _numbered_nodes(domain: Mesh, nodes: NDArray[np.integer]) -> tuple[Any, ...]:
     """Numbers without gaps, over all ranks, of the nodes in use, and this rank's part of their coordinates.
 
     Args:
@@ -76,7 +79,7 @@ def _numbered_nodes(domain, nodes):
     return np.rint(used.array).astype(np.int64), points
 
 
-def _owned_facets_of(domain, cells, facet_tags):
+def _owned_facets_of(domain: Mesh, cells: NDArray[np.integer], facet_tags: MeshTags) -> tuple[Any, ...]:
     """Nodes and tags of the tagged facets of the given cells; a facet may be listed by two ranks."""
     dim = domain.topology.dim
     if facet_tags is None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -28,7 +31,7 @@ class SlideMaps:
         self._fastest = np.zeros(ground.values.shape)
         self.record()
 
-    def _around(self):
+    def _around(self) -> Iterator[Any]:
         """The four points around each particle: (rows, columns) and the fraction of the particle that each of them has."""
         row, column, s, t = self.ground.place(self.model.particles.position)
         for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):

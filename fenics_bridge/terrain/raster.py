@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -172,7 +173,7 @@ def write_raster(path: str | Path, raster: Raster) -> None:
     path.with_suffix(".prj").write_text(raster.crs + "\n")
 
 
-def _reference(path, crs):
+def _reference(path: Path, crs: Any) -> Any:
     """The coordinate reference of a file, by what is given or by a .prj beside it."""
     beside = path.with_suffix(".prj")
     found = crs if crs is not None else beside.read_text().strip() if beside.is_file() else ""
@@ -189,7 +190,7 @@ def _reference(path, crs):
 _KEYS = {"ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value"}
 
 
-def _read_ascii(text, name):
+def _read_ascii(text: Any, name: str) -> tuple[Any, ...]:
     header, lines = {}, text.splitlines()
     while lines and lines[0].split() and lines[0].split()[0].lower() in _KEYS:
         key, *values = lines.pop(0).split()
@@ -217,7 +218,7 @@ def _read_ascii(text, name):
     return start["x"] + cell * np.arange(nx), start["y"] + cell * np.arange(ny), values.reshape(ny, nx)[::-1]
 
 
-def _read_points(text, name):
+def _read_points(text: str, name: str) -> tuple[Any, ...]:
     try:
         rows = np.array(text.replace(",", " ").split(), dtype=float)
     except ValueError as error:
@@ -235,7 +236,7 @@ def _read_points(text, name):
     return np.linspace(x[0], x[-1], len(x)), np.linspace(y[0], y[-1], len(y)), values
 
 
-def _check_heights(raster, name):
+def _check_heights(raster: Any, name: str) -> None:
     gaps = np.argwhere(~np.isfinite(raster.values))
     if len(gaps):
         at = raster.x[gaps[0][1]], raster.y[gaps[0][0]]

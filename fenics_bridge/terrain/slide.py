@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, on_root
@@ -53,7 +54,7 @@ def seed_slide(
     return model.add_contact(surface, friction=friction, adhesion=adhesion), lift
 
 
-def _points(before, rupture, surface, spacing):
+def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[Any, ...]:
     """Places and volumes of the particles, and how far they were lifted at most."""
     if before.crs != rupture.crs:
         raise InputError(f"rupture: is in {rupture.crs!r}, expected {before.crs!r} as the ground before the slide")
@@ -79,7 +80,7 @@ def _points(before, rupture, surface, spacing):
     return points + np.outer(lift[column], (0, 0, 1)), volumes, float(lift.max())
 
 
-def _lift(points, radii, column, surface):
+def _lift(points: NDArray[np.float64], radii: NDArray[np.float64], column: Any, surface: Any) -> NDArray[np.float64]:
     """How far each column goes up until no particle of it is nearer to the ground than its radius [m]."""
     lift = np.zeros(column.max() + 1)
     below = np.arange(len(points))  # those that may still be too near

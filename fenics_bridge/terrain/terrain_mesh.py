@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
@@ -52,7 +53,7 @@ def terrain_mesh(
     coarse = 4 * cell_size if coarse_size is None else coarse_size
     below = 1.5 * cell_size if depth is None else depth
 
-    def arrays():
+    def arrays() -> Any:
         _check(ground, cell_size, height, coarse, below, fine)
         plan = _plan(ground, cell_size, coarse, fine)
         return _extruded(plan, ground, below, height, max(1, round((height + below) / cell_size)))
@@ -61,7 +62,7 @@ def terrain_mesh(
     return distributed_mesh(comm, result if result is not None else empty_arrays(3), 3)
 
 
-def _check(ground, cell_size, height, coarse, below, fine):
+def _check(ground: Any, cell_size: float, height: float, coarse: Any, below: Any, fine: Any) -> None:
     for name, value in (("cell_size", cell_size), ("height", height), ("coarse_size", coarse), ("depth", below)):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"{name}: got {value!r} m, expected a positive length")
@@ -74,7 +75,7 @@ def _check(ground, cell_size, height, coarse, below, fine):
         raise InputError(f"ground: has {len(ground.y)} rows and {len(ground.x)} columns, expected 4 or more of both")
 
 
-def _plan(ground, cell_size, coarse, fine):
+def _plan(ground: Any, cell_size: float, coarse: Any, fine: Any) -> tuple[Any, ...]:
     """Triangles in plan, by gmsh."""
     x0, x1, y0, y1 = ground.x[1], ground.x[-2], ground.y[1], ground.y[-2]
     with gmsh_session() as model:
@@ -96,7 +97,7 @@ def _plan(ground, cell_size, coarse, fine):
         return arrays_from_model(2, "terrain_mesh")
 
 
-def _extruded(plan, ground, below, height, layers):
+def _extruded(plan: Any, ground: Any, below: Any, height: float, layers: Any) -> tuple[Any, ...]:
     """Prisms over the triangles, each in three tetrahedra.
 
     The diagonals of sides go up from the column of the lower number, so that neighbours agree (Dompierre et al. 1999).

@@ -1,6 +1,7 @@
 """The background mesh."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -95,7 +96,7 @@ class Mesh:
     ) -> None:
         self.comm = comm
 
-        def build():
+        def build() -> Any:
             array = np.asarray(points)
             if array.ndim != 2 or array.shape[1] not in (2, 3):
                 raise InputError(f"points has shape {array.shape}, expected (n, 2) or (n, 3)")
