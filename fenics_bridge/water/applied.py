@@ -80,7 +80,7 @@ class AppliedBoundary:
         self.held = [self._where(condition) for condition in boundary]
         return True
 
-    def _where(self, condition):
+    def _where(self, condition: WaterBoundary) -> Any:
         """Where a boundary condition holds."""
         domain, dim = self._space.mesh, self._dim
         tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")

@@ -74,7 +74,7 @@ class BoundedProblem:
         """F of the unknown as it is, (m,) on the dofs of this rank, ghosts included. Collective."""
         return assembled(self._form, self._space, into=self._vector).array
 
-    def _attempt(self, upper):
+    def _attempt(self, upper: NDArray[np.float64]) -> Any:
         comm = self._space.mesh.comm
         snes = PETSc.SNES().create(comm)
         snes.setOptionsPrefix(self._prefix)
@@ -102,15 +102,15 @@ class BoundedProblem:
             return None
         return f"Newton's method ended after {self.iterations} iterations with a residual of {norm:.3g} (PETSc's reason {reason})"
 
-    def _set(self, x):
+    def _set(self, x: Any) -> None:
         self.unknown.x.array[: self._n] = x.array_r[: self._n]
         self.unknown.x.scatter_forward()
 
-    def _function(self, snes, x, f):
+    def _function(self, snes: Any, x: Any, f: Any) -> None:
         self._set(x)
         f.array[:] = np.where(self._fixed, x.array_r - self._values[: self._n], self.residual()[: self._n])
 
-    def _jacobian(self, snes, x, jacobian, preconditioner):
+    def _jacobian(self, snes: Any, x: Any, jacobian: Any, preconditioner: Any) -> None:
         self._matrix.zeroEntries()
         petsc.assemble_matrix(self._matrix, self._tangent)
         self._matrix.assemble()

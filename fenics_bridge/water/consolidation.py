@@ -170,7 +170,7 @@ class Consolidation(PointFunctions):
         self._gravity = self._terms.gravity_flow(self._space)
         self._take_boundary(first=True)
 
-    def _take_boundary(self, first=False):
+    def _take_boundary(self, first: bool = False) -> None:
         """Put together what depends on the water's boundary conditions, where they have changed. Collective."""
         if not (self._applied.take(self.boundary) or first):
             return
@@ -273,15 +273,15 @@ class Consolidation(PointFunctions):
         """
         return run(self, until, first_step, growth, longest, progress)
 
-    def _read_pressure(self):
+    def _read_pressure(self) -> None:
         self.pressure.x.array[:] = self._unit * self._body.solution.x.array[self._pressures[1]]
 
-    def _solved(self, external, displacement, end, dt):
+    def _solved(self, external: Any, displacement: Any, end: Any, dt: float) -> Any:
         """What `solve_step` returns for the step under way."""
         fixed, heads, upper = self._applied.bounds(end)
         unit = self._weights[0] / self._unit
 
-        def step():
+        def step() -> Any:
             return CoupledStep(
                 self._body, self._laws, external, self._external, displacement, self._owned, dt * self._gravity
             )
@@ -290,7 +290,7 @@ class Consolidation(PointFunctions):
         state = lambda: self._step_state(dt)
         return solve_step(step, self._body.constraints, bounds, self._active, state, self.solver)
 
-    def _step_state(self, dt):
+    def _step_state(self, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pressures and inflows of the step under trial.
 
         Returns:
@@ -417,16 +417,18 @@ class Consolidation(PointFunctions):
         return force_on(space, forces[dofs], self._facet_tags, facet_tag)
 
 
-def _parts(space):
+def _parts(space: Any) -> Any:
     """Displacement and pressure of a mixed space, each with its dofs there."""
     return [space.sub(i).collapse() for i in (0, 1)]
 
 
-def _largest_conductivity(soils):
+def _largest_conductivity(soils: Any) -> float:
     return max(np.linalg.eigvalsh(soil.tensor(soil.conductivity, 3)).max() for soil in soils)
 
 
-def _first_mistake(element, soil, unit_weight, water_modulus, geometry, inertia):
+def _first_mistake(
+    element: Any, soil: Any, unit_weight: Any, water_modulus: float, geometry: Any, inertia: Any
+) -> str | None:
     if not isinstance(element, Element):
         return f"element: got {element!r}, expected one of {', '.join(map(str, Element))}"
     for one in soil.values() if isinstance(soil, dict) else [soil]:

@@ -83,7 +83,7 @@ class CoupledStep(EquilibriumStep):
         self._of_stress = body.kinematics.internal_forces(stress).array.copy()
         self._of_stress -= body.kinematics.internal_forces(np.zeros_like(stress)).array
 
-    def _forces_at_work(self, out_of_balance):
+    def _forces_at_work(self, out_of_balance: Any) -> Any:
         """Norms by which residuals of displacement and pressure are divided: the largest ones that take part.
 
         A volume of water times the unit of pressure counts as a force, so that the error of a volumetric strain weighs as much
@@ -93,7 +93,7 @@ class CoupledStep(EquilibriumStep):
         force = max(self._norm(array[self._parts[0]]) for array in arrays)
         return force, max(force, self._norm(out_of_balance[self._parts[1]]), self._norm(self._gravity_flow))
 
-    def _relative(self, out_of_balance):
+    def _relative(self, out_of_balance: Any) -> Any:
         norms = (self._norm(out_of_balance[dofs]) for dofs in self._parts)
         return max(norm / scale if scale > 0 else 0.0 for norm, scale in zip(norms, self.scale))
 

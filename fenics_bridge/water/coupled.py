@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
+from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
 from fenics_bridge.water.motion import Motion, inertia, over_gravity
 from fenics_bridge.water.retention import AlwaysSaturated
@@ -99,7 +100,7 @@ class WaterTerms:
     def forms(self, applied: Any) -> Callable[[Any, Any], tuple[Any, Any]]:
         """Further internal forces and their tangent as a function of test and trial functions, for `Kinematics`."""
 
-        def further(test, trial):
+        def further(test: Any, trial: Any) -> Any:
             v, q = ufl.split(test)
             end = self._p + self._dp
             forces = self._sum(lambda s: self._pressing(s, end) * self._volume(v) + self._missing(s, end, v))
@@ -122,38 +123,38 @@ class WaterTerms:
         q = ufl.TestFunctions(space)[1]
         return self._unit * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
 
-    def _flow(self, gradient, q, pressure):
-        def density(soil):
+    def _flow(self, gradient: Any, q: Any, pressure: Any) -> Any:
+        def density(soil: PorousSoil) -> Any:
             k = ufl.as_matrix(soil.tensor(soil.conductivity, self._dim).tolist())
             through = soil.retention.relative_permeability(-self._unit * pressure) if _may_dry(soil) else 1.0
             return through * ufl.inner(k * gradient, ufl.grad(q))
 
         return self._sum(density)
 
-    def _sum(self, density, measures=None):
+    def _sum(self, density: Callable[[PorousSoil], Any], measures: Any = None) -> Any:
         """Integral over the cells of all soils of a density that is a function of the soil."""
         pairs = zip(self._soils, measures or self._measures)
         return sum(weighted(density(soil), self._radius) * dx for soil, dx in pairs)
 
-    def _saturation(self, soil, pressure):
+    def _saturation(self, soil: PorousSoil, pressure: Any) -> Any:
         return soil.retention.saturation(-self._unit * pressure) if _may_dry(soil) else 1.0
 
-    def _pressing(self, soil, pressure):
+    def _pressing(self, soil: PorousSoil, pressure: Any) -> Any:
         """Part of the pressure that the total stress has, over its unit."""
         return soil.retention.effective(-self._unit * pressure) * pressure if _may_dry(soil) else pressure
 
-    def _missing(self, soil, pressure, v):
+    def _missing(self, soil: PorousSoil, pressure: Any, v: Any) -> Any:
         """Weight of the water that pores have no more, times a test function, over the unit of pressure."""
         if not _may_dry(soil):
             return 0.0
         lost = soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
         return lost * ufl.inner(self._driving, v)
 
-    def _pores(self, soil):
+    def _pores(self, soil: PorousSoil) -> Any:
         """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""
         return soil.porosity + self._volume(self._u) + self._storage(soil) * self._p
 
-    def _stored(self, soil):
+    def _stored(self, soil: PorousSoil) -> Any:
         """Water that a volume of soil takes up in the step; small differences are taken first, for the sake of round-off."""
         gained = self._volume(self._du) + self._storage(soil) * self._dp
         if not _may_dry(soil):
@@ -161,10 +162,10 @@ class WaterTerms:
         now, before = (self._saturation(soil, p) for p in (self._p + self._dp, self._p))
         return now * gained + (now - before) * self._pores(soil)
 
-    def _volume(self, u):
+    def _volume(self, u: Any) -> Any:
         return dilation(u, self._radius)
 
-    def _storage(self, soil):
+    def _storage(self, soil: PorousSoil) -> Any:
         return self._unit * soil.porosity / self._modulus
 
 
@@ -214,7 +215,7 @@ class CoupledConstraints:
 class ReservoirLoads:
     """Forces of the water that stands against the soil: its pressure, along the normal, wherever a Reservoir is."""
 
-    def __init__(self, space, facet_tags, applied, unit_weight, radius):
+    def __init__(self, space: Any, facet_tags: MeshTags, applied: Any, unit_weight: Any, radius: Any) -> None:
         domain, dim = space.mesh, space.mesh.geometry.dim
         v, height = ufl.TestFunctions(space)[0], ufl.SpatialCoordinate(domain)[dim - 1]
         normal, self._space, self._parts = ufl.FacetNormal(domain), space, []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
@@ -32,7 +33,7 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     model._read_pressure()
 
 
-def _pressures(model, pore_pressure):
+def _pressures(model: Any, pore_pressure: Any) -> Any:
     """Pore pressures [Pa] at the nodes: (m,); None for none. Collective."""
     if pore_pressure is None:
         return None
@@ -44,6 +45,6 @@ def _pressures(model, pore_pressure):
     return pore_pressure.unit_weight * search.values(pore_pressure.pressure_head)[:, 0]
 
 
-def _require(comm, name, values, shape):
+def _require(comm: MPI.Comm, name: str, values: Any, shape: Any) -> None:
     good = values is None or (np.shape(values) == shape and np.all(np.isfinite(values)))
     agree(comm, None if good else f"{name}: got shape {np.shape(values)}, expected finite values of shape {shape}")

@@ -77,7 +77,7 @@ class VanGenuchten(_Curve):
     air_entry: float = 0.0
     """Air-entry suction [Pa], 0 or more"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
         if not (np.isfinite(self.n) and self.n > 1):
             raise InputError(f"n: got {self.n!r}, expected more than 1")
@@ -85,7 +85,7 @@ class VanGenuchten(_Curve):
         if not (np.isfinite(self.air_entry) and self.air_entry >= 0):
             raise InputError(f"air_entry: got {self.air_entry!r} Pa, expected 0 or more")
 
-    def _powers(self, suction):
+    def _powers(self, suction: Any) -> Any:
         """(alpha s)^n at the suction and at the air entry."""
         entry = max(self.alpha * self.air_entry, _SMALL)
         return _at_least(suction * self.alpha, entry) ** self.n, entry**self.n
@@ -129,7 +129,7 @@ class Gardner(_Curve):
     residual: float = 0.0
     """Residual degree of saturation [-], in [0, 1)"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
         _check_residual(self.residual)
 
@@ -165,7 +165,7 @@ class Tabulated(_Curve):
     permeability_values: tuple[float, ...]
     """Relative permeabilities [-], shape (k,), falling from 1 and 0 or more"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         lengths = {len(self.suction), len(self.saturation_values), len(self.permeability_values)}
         if len(lengths) != 1 or lengths == {1} or lengths == {0}:
             raise InputError(f"suction, saturation_values and permeability_values have {sorted(lengths)} values, "
@@ -234,7 +234,7 @@ class FreeSurface(_Curve):
     residual: float = 0.0
     """Residual degree of saturation [-], in [0, 1)"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_positive("fringe", self.fringe, "Pa")
         _check_residual(self.residual)
         if not 0 < self.dry_permeability < 1:
@@ -278,19 +278,19 @@ class AlwaysSaturated(_Curve):
 # --- for numbers and UFL alike ---------------------------------------------------------------------------------------
 
 
-def _exp(x):
+def _exp(x: Any) -> Any:
     return ufl.exp(x) if isinstance(x, Expr) else np.exp(x)
 
 
-def _at_least(x, low):
+def _at_least(x: Any, low: float) -> Any:
     return ufl.max_value(x, low) if isinstance(x, Expr) else np.maximum(x, low)
 
 
-def _at_most(x, high):
+def _at_most(x: Any, high: float) -> Any:
     return ufl.min_value(x, high) if isinstance(x, Expr) else np.minimum(x, high)
 
 
-def _joined(x, places, values):
+def _joined(x: Any, places: Any, values: Any) -> Any:
     """Straight lines between points; the first and the last value outside of them."""
     if not isinstance(x, Expr):
         return np.interp(x, places, values)
@@ -301,11 +301,11 @@ def _joined(x, places, values):
     return ufl.conditional(ufl.lt(x, places[0]), ufl.as_ufl(float(values[0])), result)
 
 
-def _check_positive(name, value, unit):
+def _check_positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0):
         raise InputError(f"{name}: got {value!r} {unit}, expected a positive number")
 
 
-def _check_residual(value):
+def _check_residual(value: float) -> None:
     if not 0 <= value < 1:
         raise InputError(f"residual: got {value!r}, expected at least 0 and less than 1")

@@ -13,6 +13,7 @@ guessed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 import ufl
@@ -117,7 +118,7 @@ class Seepage:
         if self._applied.take(self.boundary):
             self._steady = self._transient = None
 
-    def _set_load(self):
+    def _set_load(self) -> None:
         """The loading at the present time."""
         if self._loading is None:
             return
@@ -152,7 +153,7 @@ class Seepage:
             raise RuntimeError(f"steady seepage was not found: {failure}; try a retention curve that falls more gently, or a "
                                "finer mesh")  # fmt: skip
 
-    def _sharpen(self):
+    def _sharpen(self) -> Any:
         """Find the steady flow by continuation.
 
         Retention curves are stretched over a suction 1000 times as large, which makes the problem nearly linear, and are
@@ -200,7 +201,7 @@ class Seepage:
             self._load.x.array[:] = self._old_load.x.array
         return not failure
 
-    def _solve(self, problem):
+    def _solve(self, problem: Any) -> Any:
         self._applied.set_time(self.time)
         height, (fixed, values, upper) = self._applied.height, self._applied.bounds(self.time)
         heads = np.concatenate([values[fixed] + height[fixed], height])
@@ -218,7 +219,7 @@ class Seepage:
             self._reaction = self._largest * problem.residual()
         return failure
 
-    def _problem(self, transient):
+    def _problem(self, transient: bool) -> Any:
         psi, test = self.pressure_head, ufl.TestFunction(self.pressure_head.function_space)
         trial = ufl.TrialFunction(self.pressure_head.function_space)
         form, lagged = 0, 0
@@ -236,21 +237,21 @@ class Seepage:
         form -= self._applied.inflow_form(test)
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
 
-    def _lumped(self, dx):
+    def _lumped(self, dx: Any) -> Any:
         """The measure for what is lumped: linear elements integrate it at their vertices."""
         rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
         return dx(metadata=rule if self._degree == 1 else {"quadrature_degree": QUADRATURE[self._degree]})
 
-    def _water_content(self, soil, psi, load):
+    def _water_content(self, soil: PorousSoil, psi: Any, load: Any) -> Any:
         return soil.retention.saturation(-self.unit_weight * psi) * (soil.porosity + self._held(soil, psi, load))
 
-    def _held(self, soil, psi, load):
+    def _held(self, soil: PorousSoil, psi: Any, load: Any) -> Any:
         """Water [-] by which saturated soil has more than its porosity."""
         storage = soil.porosity / self.water_modulus + soil.compressibility
         held = storage * self.unit_weight * psi
         return held if self._loading is None else held - soil.compressibility * load
 
-    def _change_of_water(self, soil):
+    def _change_of_water(self, soil: PorousSoil) -> Any:
         """Change of the water content since the step began; small differences are taken first, for the sake of round-off."""
         psi, old = self.pressure_head, self._old
         now, before = (soil.retention.saturation(-self.unit_weight * p) for p in (psi, old))
@@ -317,7 +318,7 @@ class Seepage:
         )
         return at_positions(self._pressure(effective), outside)
 
-    def _pressure(self, effective):
+    def _pressure(self, effective: Any) -> Any:
         """Pore pressure [Pa]: continuous and cut off at zero or, with effective saturations, with that part of the suction."""
         psi = self.pressure_head
         result = fem.Function(psi.function_space, name="pore_pressure")

@@ -42,7 +42,7 @@ class PorousSoil:
     density: float | None = None
     """Density of the saturated soil [kg/m3]; for steps with inertia only"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         k = np.asarray(self.conductivity, dtype=float)
         square = k.ndim == 2 and k.shape[0] == k.shape[1] and np.allclose(k, k.T)
         if not (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
@@ -45,7 +46,7 @@ def standing_water(
         (np.ptp(line) for _, ground in grounds for line in ground), default=0.0
     )  # round-off of coordinates
 
-    def pressure(points, time):
+    def pressure(points: NDArray[np.float64], time: float) -> Any:
         deepest = np.zeros(len(points))
         for condition, (x, y) in grounds:
             below = (points[:, 0] >= x[0] - close) & (points[:, 0] <= x[-1] + close)

@@ -32,7 +32,7 @@ def run(
     return reports
 
 
-def _mistake(until, time, first_step, growth, longest):
+def _mistake(until: float, time: float, first_step: float, growth: float, longest: float) -> str | None:
     if not (np.isfinite(until) and until > time):
         return f"until: got {until!r} s, expected a time after the present one, {time:g} s"
     if not (np.isfinite(first_step) and first_step > 0):
