@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
@@ -29,7 +30,7 @@ class Facets(NamedTuple):
     """Positions of these nodes [m], shape (m, k, D)"""
 
 
-def facets_of_space(space, facets: NDArray[np.int32]) -> Facets:
+def facets_of_space(space: Any, facets: NDArray[np.int32]) -> Facets:
     """Facets on the border of the body of a Lagrange space, with its nodes on them.
 
     Args:
@@ -77,7 +78,7 @@ def facets_of_mesh(mesh: BackgroundMesh, tags: tuple[int, ...]) -> Facets:
     return Facets(every.corners[first], every.nodes[first], every.points[first])
 
 
-def _gathered(comm, local: Facets) -> Facets:
+def _gathered(comm: MPI.Comm, local: Facets) -> Facets:
     """The facets of all ranks, in an order that does not depend on these."""
     every = Facets(*(np.concatenate(part) for part in zip(*comm.allgather(local), strict=True)))
     centres = np.round(every.corners.mean(axis=1), 9) if len(every.corners) else np.zeros((0, 2))

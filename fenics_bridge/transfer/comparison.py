@@ -64,7 +64,9 @@ def compare(
     return {name: _difference(model.comm, here, there, particles.volume) for name, (here, there) in pairs.items()}
 
 
-def _difference(comm, values, reference, volume):
+def _difference(
+    comm: MPI.Comm, values: NDArray[np.float64], reference: NDArray[np.float64], volume: NDArray[np.float64]
+) -> Difference:
     difference = values - reference
     sums = [comm.allreduce(float(np.sum(volume[:, None] * a**2))) for a in (difference, reference)]
     largest = [
@@ -73,5 +75,5 @@ def _difference(comm, values, reference, volume):
     return Difference(_ratio(*sums) ** 0.5, _ratio(*largest), difference)
 
 
-def _ratio(above, below):
+def _ratio(above: float, below: float) -> float:
     return above / below if below > 0 else (0.0 if above == 0 else np.inf)

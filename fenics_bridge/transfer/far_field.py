@@ -10,6 +10,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -87,7 +88,15 @@ class FarField:
         held = Constraints(self._space, facet_tags, supports)
         self._condense(blocks, held, float(young), float(poisson), float(density), options_prefix)
 
-    def _condense(self, blocks, held, young, poisson, density, options_prefix):
+    def _condense(
+        self,
+        blocks: NDArray[np.int32],
+        held: Constraints,
+        young: float,
+        poisson: float,
+        density: float,
+        options_prefix: str,
+    ) -> None:
         """Find the stiffness of the free components of the border's nodes, and their forces by unit gravity."""
         space, dim = self._space, self._domain.geometry.dim
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
@@ -211,7 +220,7 @@ class FarField:
         flat = whole.reshape(len(whole), -1)
         return Border(nodes[order], flat.T @ self.stiffness @ flat, np.einsum("rna,rd->nad", whole, self.mass))
 
-    def _positions(self):
+    def _positions(self) -> NDArray[np.float64]:
         numbers, first = np.unique(self._facets.nodes, return_index=True)
         return self._facets.points.reshape(-1, self._domain.geometry.dim)[first]
 
@@ -226,7 +235,9 @@ class FarField:
         return self._displaced(border, sum(g * load for g, load in zip(added, self._loads, strict=True)))
 
 
-def _first_mistake(young, poisson, density, degree, supports):
+def _first_mistake(
+    young: float, poisson: float, density: float, degree: int, supports: Sequence[Support]
+) -> str | None:
     if not (np.isfinite(young) and young > 0):
         return f"young: got {young!r} Pa, expected a positive number"
     if not 0 <= poisson < 0.5:
@@ -239,7 +250,7 @@ def _first_mistake(young, poisson, density, degree, supports):
     return f"supports: {moving[0]} moves, expected displacements of zero" if moving else None
 
 
-def _require_same_border(comm, first: Facets, second: Facets, common: float) -> None:
+def _require_same_border(comm: MPI.Comm, first: Facets, second: Facets, common: float) -> None:
     """Raise InputError unless two borders are the same lines or surfaces."""
     sizes = [sum(measure(corners) for corners in facets.corners) for facets in (first, second)]
     same = np.allclose(sizes, common, rtol=1e-6)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpm_core.checks import renamed
+from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
@@ -113,7 +116,7 @@ def initialise(
     return Handover(before, after, returned / count, yielded / count)
 
 
-def _take_stress_and_state(model, fem, search, smooth):
+def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smooth: bool) -> int:
     """Give the particles stress and state of the finite elements at their positions; returns the number of returned stresses."""
     particles = model.particles
     stress, state = search.values(fem.stress_function(smooth)), particles.state.copy()
@@ -132,7 +135,7 @@ def _take_stress_and_state(model, fem, search, smooth):
     return returned
 
 
-def _displace(model, displacement, search, move, count):
+def _displace(model: Any, displacement: Any, search: PointSearch, move: bool, count: bool) -> None:
     """Move the particles, count the displacement as theirs, both or neither; rows may have another order afterwards."""
     particles, start = model.particles, model.particles.position
     moved = search.values(displacement)
@@ -150,7 +153,9 @@ def _displace(model, displacement, search, move, count):
         particles.set("volume", fitted_volumes(particles.volume, particles.cell, held))
 
 
-def _returned(laws, material, stress, state):
+def _returned(
+    laws: Sequence[Any], material: NDArray[np.integer], stress: NDArray[np.float64], state: NDArray[np.float64]
+) -> int:
     """Return stresses to the yield surface, in place; returns the number of those that were outside."""
     outside = 0
     for number, law in enumerate(laws):
@@ -163,7 +168,7 @@ def _returned(laws, material, stress, state):
     return outside
 
 
-def _require_usable(model, fem, move):
+def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
@@ -177,7 +182,7 @@ def _require_usable(model, fem, move):
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 
 
-def _require_same_laws(model, fem, number):
+def _require_same_laws(model: mpm.Model, fem: Any, number: Any) -> None:
     """Raise InputError, on all ranks, unless particles have the laws that the finite elements have there.
 
     Args:
@@ -191,7 +196,7 @@ def _require_same_laws(model, fem, number):
     agree(model.comm, next((mistake for mistake in mistakes if mistake), None))
 
 
-def _law_mistake(material, law, there):
+def _law_mistake(material: Any, law: Any, there: Any) -> str | None:
     """Difference between the law of a material and that of the finite elements, in words; None for none."""
     if type(law) is not type(there):
         return f"fem: its law is {type(there).__name__}, that of material {material} is {type(law).__name__}"
@@ -204,6 +209,6 @@ def _law_mistake(material, law, there):
     return None
 
 
-def _parameters(law):
+def _parameters(law: Any) -> Any:
     """Names of a law's parameters: its numbers, and whatever else is no method."""
     return [name for name in dir(law) if not name.startswith("_") and not callable(getattr(law, name))]

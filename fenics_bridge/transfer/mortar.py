@@ -33,7 +33,7 @@ class Polynomials:
         """Their values (n, k) at points (n, D)."""
         return self._monomials(points) @ self._weights
 
-    def _monomials(self, points):
+    def _monomials(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         coordinates = barycentric(self._corners, points)
         powers = combinations_with_replacement(range(coordinates.shape[1]), self.degree)
         return np.stack([np.prod(coordinates[:, list(each)], axis=1) for each in powers], axis=1)
@@ -53,7 +53,7 @@ def intersection(first: NDArray[np.float64], second: NDArray[np.float64]) -> lis
     return [simplex for simplex in simplices if measure(simplex) > ROUND_OFF * size ** (len(first) - 1)]
 
 
-def _clipped(polygon, height):
+def _clipped(polygon: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
     """The part of a polygon, or of a line of two points, where heights at its corners are not below zero."""
     kept = []
     n = len(polygon)

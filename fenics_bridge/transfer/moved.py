@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -108,11 +110,11 @@ def simplex_samples(dim: int, count: int) -> NDArray[np.float64]:
     return -np.diff(ends, axis=1)
 
 
-def _ordered(corners):
+def _ordered(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """The corners of each cell by their coordinates: their numbers, and so the samples, would depend on the partition."""
     order = np.lexsort(np.moveaxis(corners, 2, 0), axis=-1)
     return np.take_along_axis(corners, order[:, :, None], axis=1)
 
 
-def _mean(comm, values):
+def _mean(comm: MPI.Comm, values: NDArray[Any]) -> Any:
     return comm.allreduce(float(values.sum())) / comm.allreduce(len(values), MPI.SUM)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -67,7 +69,7 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
     return force + _surface_forces(model, everywhere, suction)[0]
 
 
-def _surface_forces(model, chosen, pressure):
+def _surface_forces(model: mpm.Model, chosen: Any, pressure: Any) -> tuple[NDArray[np.float64], Any]:
     """Forces by a pressure on those chosen facets of cells beyond which there are no particles.
 
     Args:
@@ -106,7 +108,7 @@ def _surface_forces(model, chosen, pressure):
     return force, model.comm.allreduce(len(facets))
 
 
-def _gradients(mesh):
+def _gradients(mesh: Any) -> NDArray[np.float64]:
     """Gradients of the shape functions of each cell: (m, D + 1, D) [1/m]."""
     corners = mesh.points[mesh.cells]
     inner = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)

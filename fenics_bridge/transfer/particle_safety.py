@@ -97,7 +97,7 @@ def particle_safety(
     _check(start=start, first_step=first_step, tolerance=tolerance, damping=damping, rest=rest)
     models, curve = {}, []
 
-    def attempt(factor):
+    def attempt(factor: float) -> Any:
         models[factor] = model = model_of(factor)
         agree(model.comm, None if np.any(model.gravity) else "model_of: its model has no gravity to fail under")
         report, moved = _follow(model, damping, rest, nmd)
@@ -127,7 +127,7 @@ def particle_safety(
     )
 
 
-def _check(**values):
+def _check(**values: float) -> None:
     """Raise InputError for a value that is not positive, or not below 1 where that is required."""
     for name, value in values.items():
         below = {"tolerance": 1.0, "damping": 1.0, "rest": 1.0}.get(name, math.inf)
@@ -136,7 +136,7 @@ def _check(**values):
             raise InputError(f"{name}: got {value!r}, expected {expected}")
 
 
-def _follow(model, damping, rest, nmd):
+def _follow(model: Any, damping: float, rest: float, nmd: bool) -> Any:
     """Run a model until it rests or flows; returns EquilibriumReport and the largest displacement of a particle [m]."""
     period, settlement = _scales(model)
     residuals, moved = [1.0], [0.0]
@@ -161,13 +161,13 @@ def _follow(model, damping, rest, nmd):
     return EquilibriumReport("undecided", residuals, reason, iterations), moved[-1]
 
 
-def _flows(moved):
+def _flows(moved: list[float]) -> bool:
     """Whether the displacements of equal times grew as much in the last quarter of them as in the one before, or more."""
     quarter = len(moved) // 4
     return moved[-1] - moved[-1 - quarter] >= moved[-1 - quarter] - moved[-1 - 2 * quarter]
 
 
-def _scales(model):
+def _scales(model: mpm.Model) -> tuple[float, float]:
     """Time that a shear wave takes through the body [s], and its elastic settlement under its weight [m]. Collective."""
     p, comm = model.particles, model.comm
     low = np.min(comm.allgather(p.position.min(axis=0, initial=np.inf)), axis=0)
@@ -182,7 +182,7 @@ def _scales(model):
     )
 
 
-def _largest_displacement(model):
+def _largest_displacement(model: mpm.Model) -> float:
     """Largest displacement of a particle [m]. Collective."""
     lengths = np.linalg.norm(model.particles.displacement, axis=1)
     return model.comm.allreduce(float(lengths.max(initial=0.0)), MPI.MAX)

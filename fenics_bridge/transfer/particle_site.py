@@ -135,7 +135,7 @@ class ParticleSite:
             rows |= (ids >= first) & (ids < end) & (tag in tags)
         return rows
 
-    def _fill(self, tag, unit_weight, stage):
+    def _fill(self, tag: int, unit_weight: Any, stage: Stage) -> None:
         model, first = self.model, self.model._next_id
         model.seed(density=unit_weight / self._g, per_cell=self._per_cell, cell_tag=tag, material=self._material[tag])
         self._seeded.append((first, model._next_id, tag))
@@ -144,13 +144,13 @@ class ParticleSite:
             stress[rows] = stage.stress(model.particles.position[rows])
             model.particles.set("stress", stress)
 
-    def _number_of(self, law, stage):
+    def _number_of(self, law: Any, stage: Stage) -> int:
         numbers = [number for number, known in enumerate(self.model.laws) if known is law]
         message = f"stage {stage.name!r}: law: {law!r} is not among the laws that the model was made with"
         agree(self.model.comm, None if numbers else message)
         return numbers[0]
 
-    def _change_laws(self, material):
+    def _change_laws(self, material: Any) -> None:
         model = self.model
         numbers, state, changed = model.particles.material.copy(), model.particles.state.copy(), False
         for tag, number in material.items():
@@ -163,7 +163,7 @@ class ParticleSite:
             model.particles.set("state", state)
             model._seeded(0, 0)  # gives laws that ask for it the size of the cells
 
-    def _weigh(self, state):
+    def _weigh(self, state: SiteState) -> None:
         """Scale masses by the ratio of the new unit weights to the old ones; undeformed volumes are not stored."""
         mass = self.model.particles.mass.copy()
         for tag in self.state.there:
@@ -171,7 +171,7 @@ class ParticleSite:
                 mass[self.rows_of(tag)] *= state.unit_weight[tag] / self.state.unit_weight[tag]
         self.model.particles.set("mass", mass)
 
-    def _load(self, state):
+    def _load(self, state: SiteState) -> Any:
         """Forces of pressures and pore water on the particles; they replace those of the stage before."""
         model = self.model
         force = np.zeros((len(model.particles), model.mesh.dim))
@@ -181,7 +181,7 @@ class ParticleSite:
             force += seepage_forces(model, state.pore_pressure)
         model.particles.set("traction", force)
 
-    def _failure(self, stage, error):
+    def _failure(self, stage: Stage, error: Any) -> Any:
         return (
             f"stage {self.number} ({stage.name!r}) has no equilibrium of the particles: {error}. Either the ground fails: take a "
             "smaller change, more strength or more support, or follow the failure by the explicit or implicit scheme; or "
@@ -217,12 +217,12 @@ def apply_supports(model: mpm.Model, supports: Sequence[Support]) -> None:
                     model.roller(support.facet_tag, np.eye(dim)[axis])
 
 
-def stage_laws(stage, state):
+def stage_laws(stage: Stage, state: SiteState) -> Any:
     """Tags of the soils whose law a stage gives."""
     return [tag for tag, law in state.law.items() if any(law is given for given in stage.law.values())]
 
 
-def _tags(model, kind, given, argument):
+def _tags(model: mpm.Model, kind: str, given: Any, argument: str) -> Any:
     try:
         return model.mesh.tags_of(kind, given)
     except mpm.InputError as error:
