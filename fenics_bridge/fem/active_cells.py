@@ -8,11 +8,15 @@ the same to Newton's method.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem, la
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
@@ -24,12 +28,12 @@ from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
 
-def switch_off(model):
+def switch_off(model: Any) -> None:
     """Deactivate all cells, before the first soil is placed."""
     model.points.assign(np.full(owned_cells(model.domain), -1, dtype=np.int32), len(model.laws))
 
 
-def reconfigure(model, off, supports, pore_pressure, stress, law):
+def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress: Any, law: Any) -> None:
     """Apply the changes of `QuasiStatic.reconfigure`."""
     domain, points, before = model.domain, model.points, model.laws
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
@@ -56,7 +60,7 @@ def reconfigure(model, off, supports, pore_pressure, stress, law):
     model.load = replace(old, held=1.0)
 
 
-def _cells_there(model, off):
+def _cells_there(model: Any, off: Any) -> Any:
     """Function that is 1 in active cells, including ghost cells; its dofs are numbered as the cells."""
     there = fem.Function(compat.function_space(model.domain, "DG", 0), name="active")
     values = tag_values(model.domain, model.cell_tags, model.domain.topology.dim)
@@ -64,7 +68,7 @@ def _cells_there(model, off):
     return there
 
 
-def _given_stress(model, stress, new):
+def _given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | None:
     """Initial stress of the new points: (k, S) [Pa]; None for none."""
     if stress is None:
         return None
@@ -75,7 +79,7 @@ def _given_stress(model, stress, new):
     return given
 
 
-def _take_over(model, new, laws, before, given):
+def _take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: Any) -> None:
     """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state."""
     points = model.points
     points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
@@ -91,7 +95,7 @@ def _take_over(model, new, laws, before, given):
         points.stress[other], points.state[other] = points.trial_stress[other], points.trial_state[other]
 
 
-def _support(model, supports, there):
+def _support(model: Any, supports: Any, there: Any) -> None:
     """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement."""
     space = model.displacement.function_space
     constraints = Constraints(space, model.facet_tags, supports, _lonely_nodes(space, there))
@@ -100,7 +104,7 @@ def _support(model, supports, there):
     model._assemble(constraints)
 
 
-def _lonely_nodes(space, there):
+def _lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:
     """Blocked dofs, including ghosts, that belong to no active cell: (k,) int32. Collective."""
     count = la.vector(space.dofmap.index_map, 1)
     count.array[:] = 0.0
@@ -111,7 +115,7 @@ def _lonely_nodes(space, there):
     return np.flatnonzero(count.array == 0).astype(np.int32)
 
 
-def _nodal_pressure(domain, pore_pressure):
+def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
     """Pore pressure [Pa] as a function that is linear in each cell; None for none."""
     if pore_pressure is None:
         return None
@@ -122,7 +126,7 @@ def _nodal_pressure(domain, pore_pressure):
     return p
 
 
-def _seepage_forces(space, p, there, radius):
+def _seepage_forces(space: Any, p: Any, there: Any, radius: Any) -> Any:
     """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
 
     By Gauss' theorem: the integral of p div v over the active cells, less that of p n v over their surface. Suction does not pull
@@ -136,7 +140,7 @@ def _seepage_forces(space, p, there, radius):
     return assembled(fem.form(form), space).array.copy()
 
 
-def free_motions(model):
+def free_motions(model: Any) -> list[str]:
     """Rigid-body motions that the supports leave free, in words; empty if there are none. Collective."""
     domain, dim = model.domain, model.domain.geometry.dim
     space, dofs = model.displacement.function_space, model._body.constraints.dofs

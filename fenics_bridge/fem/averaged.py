@@ -129,7 +129,7 @@ class AveragedKinematics:
         matrix.zeroRowsColumns(self._held, 1.0)
         return matrix
 
-    def _cells(self, axisymmetric):
+    def _cells(self, axisymmetric: bool) -> tuple[Any, ...]:
         """Nodes, gradients of shape functions, volumes and radii of the owned cells.
 
         Returns:
@@ -150,7 +150,7 @@ class AveragedKinematics:
         radii = corners[:, :, 0].mean(axis=1)
         return numbers[local], gradients, radii * volumes, radii
 
-    def _mean_over_nodes(self, comm, nodes):
+    def _mean_over_nodes(self, comm: MPI.Comm, nodes: NDArray[np.integer]) -> Any:
         """Matrix from cells to cells: to the nodes by volume, and back as the mean over a cell's nodes."""
         size = len(nodes), self._space.dofmap.index_map.size_local
         there = self._points.material >= 0  # cells that are switched off take no part
@@ -160,13 +160,13 @@ class AveragedKinematics:
         to_nodes.diagonalScale(L=around)
         return _matrix(comm, size, nodes, 1 / nodes.shape[1]).matMult(to_nodes)
 
-    def _held_dofs(self):
+    def _held_dofs(self) -> NDArray[np.integer]:
         """Global numbers of this rank's supported dofs."""
         mine = self._constraints.dofs[self._constraints.dofs < self._n_dofs]
         return (self._space.dofmap.index_map.local_range[0] * self._space.dofmap.index_map_bs + mine).astype(np.int32)
 
 
-def _strain_rows(gradients, radii):
+def _strain_rows(gradients: NDArray[np.float64], radii: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Strain operator of each cell, (m * S, (D + 1) * D): components of strain by components of nodal displacement."""
     m, corners, dim = gradients.shape
     pairs = [(0, 0), (1, 1), None, (0, 1)] if dim == 2 else [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
@@ -183,7 +183,7 @@ def _strain_rows(gradients, radii):
     return rows.reshape(m * len(pairs), corners * dim)
 
 
-def _matrix(comm, local_size, columns, values):
+def _matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values: Any) -> Any:
     """Sparse matrix of this rank's rows, each with k entries: global columns and values, both (rows, k)."""
     matrix = PETSc.Mat().create(comm)
     matrix.setSizes([(n, None) for n in local_size])
@@ -193,7 +193,7 @@ def _matrix(comm, local_size, columns, values):
     return matrix
 
 
-def _rows(columns, values):
+def _rows(columns: NDArray[np.integer], values: NDArray[np.float64]) -> tuple[Any, ...]:
     """Compressed rows of equal length."""
     start = np.arange(0, columns.size + 1, columns.shape[1]) if columns.size else np.zeros(len(columns) + 1)
     values = np.broadcast_to(values, columns.shape)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
@@ -50,8 +51,8 @@ class Collapse:
     def __repr__(self) -> str:
         above = "failure shown" if self.failed else "no equilibrium found, failure not shown,"
         return (
-            f"<Collapse: {self.value:.6g} at the last equilibrium, {above} at {self.failed_at:.6g}; {len(self.steps)} load steps, "
-            f"out-of-balance ratio up to {self.residual:.2g}>"
+            f"<Collapse: {self.value:.6g} at the last equilibrium, {above} at {self.failed_at:.6g}; "
+            f"{len(self.steps)} load steps, out-of-balance ratio up to {self.residual:.2g}>"
         )
 
 
@@ -123,13 +124,13 @@ def factor_of_safety(
     steps = model.solve(load, progress=progress)
     agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
 
-    def weaken(factor):
+    def weaken(factor: float) -> Any:
         return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
     return _follow(model, weaken, start, first_step, tolerance, progress)
 
 
-def _not_carried(start, steps):
+def _not_carried(start: float, steps: list[LoadStep]) -> str:
     """Message: why the load is not carried at the start, and possible remedies."""
     last = next((step for step in reversed(steps) if not step.converged), steps[-1])
     carried = max((step.value for step in steps if step.converged), default=0.0)
@@ -139,13 +140,20 @@ def _not_carried(start, steps):
     )
 
 
-def _follow(model, equilibrate, start, first_step, tolerance, progress):
+def _follow(
+    model: Any,
+    equilibrate: Callable[[float], Any],
+    start: float,
+    first_step: float,
+    tolerance: float,
+    progress: Callable[[LoadStep], Any] | None,
+) -> Any:
     """Increase the value from `start` until no step succeeds; records all steps."""
     comm, dim = model.domain.comm, model.domain.geometry.dim
     curve = [(start, _largest(model.displacement, comm, dim))]
     mechanism = fem.Function(model.displacement.function_space, name="mechanism")
 
-    def attempt(value):
+    def attempt(value: float) -> Any:
         report = equilibrate(value)
         if report.converged:
             curve.append((value, _largest(model.displacement, comm, dim)))
@@ -180,7 +188,7 @@ def _follow(model, equilibrate, start, first_step, tolerance, progress):
     )
 
 
-def _unlimited(steps, curve, mechanism):
+def _unlimited(steps: list[LoadStep], curve: Any, mechanism: Any) -> Collapse:
     """The result where every step found equilibrium: a lower bound only."""
     reason = f"equilibrium at every value up to {curve[-1, 0]:.3g}: the body may not be able to fail in this way"
     return Collapse(
@@ -196,7 +204,7 @@ def _unlimited(steps, curve, mechanism):
     )
 
 
-def _accepted(steps):
+def _accepted(steps: list[LoadStep]) -> Any:
     """What was accepted on the way as equilibrium."""
     reports = [step.report for step in steps if step.converged]
     return {
@@ -205,7 +213,7 @@ def _accepted(steps):
     }
 
 
-def _largest(function, comm, dim):
+def _largest(function: Any, comm: MPI.Comm, dim: int) -> float:
     """Largest displacement of a node [m]."""
     lengths = np.linalg.norm(function.x.array.reshape(-1, dim), axis=1)
     return max(comm.allgather(float(lengths.max(initial=0.0))))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import ufl
@@ -153,7 +154,7 @@ def solve_elastic(
     # As the elasto-plastic elements: the hoop strain u_r / r is no polynomial, and UFL's own degree would be high.
     dx = ufl.dx if radius is None else ufl.dx(metadata={"quadrature_degree": max(1, 2 * (degree - 1))})
 
-    def internal(u):
+    def internal(u: Any) -> Any:
         return weighted(ufl.inner(elastic_stress(strain(u, radius), *stiffness), strain(v, radius)), radius) * dx
 
     load = elastic_load(v, domain, facet_tags, unit_weight, traction or {}, body_force, radius)
@@ -212,7 +213,7 @@ def solve_nearly_incompressible(
 
     dx = ufl.dx if radius is None else ufl.dx(metadata={"quadrature_degree": 3})
 
-    def internal(u, p):
+    def internal(u: Any, p: Any) -> Any:
         stress = _mixed_stress(strain(u, radius), p, shear)
         work = ufl.inner(stress, strain(v, radius)) - q * dilation(u, radius) - flexibility * p * q
         return weighted(work, radius) * dx
@@ -226,12 +227,12 @@ def solve_nearly_incompressible(
     return ElasticSolution(u, cell_function(domain, stress, 1, "stress"), geometry)
 
 
-def _mixed_stress(e, p, shear):
+def _mixed_stress(e: Any, p: Any, shear: Any) -> Any:
     """Stress components from strain and pressure (here lambda times the volumetric strain, compression positive)."""
     return ufl.as_vector([2 * shear * e[i] - p for i in range(3)] + [shear * e[i] for i in range(3, e.ufl_shape[0])])
 
 
-def _solved(space, constraints, tangent, load, internal, options_prefix):
+def _solved(space: Any, constraints: Any, tangent: Any, load: Any, internal: Any, options_prefix: str) -> Any:
     """Solution of a linear problem: one correction by the tangent, starting from the displacements of the supports.
 
     Load and internal forces are assembled one by one: in a form with integrals of degree 1 and 2, FFCx 0.5 takes the radius of
@@ -258,7 +259,7 @@ def _solved(space, constraints, tangent, load, internal, options_prefix):
     return solution
 
 
-def _first_mistake(young, poisson, unit_weight, degree):
+def _first_mistake(young: float, poisson: float, unit_weight: Any, degree: int) -> str | None:
     if not (np.isfinite(young) and young > 0):
         return f"young: got {young!r} Pa, expected a positive number"
     if not 0 <= poisson < 0.5:

@@ -102,7 +102,7 @@ def find_equilibrium(
     return _relaxed(body, laws, external, before, displacement, solver, report)
 
 
-def _in_parts(body, laws, external, before, displacement, solver):
+def _in_parts(body: Body, laws: Sequence[Any], external: Any, before: Any, displacement: float, solver: Solver) -> Any:
     """The report of a step with prescribed displacements that is divided, or None where its parts do not converge either.
 
     A relaxation stops in the middle of such a motion, and the soil unloads as its viscous stresses vanish: reactions would be
@@ -135,7 +135,9 @@ def _in_parts(body, laws, external, before, displacement, solver):
     return EquilibriumReport("equilibrium", residuals, "", iterations, motion=motion)
 
 
-def _relaxed(body, laws, external, before, displacement, solver, newton_report):
+def _relaxed(
+    body: Body, laws: Sequence[Any], external: Any, before: Any, displacement: float, solver: Solver, newton_report: Any
+) -> Any:
     """The report of a relaxation after Newton's method did not converge."""
     start = body.snapshot()
     comm = body.solution.function_space.mesh.comm
@@ -156,7 +158,9 @@ def _relaxed(body, laws, external, before, displacement, solver, newton_report):
     return EquilibriumReport(result.outcome, residuals, reason, iterations, result, motion)
 
 
-def _refine(body, laws, external, displacement, solver, result):
+def _refine(
+    body: Body, laws: Sequence[Any], external: Any, displacement: float, solver: Solver, result: Relaxation
+) -> Any:
     """Newton's method from the end of a relaxation, where it often converges."""
     report = newton(EquilibriumStep(body, laws, external, external, displacement), solver.tolerance, EASY_ITERATIONS)
     result.iterations += report.iterations

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge.fem.missing_stress import missing_fraction
 from fenics_bridge.types import Law
@@ -97,7 +98,7 @@ class EquilibriumStep:
         points.add_viscosity(self._laws, self._viscosity, np.zeros_like(spread))
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
-    def begin_from(self, motion):
+    def begin_from(self, motion: Any) -> Any:
         """Begin the iteration from an increment per degree of freedom [m], but for the supports', if the laws can follow it."""
         self._correction.x.array[:] = motion
         self._correction.x.array[self._fixed] = 0.0
@@ -153,7 +154,7 @@ class EquilibriumStep:
         """Make this the last point of the iteration."""
         self._base[:] = self._body.increment.x.array
 
-    def _residual(self, stress):
+    def _residual(self, stress: NDArray[np.float64]) -> float:
         """Norm of the out-of-balance forces over that of the forces at work."""
         forces = self._body.kinematics.internal_forces(stress)
         forces.array[:] = self._external - forces.array
@@ -163,11 +164,11 @@ class EquilibriumStep:
         self._residual_vector = forces
         return self._relative(forces.array)
 
-    def _relative(self, out_of_balance):
+    def _relative(self, out_of_balance: Any) -> Any:
         """Norm of the out-of-balance forces where nothing is prescribed, over that of the forces at work."""
         return self._norm(out_of_balance) / self.scale if self.scale > 0 else 0.0
 
-    def _forces_at_work(self, out_of_balance):
+    def _forces_at_work(self, out_of_balance: Any) -> Any:
         """Largest norm of the loads before and after the step and of the reactions at its start.
 
         It is set once: in an iteration that runs away the reactions grow without limit and would hide the residual.
@@ -176,5 +177,5 @@ class EquilibriumStep:
         reactions[self._fixed] = out_of_balance[self._fixed]
         return max(self._norm(forces) for forces in (self._external, self._before, reactions))
 
-    def _norm(self, array):
+    def _norm(self, array: NDArray[Any]) -> float:
         return np.sqrt(self._comm.allreduce(float(np.sum(array[: self._n_owned] ** 2))))

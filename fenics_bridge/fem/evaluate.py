@@ -116,7 +116,7 @@ class PointSearch:
         return np.bincount(self._cells, received[self._inside, 0], owned_cells(self._domain))
 
     def _returned(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the points that were asked for, (m, k), as the ranks that asked get them; in the order of `_rows`. Collective."""
+        """Values (m, k) at the points that other ranks asked for, sent back to them; in the order of `_rows`. Collective."""
         return exchange_rows(self._comm, self._askers, values)[0]
 
 
@@ -164,14 +164,14 @@ def local_cells(domain: Mesh, points: NDArray[np.float64]) -> NDArray[np.int32]:
     return found
 
 
-def _depth(corners, points):
+def _depth(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Smallest barycentric coordinate of points in cells: negative outside."""
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     inner = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
     return np.minimum(inner.min(axis=1), 1 - inner.sum(axis=1)) if len(points) else np.empty(0)
 
 
-def _owned_box(domain):
+def _owned_box(domain: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     n_cells, dim = owned_cells(domain), domain.geometry.dim
     if n_cells == 0:
         return np.full(dim, np.inf), np.full(dim, -np.inf)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fenics_bridge.fem.active_cells import free_motions
 from fenics_bridge.mesh.names import label
 
 
-def explained(fem, reason, load):
+def explained(fem: Any, reason: str, load: Any) -> str:
     """The reason why a QuasiStatic found no equilibrium under a load, with load, place, soil, law and advice. Collective."""
     where, soil, law, tension = most_moved(fem)
     place = ", ".join(f"{x:.3g}" for x in where)
@@ -19,7 +21,7 @@ def explained(fem, reason, load):
     )
 
 
-def advice(reason, free, law, tension):
+def advice(reason: str, free: list[str], law: Any, tension: bool) -> str:
     """Possible remedies.
 
     Args:
@@ -56,7 +58,7 @@ def advice(reason, free, law, tension):
     )
 
 
-def most_moved(fem):
+def most_moved(fem: Any) -> Any:
     """Place of the largest displacement in the last increment, also of a step that failed. Collective.
 
     Returns the place (D,) [m], and of the soil nearest to it: its tag, its law, and whether it was under tension.
@@ -81,7 +83,7 @@ def most_moved(fem):
     return where, fem.soils[number], fem.laws[number], tension
 
 
-def _in_words(fem, load):
+def _in_words(fem: Any, load: Any) -> str:
     """A load as text, without the components that are not given."""
     weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
     parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
@@ -92,5 +94,5 @@ def _in_words(fem, load):
     return ", ".join(parts) or "no load"
 
 
-def _of(tags, tag):
+def _of(tags: Any, tag: Any) -> Any:
     return "" if tag is None else f" of {tag!r}" if isinstance(tag, str) else f" of {label(tags, tag)}"

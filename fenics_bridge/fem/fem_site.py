@@ -104,12 +104,12 @@ class FemSite:
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()
         return max(self.fem.domain.comm.allgather(float(size[there].max(initial=0.0))))
 
-    def _laws(self, state):
+    def _laws(self, state: SiteState) -> Any:
         """The present laws, by tag: those of the stage, otherwise those that the body had before."""
         present = self.fem.law_by_tag()
         return {tag: state.law.get(tag, law) for tag, law in present.items()}
 
-    def _failure(self, stage, steps):
+    def _failure(self, stage: Stage, steps: list[LoadStep]) -> Any:
         fem = self.fem
         reason = next((step.report.reason for step in reversed(steps) if not step.converged), "no step was tried")
         return f"stage {self.number} ({stage.name!r}) has no equilibrium beyond {1 - fem.load.held:.3g} of its change: {reason}."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,7 +97,7 @@ def k0_layered_stress(
     return stress
 
 
-def _checked_layers(layers):
+def _checked_layers(layers: Any) -> Any:
     table = np.asarray(layers, dtype=float)
     if table.ndim != 2 or table.shape[1] != 3 or len(table) == 0 or np.isnan(table).any():
         raise InputError(f"layers: got {layers!r}, expected rows of (bottom, unit_weight, k0)")

@@ -77,6 +77,6 @@ class Kinematics:
         self._tangent.x.array.reshape(-1, size)[self._tangent_rows] = tangent.reshape(-1, size)
         return self._stiffness.assembled()
 
-    def _quadrature_function(self, size):
+    def _quadrature_function(self, size: int) -> Any:
         space = compat.quadrature_space(self._space.mesh, self._points.degree, size)
         return fem.Function(space), compat.cell_dofs(space)[self._points.cells].ravel()

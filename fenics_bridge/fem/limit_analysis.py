@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ def log_spiral_safety(height: float, angle: float, cohesion: float, friction_ang
     return factor
 
 
-def _best_angles(slope, tangent):
+def _best_angles(slope: float, tangent: float) -> NDArray[np.float64]:
     """Start and end angle of the spiral with the least collapse load: a grid search, refined around its best point."""
     centre, half = np.array([0.5 * np.pi / 2, 0.6 * np.pi]), np.array([0.5 * np.pi / 2, 0.4 * np.pi])
     for _ in range(16):
@@ -92,7 +93,7 @@ def _best_angles(slope, tangent):
     return centre
 
 
-def _load(start, end, slope, tangent):
+def _load(start: Any, end: Any, slope: float, tangent: float) -> Any:
     """Dimensionless collapse load, gamma H / c; infinite where the angles make no mechanism."""
     if not 0 < start < end < np.pi:
         return np.inf
@@ -102,7 +103,7 @@ def _load(start, end, slope, tangent):
     return dissipation * height / moment if moment > 0 and height > 0 and behind >= 0 else np.inf
 
 
-def _mechanism(start, end, slope, tangent):
+def _mechanism(start: float, end: float, slope: float, tangent: float) -> tuple[Any, ...]:
     """Spiral (k, 2) about the pole, with radius 1 at its start; first moment of the soil's area; dissipation over c."""
     angles = np.linspace(start, end, 101)
     radius = np.exp((angles - start) * tangent)
@@ -115,7 +116,7 @@ def _mechanism(start, end, slope, tangent):
     return spiral, moment, dissipation
 
 
-def _shoulder(spiral, slope):
+def _shoulder(spiral: NDArray[np.float64], slope: float) -> Any:
     """Where the slope from the spiral's end, the toe, meets the level of its start."""
     height = spiral[0, 1] - spiral[-1, 1]
     back = height / math.tan(slope) if slope < math.pi / 2 else 0.0

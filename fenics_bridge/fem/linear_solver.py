@@ -55,7 +55,8 @@ class LinearSolver:
         self._options = choice if direct else multigrid_options(dim, EXACT)
         if newton and not direct:
             self._options["ksp_max_it"] = MOST_ITERATIONS
-        self._options_prefix, self._newton, self._last = options_prefix, newton, None
+        self._options_prefix, self._newton = options_prefix, newton
+        self._last: float | None = None
         self._first: PETSc.Mat | None = None
         self._rigid = None
         if displacements:
@@ -95,7 +96,7 @@ class LinearSolver:
             increment.x.scatter_forward()
         return failure
 
-    def _solved(self, matrix, right, solution, options):
+    def _solved(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> Any:
         if self._rigid is not None:
             matrix.setNearNullSpace(self._rigid)
         self._ksp.setOperators(matrix)
@@ -107,7 +108,7 @@ class LinearSolver:
             self._ksp = new_solver(self._comm, self._options_prefix)
         return failure
 
-    def _solved_stiffer(self, matrix, right, solution, options):
+    def _solved_stiffer(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> Any:
         """Solution with a matrix to which parts of the first one are added."""
         failure, before = "", 0.0
         for part in PARTS:
@@ -119,7 +120,7 @@ class LinearSolver:
                 break
         return failure
 
-    def _tolerance(self, size):
+    def _tolerance(self, size: float) -> float:
         """Relative tolerance for a residual of Newton's method, from the reduction of the last ones.
 
         Choice 2 of Eisenstat and Walker (1996, SIAM J. Sci. Comput. 17, 16-32), 0.9 of the square of the reduction, keeps

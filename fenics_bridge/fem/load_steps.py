@@ -94,7 +94,7 @@ def advance(
     return steps
 
 
-def _below_failure(value, failed_at, carried):
+def _below_failure(value: float, failed_at: float, carried: float) -> float:
     """Size of the step after a failure: half of the way, or less where the mechanism carries less than that.
 
     Args:

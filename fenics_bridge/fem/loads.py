@@ -49,10 +49,10 @@ class Load:
             fraction: from 0, this load, to 1, the other one [-].
         """
 
-        def between(a, b):
+        def between(a: Any, b: Any) -> Any:
             return a + fraction * (b - a)
 
-        def between_tags(a, b):
+        def between_tags(a: Any, b: Any) -> Any:
             return {tag: between(a.get(tag, a.get(None, 0.0)), b.get(tag, b.get(None, 0.0))) for tag in {*a, *b}}
 
         weights = self.unit_weight, other.unit_weight
@@ -80,11 +80,11 @@ def require_finite(comm: MPI.Comm, load: Load) -> None:
     agree(comm, problem)
 
 
-def _arrays(tractions):
+def _arrays(tractions: Any) -> Any:
     return {tag: np.asarray(vector, dtype=float) for tag, vector in tractions.items()}
 
 
-def _weight_by_tag(unit_weight):
+def _weight_by_tag(unit_weight: Any) -> Any:
     """Unit weights by cell tag; None stands for the cells of all other tags."""
     return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
 
@@ -171,13 +171,13 @@ class LoadVectors:
         traction = by_number(comm, self._facet_tags, load.traction, "traction")
         return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
 
-    def _vector(self, traction):
+    def _vector(self, traction: Any) -> Any:
         vector, domain = np.asarray(traction, dtype=float), self._space.mesh
         dim = domain.geometry.dim
         agree(domain.comm, None if vector.shape == (dim,) else f"traction has shape {vector.shape}, expected ({dim},)")
         return vector
 
-    def _unit_weight(self, dx):
+    def _unit_weight(self, dx: Any) -> Any:
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
         there = 1.0 if self._active is None else self._active
@@ -185,13 +185,13 @@ class LoadVectors:
             fem.form(weighted(there * ufl.inner(down, self._test), self._radius) * dx), self._space
         ).array.copy()
 
-    def _unit_weight_of(self, tag):
+    def _unit_weight_of(self, tag: Any) -> Any:
         if tag not in self._weight:
             dx = ufl.Measure("dx", domain=self._space.mesh, subdomain_data=self._cell_tags)
             self._weight[tag] = self._unit_weight(dx(tag))
         return self._weight[tag]
 
-    def _unit_pressure(self, tag):
+    def _unit_pressure(self, tag: Any) -> Any:
         if tag not in self._pressure:
             domain = self._space.mesh
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
@@ -206,7 +206,7 @@ class LoadVectors:
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
 
-    def _unit_tractions(self, tag):
+    def _unit_tractions(self, tag: Any) -> Any:
         """Nodal forces of 1 Pa along each axis."""
         if tag not in self._traction:
             domain = self._space.mesh

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def missing_fraction(
     return float(np.max(missing[yields] / np.maximum(mobilised[yields], 1e-300), initial=0.0))
 
 
-def _parts(values, shear):
+def _parts(values: NDArray[np.float64], shear: float) -> tuple[Any, ...]:
     """Means and norms of deviators of components (n, S): each (n,); shear: factor of the squares of the shear components."""
     mean = values[:, :3].mean(axis=1)
     deviator = values[:, :3] - mean[:, None]

@@ -224,7 +224,15 @@ class _MixedKinematics(Kinematics):
     The unknown pressure is in units of the shear modulus, so that both kinds of equations have entries of similar magnitude.
     """
 
-    def __init__(self, solution, increment, points, constraints, law, geometry):
+    def __init__(
+        self,
+        solution: Any,
+        increment: Any,
+        points: QuadraturePoints,
+        constraints: Constraints,
+        law: Any,
+        geometry: Geometry | None,
+    ) -> None:
         young, poisson, size = law.young, law.poisson, points.size
         self.scale = young / (2 * (1 + poisson))
         flexibility = self.scale * 3 * (1 - 2 * poisson) / young  # G / K
@@ -236,29 +244,29 @@ class _MixedKinematics(Kinematics):
         degree = points.degree if radius is None else 3
         dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": degree})
 
-        def volume(u, p, v, q):
+        def volume(u: Any, p: Any, v: Any, q: Any) -> Any:
             terms = -p * dilation(v, radius) - q * dilation(u, radius) - flexibility * p * q
             return self.scale * weighted(terms, radius) * dx
 
-        def further(test, trial):
+        def further(test: Any, trial: Any) -> Any:
             return volume(u, p, *ufl.split(test)), volume(*ufl.split(trial), *ufl.split(test))
 
         super().__init__(increment, points, constraints, geometry, further)
 
-    def strain_increment(self):
+    def strain_increment(self) -> NDArray[np.float64]:
         """Deviatoric strain of the increment at the points: (n, S)."""
         return super().strain_increment() @ self._deviator
 
-    def internal_forces(self, stress):
+    def internal_forces(self, stress: NDArray[np.float64]) -> Any:
         """Nodal forces of a stress (n, S), of which the deviatoric part counts, and of the pressure. Collective."""
         return super().internal_forces(stress @ self._deviator)
 
-    def stiffness(self):
+    def stiffness(self) -> Any:
         """Matrix of the points' present tangent, without the rows and columns of the supports. Collective."""
         return self.stiffness_of(self._deviator @ self._points.tangent @ self._deviator)
 
 
-def _first_mistake(law):
+def _first_mistake(law: Any) -> str | None:
     if isinstance(law, mpm.LinearElastic):
         return None
     if not isinstance(law, mpm.MohrCoulomb):

@@ -116,11 +116,11 @@ class QuadraturePoints:
         self.parameters[name] = values
         self._write_parameter(laws, name)
 
-    def _write_parameter(self, laws, name):
+    def _write_parameter(self, laws: Sequence[Any], name: str) -> None:
         if any(has_varying(law, name) for law in laws):
             self.state[:] = differences_of(name, self.parameters[name], laws, self._numbers(), self.state)
 
-    def _numbers(self):
+    def _numbers(self) -> Any:
         """Number of each point's law: (n,)."""
         return np.repeat(self.material, self.per_cell)
 
@@ -143,7 +143,7 @@ class QuadraturePoints:
                 failure = self._failure(law, np.arange(self.n)[piece][report.first_failed])
         return failure
 
-    def _failure(self, law, point):
+    def _failure(self, law: Any, point: int) -> Any:
         """A point where a law failed, in words: law, place and strain increment."""
         position = ", ".join(f"{x:.6g}" for x in self.coordinates()[point])
         strain = ", ".join(f"{e:.6g}" for e in self._trial_strain[point])
@@ -218,11 +218,11 @@ class QuadraturePoints:
         function.x.scatter_forward()
         return function
 
-    def _linear_shapes(self):
+    def _linear_shapes(self) -> Any:
         return np.column_stack([1 - self.reference.sum(axis=1), self.reference])
 
 
-def _piece(rows):
+def _piece(rows: NDArray[Any]) -> Any:
     """Rows in order, as a slice if they are contiguous."""
     if len(rows) == 0:
         return slice(0, 0)

@@ -278,7 +278,7 @@ class QuasiStatic(PointFunctions):
         self._follow(self.laws)
         return replace(report, reason=explained(self, report.reason, load))
 
-    def _follow(self, laws):
+    def _follow(self, laws: Sequence[Any]) -> Any:
         """Let averaged forces follow the laws. Collective."""
         if self._nmd:
             self._kinematics.follow(laws)

@@ -150,7 +150,7 @@ def relax(
     return result
 
 
-def _solve_step(step, tolerance, motion):
+def _solve_step(step: EquilibriumStep, tolerance: float, motion: Any) -> Any:
     """Newton's method for one viscous step, to a fraction of the residual at its start; returns the residuals.
 
     Args:
@@ -170,7 +170,7 @@ def _solve_step(step, tolerance, motion):
     return residuals
 
 
-def _record(result, body, step, theta, start):
+def _record(result: Relaxation, body: Body, step: EquilibriumStep, theta: float, start: Any) -> Any:
     """Accept a step and add it to the result; returns its motion."""
     result.residual.append(step.out_of_balance())
     result.carried.append(step.carried_fraction())
@@ -183,7 +183,7 @@ def _record(result, body, step, theta, start):
     return result.motion
 
 
-def _flows(result, reference):
+def _flows(result: Relaxation, reference: float) -> bool:
     """Whether the displacement has grown beyond the reference, at a rate that falls no more."""
     if result.growth[-1] <= reference:
         return False

@@ -31,7 +31,7 @@ class Solver:
     max_steps: int = 80
     """Largest number of steps of a relaxation"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("tolerance", "relaxed_tolerance"):
             if not 0 < getattr(self, name) < 1:
                 raise InputError(f"{name}: got {getattr(self, name)!r}, expected a number between 0 and 1")

@@ -53,7 +53,7 @@ class Stage:
     reset_displacement: bool = False
     """Whether displacements count from the beginning of this stage"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("fill", "excavate", "release", "support"):
             value = getattr(self, name)
             single = isinstance(value, (str, int)) or not hasattr(value, "__iter__")
@@ -221,7 +221,7 @@ class SiteState:
             new.pore_pressure = stage.pore_pressure
         return new, fill, excavate
 
-    def _supports_after(self, stage, where):
+    def _supports_after(self, stage: Stage, where: str) -> Any:
         held = {n for support in self.supports for n in self._facets_of(support.facet_tag, where + "support")}
         gone = {n for tag in stage.release for n in self._facets_of(tag, where + "release")}
         wrong = gone - held
@@ -233,14 +233,14 @@ class SiteState:
             self._facets_of(support.facet_tag, where + "support")
         return (*kept, *stage.support)
 
-    def _numbers(self, argument, names):
+    def _numbers(self, argument: str, names: Any) -> Any:
         return tuple(dict.fromkeys(n for name in names for n in self._cells_of(name, argument)))
 
-    def _by_soil(self, argument, given):
+    def _by_soil(self, argument: str, given: Any) -> Any:
         return {number: value for key, value in given.items() for number in self._cells_of(key, argument)}
 
 
-def _wrong_value(stage, where):
+def _wrong_value(stage: Stage, where: str) -> str | None:
     """What is wrong with the values of a stage; None for nothing."""
     for name in ("unit_weight", "pressure"):
         for key, value in getattr(stage, name).items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 
@@ -95,12 +96,12 @@ def davis_reduced_strength(law: Laws, factor: float, unreduced: Collection[int |
     return davis_strength(reduced_strength(law, factor, unreduced))
 
 
-def _divided(angle, factor):
+def _divided(angle: Any, factor: float) -> Any:
     """The angle [degrees] whose tangent is that of another one over a factor."""
     return math.degrees(math.atan(math.tan(math.radians(angle)) / factor))
 
 
-def _mohr_coulomb(law, cohesion, friction_angle, dilation_angle):
+def _mohr_coulomb(law: Any, cohesion: Any, friction_angle: Any, dilation_angle: Any) -> Any:
     return mpm.MohrCoulomb(
         young=law.young,
         poisson=law.poisson,

@@ -157,7 +157,7 @@ def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: Tag, argument: str)
     return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
 
 
-def _first_mistake(domain, facet_tags, supports, dim):
+def _first_mistake(domain: Mesh, facet_tags: MeshTags, supports: Sequence[Support], dim: int) -> str | None:
     for support in supports:
         tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports")
         displacement = support.displacement
