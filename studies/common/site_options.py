@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-from .options import add_choice, add_number
 from .files import ROOT
+from .options import add_choice, add_number
 
 
 def add_site_file(parser: ArgumentParser, site: str, contents: str, elements: tuple[str, tuple[str, ...], str]) -> None:

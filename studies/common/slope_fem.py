@@ -12,8 +12,8 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 from fenics_bridge.types import MeshTags
 
-from .options import add_choice, add_count, add_number, check
 from .files import ROOT
+from .options import add_choice, add_count, add_number, check
 from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_slope_options, soil_of
 
 

@@ -1,4 +1,4 @@
-"""Versions of the program and of what it stands on. Nothing is imported before it is asked for, so that what is missing can be told."""
+"""Versions of the program and its libraries. A library is imported when its version is asked for, since it may be missing."""
 
 from __future__ import annotations
 

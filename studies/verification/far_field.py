@@ -10,8 +10,8 @@ import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
 from common.figures import save_figure
-from common.plots import paper_style
 from common.files import ROOT
+from common.plots import paper_style
 from mpi4py import MPI
 
 import fenics_bridge as bridge
