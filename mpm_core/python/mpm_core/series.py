@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -22,13 +23,17 @@ _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz
 _TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}
 _HEAD = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
 _TAIL = "</Grid>\n</Domain>\n</Xdmf>\n"
+SHORT = 1 << 19
+"""Characters of an XDMF file that is rewritten for each frame, some 150 frames of all fields; see `REWRITING` for longer ones"""
+REWRITING = 0.02
+"""Fraction of the time in which a long XDMF file is rewritten; for each frame it would take the square of their number"""
 
 
 class Series:
     """The file ``PATH.xdmf``, and beside it the folder ``PATH`` with an HDF5 file for each frame.
 
     The XDMF file is written aside and renamed for each frame, so that it is whole and names whole files only, whenever it is
-    read or the run is killed.
+    read or the run is killed. When it is long, several frames may share a rewriting; `close` names the last ones.
 
     Args:
         path: without suffix, or with .h5 or .xdmf. What an earlier series left there is removed.
@@ -55,6 +60,7 @@ class Series:
         self.n_frames = 0
         self._xdmf, self._grid, self._compression = f"{text}.xdmf", grid, int(compression)
         self._closed, self._frames = False, [""]
+        self._length, self._next_rewriting, self._unnamed = 0, 0.0, 0
         check_same_path(comm, text)
         on_first_rank(comm, text, self._begin)
 
@@ -120,20 +126,36 @@ class Series:
         text = f"{head}{''.join(frame.text)}"
 
         def describe() -> None:
+            start = monotonic()
+            if self._length > SHORT and start < self._next_rewriting:
+                self._unnamed += 1
+                return
             try:
                 self._replace_xdmf(text if end is None else self._collection(text + end))
             except OSError:
                 with suppress(OSError):
                     path.unlink()
                 raise
+            self._next_rewriting, self._unnamed = start + (monotonic() - start) / REWRITING, 0
 
         on_first_rank(self.comm, self._xdmf, describe)
         if end is not None:
             self._frames.append(text + end)
+            self._length += len(text)
 
     def close(self) -> None:
-        """Nothing can be written after that."""
+        """Name the last frames in the XDMF file; nothing can be written after that. Without communication between ranks.
+
+        Raises:
+            RunError: on the first rank, with path and reason: they cannot be named. The frames themselves are on the disk.
+        """
         self._closed = True
+        if self._unnamed:
+            self._unnamed = 0
+            try:
+                self._replace_xdmf(self._collection())
+            except OSError as error:
+                raise RunError(f"cannot write {self._xdmf}: {error.strerror}") from None
 
 
 T = TypeVar("T", bound="Output")
@@ -146,7 +168,7 @@ class Output:
         self._series = series
 
     def close(self) -> None:
-        """Nothing can be written after that."""
+        """Complete the XDMF file; nothing can be written after that."""
         self._series.close()
 
     def __enter__(self: T) -> T:

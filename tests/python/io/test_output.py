@@ -13,7 +13,7 @@ import pytest
 from mpm_core.output import MeshOutput, ParticleOutput
 from output_cases import COMM, SQUARE, TRIANGLES, particle_fields
 
-from mpm_core import InputError
+from mpm_core import InputError, series
 
 
 def padded(vectors):
@@ -174,6 +174,26 @@ def test_a_long_series_is_valid_all_the_time(tmp_path):
             assert file["mass"][1] == step and file["position"][1, 1] == step
     times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
     assert times == list(range(n)) and path.read_text().endswith("</Xdmf>\n")
+
+
+def test_a_long_series_is_not_rewritten_for_each_frame(tmp_path, monkeypatch):
+    """Else its bytes would grow with the square of the frames. It is valid at any time, and complete in the end."""
+    monkeypatch.setattr(series, "SHORT", 20_000)
+    path, n, rewritten, known = tmp_path / "particles.xdmf", 600, [], 0
+    replace = series.Series._replace_xdmf
+    monkeypatch.setattr(
+        series.Series, "_replace_xdmf", lambda self, text: (rewritten.append(text), replace(self, text))
+    )
+    with ParticleOutput(path, COMM) as output:
+        for step in range(n):
+            output.write(float(step), {"position": np.full((2, 2), step), "mass": np.full(2, step)})
+            if step % 50 == 0:
+                times = [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")]
+                assert times == list(range(len(times))) and known <= len(times) <= step + 1
+                known = len(times)
+    assert [float(t.get("Value")) for t in ElementTree.parse(path).iter("Time")] == list(range(n))
+    assert 20_000 / 700 < len(rewritten) < n / 2
+    output.close()  # has nothing left to do
 
 
 # Frames until it is killed; each field of frame k is k.
