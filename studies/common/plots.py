@@ -33,26 +33,12 @@ BODY = "#1d3a5f"
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 ROUND_TICKS = MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
 WIDTH = 6.9  # in; a page's text width
-STYLE = {
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
-    "font.size": 10,
-    "axes.linewidth": 0.6,
-    "axes.labelsize": 10,
-    "axes.titlesize": 10,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "savefig.dpi": 200,
-}
+STYLE = Path(__file__).with_name("paper.mplstyle")
 
 
 def paper_style() -> AbstractContextManager[None]:
     """Fonts and lines of all pictures, as a context."""
-    return plt.rc_context(STYLE)
+    return plt.style.context(STYLE)
 
 
 @dataclass(frozen=True)
