@@ -102,11 +102,11 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
     shrink_part(mesh, exchange, field);
   begin_integration(mesh, exchange, particles, runs, field);
   const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
-  const auto scatter_particles = [&](auto&& stress_of)
+  const auto scatter_particles = [&](auto&& stress_of, std::span<const NodeSums<D>> of_resting_cells)
   {
     field.has_light_nodes =
-        scatter<G>(mesh, part_of_particles(field), field.moments, stress_of, field.tractions, field.nodes,
-                   2 * field.least_mass); // twice: sums of several cells have round-off
+        scatter<G>(mesh, part_of_particles(field), field.moments, stress_of, field.tractions, of_resting_cells,
+                   field.nodes, 2 * field.least_mass); // twice: sums of several cells have round-off
   };
   if (!field.integration.averaged_by_law.empty())
   {
@@ -119,16 +119,15 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
         stress[k] += change;
       return stress;
     };
-    scatter_particles(averaged);
+    scatter_particles(averaged, {});
     add_resting_sums(mesh, averaged, field);
   }
+  else if (field.integration.kind == Integration::particles)
+    scatter_particles(integrated, field.resting.sums);
   else
   {
-    scatter_particles(integrated);
-    if (field.integration.kind == Integration::particles)
-      add_resting_sums(field);
-    else
-      add_resting_sums(mesh, integrated, field);
+    scatter_particles(integrated, {});
+    add_resting_sums(mesh, integrated, field);
   }
 }
 

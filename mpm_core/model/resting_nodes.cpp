@@ -115,23 +115,6 @@ void update_resting_rows(Model<G>& model)
 }
 
 template <class G>
-void add_resting_sums(VelocityField<G>& field)
-{
-  constexpr int D = G::dim;
-  for (Index i : field.resting.nodes)
-  {
-    NodeSums<D>& node = field.nodes[i];
-    const NodeSums<D>& sums = field.resting.sums[i];
-    node.mass += sums.mass;
-    for (int a = 0; a < D; ++a)
-    {
-      node.momentum[a] += sums.momentum[a];
-      node.internal[a] += sums.internal[a];
-    }
-  }
-}
-
-template <class G>
 const MeshPart& part_of_particles(VelocityField<G>& field)
 {
   RestingCells<G::dim>& resting = field.resting;
@@ -247,7 +230,6 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   template void take_resting_runs(const Mesh<G::dim>&, std::vector<Run>&, VelocityField<G>&);                          \
   template void make_resting_cells(const Mesh<G::dim>&, const Particles<G::dim>&, VelocityField<G>&);                  \
   template void update_resting_rows(Model<G>&);                                                                        \
-  template void add_resting_sums(VelocityField<G>&);                                                                   \
   template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
   template void map_resting_change(VelocityField<G>&, std::span<Vector<G::dim>>);                                      \
   template void move_resting_nodes(Model<G>&, const PassOptions&);

@@ -19,11 +19,8 @@ void make_resting_cells(const Mesh<D>& mesh, const Particles<D>& particles, Velo
 template <class G>
 void update_resting_rows(Model<G>& model);
 
-/// Adds mass, momentum and internal force of resting cells to the sums at the nodes of a field.
-template <class G>
-void add_resting_sums(VelocityField<G>& field);
-
-/// The same with forces of another stress than that of their rows.
+/// Adds mass, momentum and internal force of resting cells to the sums at the nodes of a field, with forces of another
+/// stress than that of their rows.
 /// @param stress_of  what a cell integrates [N m]; a callable Index -> Working
 template <class G, class StressOf>
 void add_resting_sums(const Mesh<G::dim>& mesh, StressOf&& stress_of, VelocityField<G>& field)

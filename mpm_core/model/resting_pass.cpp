@@ -3,6 +3,7 @@
 #include "model/law_update.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
+#include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
 #include "transfer/resting.h"
 #include "transfer/turn.h"
@@ -28,20 +29,16 @@ struct RestingScratch
 template <class G, int D = G::dim>
 std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>& field, double dt, std::size_t first)
 {
-  static_assert(lanes == 4);
   const auto* v = &field.resting.vertices[first];
+  const auto at = [&](int k) { return by_component<D>([&](int l) -> const auto& { return field.velocity[v[l][k]]; }); };
+  const std::array<Lanes, D> u = at(0);
   std::array<std::array<Lanes, D>, D> gradient{};
-  for (int a = 0; a < D; ++a)
+  for (int k = 0; k < D; ++k)
   {
-    const auto at = [&](int k) -> Lanes
+    const std::array<Lanes, D> end = at(k + 1);
+    for (int a = 0; a < D; ++a)
     {
-      return Lanes{field.velocity[v[0][k]][a], field.velocity[v[1][k]][a], field.velocity[v[2][k]][a],
-                   field.velocity[v[3][k]][a]};
-    };
-    const Lanes u = at(0);
-    for (int k = 0; k < D; ++k)
-    {
-      const Lanes relative = dt * (at(k + 1) - u);
+      const Lanes relative = dt * (end[a] - u[a]);
       for (int b = 0; b < D; ++b)
         gradient[a][b] += relative * load(&field.resting.gradient[k * D + b][first]);
     }

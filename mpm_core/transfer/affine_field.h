@@ -20,6 +20,29 @@ template <int D>
     return Lanes{v[0], v[1], v[2], 0};
 }
 
+/// Each component of `lanes` vectors side by side.
+/// @param vector  number l of them, a callable int -> Vector<D>
+template <int D, class VectorAt>
+[[gnu::always_inline]] inline std::array<Lanes, D> by_component(VectorAt&& vector)
+{
+  static_assert(lanes == 4);
+  if constexpr (D == 2)
+  {
+    // Whole vectors are loaded, and then exchanged in registers: half the loads.
+    const auto both = [&](int l) -> Lanes
+    { return __builtin_shufflevector(components<2>(vector(l)), components<2>(vector(l + 1)), 0, 1, 2, 3); };
+    const Lanes first = both(0), second = both(2);
+    return {__builtin_shufflevector(first, second, 0, 2, 4, 6), __builtin_shufflevector(first, second, 1, 3, 5, 7)};
+  }
+  else
+  {
+    std::array<Lanes, D> columns;
+    for (int a = 0; a < D; ++a)
+      columns[a] = Lanes{vector(0)[a], vector(1)[a], vector(2)[a], vector(3)[a]};
+    return columns;
+  }
+}
+
 /// The field that values at the vertices have inside a cell.
 /// @param at_vertex  value of vertex k, a callable int -> Vector<D>
 template <int D, class AtVertex>

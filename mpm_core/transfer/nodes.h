@@ -72,18 +72,19 @@ inline void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMom
 /// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
 /// @param stress_of  what a cell integrates [N m], sum V_p sigma_p or what takes its place; a callable Index -> Working
 /// @param tractions   one per cell, or empty
+/// @param others      what the nodes have beside these cells, or empty
 /// @param least_mass  [kg]
 /// @returns whether a vertex gets no more than the least mass from a cell, whose particles then lie on the facet
 /// opposite to it
 template <class G, class StressOf>
 bool scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
              StressOf&& stress_of, std::span<const TractionMoments<G::dim>> tractions,
-             std::span<NodeSums<G::dim>> nodes, double least_mass = 0)
+             std::span<const NodeSums<G::dim>> others, std::span<NodeSums<G::dim>> nodes, double least_mass = 0)
 {
   constexpr int D = G::dim;
   double least = std::numeric_limits<double>::infinity();
   for (Index node : part.nodes)
-    nodes[node] = {};
+    nodes[node] = others.empty() ? NodeSums<D>{} : others[node];
   for (Index c : part.cells)
   {
     const CellMoments<G>& moments = cells[c];

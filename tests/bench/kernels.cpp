@@ -167,7 +167,7 @@ void scatter_to_nodes(benchmark::State& state)
   Gathered<D> box(static_cast<int>(state.range(0)));
   const auto stress_of = [&](Index c) { return box.moments[c].stress; };
   for (auto _ : state)
-    scatter<Cartesian<D>>(box.mesh, box.part, box.moments, stress_of, {}, box.nodes);
+    scatter<Cartesian<D>>(box.mesh, box.part, box.moments, stress_of, {}, {}, box.nodes);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(scatter_to_nodes<2>)->Arg(18)->Arg(112);

@@ -64,7 +64,7 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
   const auto stress_of = [&](Index c) { return moments[c].stress; };
-  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, stress_of, tractions, nodes);
+  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, stress_of, tractions, {}, nodes);
   return nodes;
 }
 
