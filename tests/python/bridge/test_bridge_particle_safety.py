@@ -12,9 +12,9 @@ SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 MESH = bridge.slope_mesh(MPI.COMM_WORLD, crest=1.0, cell_size=0.2)
 
 
-def soil(friction_angle=25.0, dilation_angle=0.0, cohesion=1e3):
+def soil(friction_angle=25.0, dilation_angle=0.0, cohesion=1e3, young=20e6):
     return mpm.MohrCoulomb(
-        young=20e6, poisson=0.33, cohesion=cohesion, friction_angle=friction_angle, dilation_angle=dilation_angle
+        young=young, poisson=0.33, cohesion=cohesion, friction_angle=friction_angle, dilation_angle=dilation_angle
     )
 
 
@@ -54,6 +54,27 @@ def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilati
     assert len(found.curve) >= 3 and found.curve[-1, 0] == found.value
     moving = found.model.particles
     assert np.linalg.norm(moving.velocity, axis=1).max() > 0
+
+
+def test_the_factor_does_not_depend_on_where_cells_rest():
+    """To 0.1 %, with brackets half as wide; in soil so stiff that particles settle by less than that of the height."""
+    made = particles(soil(25.0, 25.0, young=400e6))
+
+    def resting(where):
+        def model_of(factor):
+            model = made(factor)
+            if where is not None:
+                model.rest(where=where)
+            return model
+
+        return model_of
+
+    parts = (None, lambda x: x[:, 0] >= 0, lambda x: x[:, 0] < 0.8, lambda x: x[:, 0] > 1.2)
+    options = dict(start=1.17, first_step=0.02, tolerance=5e-4)
+    found = [bridge.particle_safety(resting(part), **options) for part in parts]
+    assert [each.model.report().resting_cells > 0 for each in found] == [False, True, True, True]
+    for each in found[1:]:
+        assert each.failed and each.value == pytest.approx(found[0].value, rel=1e-3)
 
 
 def test_the_factor_is_that_of_the_strength():

@@ -159,6 +159,24 @@ def test_free_vibration_at_rest_keeps_its_energy_and_its_period():
     assert 0 < errors[1] < 0.1 and errors[0] / errors[1] == pytest.approx(16, rel=0.25)  # 1 - cos(phase), phase ~ h^2
 
 
+@pytest.mark.parametrize("rests", [None, lambda x: x[:, 0] > 0.5], ids=["all", "half"])
+def test_a_bar_vibrates_a_thousand_periods_and_keeps_its_energy(rests):
+    # Velocities are half a step away from stresses, so that the sum of their energies swings by w dt / 2 of itself.
+    wave, amplitude = np.sqrt(moduli(YOUNG, POISSON)[2] / DENSITY), 1e-3
+    model = mpm.Model(box((8, 1), (1.0, 1 / 8), diagonals="alternating"), ELASTIC)
+    model.seed(density=DENSITY)
+    shape = np.sin(0.5 * np.pi * model.mesh.points[:, :1]) * [amplitude, 0.0]
+    model.particles.set("velocity", interpolated(model, shape))
+    rollers(model, axes=[1])
+    model.fix(1)
+    model.rest(where=rests)
+    start, period = model.report().kinetic_energy, 4 / wave
+    for report in model.explicit(1000 * period, every=100.03 * period, conversion=None):
+        swing = np.pi * report.dt / period
+        assert abs((report.kinetic_energy + report.stored_energy) / start - 1) < 1.05 * swing < 0.04
+        assert abs(report.unexplained_energy) < 1e-6 * start
+
+
 def pulse(at_rest, amplitude=1e-5):
     """A compression pulse 20 cells long runs along a bar whose right half rests, all of it, or nothing; velocities at the end."""
     count = 100
