@@ -126,7 +126,7 @@ def particles(cells, law, porosity, conductivity, curve, weight, air=0):
     model.add_water(
         porosity=porosity,
         conductivity=conductivity,
-        modulus=2e9,
+        modulus=np.inf,
         unit_weight=WATER,
         retention=curve,
         drained_surface=air > 0,
@@ -147,8 +147,8 @@ def line_at(model, values, heights):
 
 
 def march(model, dt):
-    """A step to which small displacements are enough."""
-    for _ in model.implicit(model.time + dt, dt=dt, quasi_static=True, small_displacements=True):
+    """A step."""
+    for _ in model.implicit(model.time + dt, dt=dt, quasi_static=True):
         pass
 
 
