@@ -3,6 +3,7 @@
 #include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
 #include "model/integration.h"
+#include "transfer/resting.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,14 +38,31 @@ double longest_edge_squared(const auto& points, const auto& cell)
   return longest;
 }
 
+/// Products N_k N_l of the shape functions at a particle; of a resting cell, their means over the particles that it
+/// stands for.
+template <int D>
+RuleMoments<D> shape_products(const Particles<D>& particles, Index p, const std::array<double, D + 1>& n,
+                              Rules<D>& rules)
+{
+  if (is_resting(particles, p))
+    return rule_moments<D>(static_cast<int>(particles.resting[0][p]), rules);
+  RuleMoments<D> products;
+  for (int k = 0; k <= D; ++k)
+    for (int l = 0; l <= D; ++l)
+      products[k][l] = n[k] * n[l];
+  return products;
+}
+
 /// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
-                  double modulus, double factor, PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
+                  double modulus, double factor, Rules<D>& rules, PoreCell<D>& cell, PoreSums<D>& sums,
+                  std::vector<NodalWater>& nodes)
 {
   const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
   const auto n = shape_functions<D>(mesh.shapes[run.cell], x);
+  const RuleMoments<D> products = shape_products(particles, p, n, rules);
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight;
@@ -65,7 +83,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
       there += particles.pressure_gradient[a][p] * (mesh.points[node][a] - x[a]);
     cell.mean[k] += volume * n[k];
     for (int l = 0; l <= D && !dries; ++l)
-      cell.capacity[k][l] += volume * storage * n[k] * n[l];
+      cell.capacity[k][l] += volume * storage * products[k][l];
     const double weight = volume * n[k];
     NodalWater& sum = nodes[node];
     sum.volume += weight;
@@ -95,12 +113,13 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   std::vector<NodalWater> nodes(mesh.points.size(), NodalWater{});
   step.pore.cells.assign(static_cast<std::size_t>(mesh.owned_cells), PoreCell<D>{});
   std::vector<PoreSums<D>> sums(step.pore.cells.size());
-  for (const Run& run : model.order.runs)
+  Rules<D> rules;
+  for (const Run& run : step.runs)
   {
     const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, step.pore.cells[run.cell],
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, rules, step.pore.cells[run.cell],
                       sums[static_cast<std::size_t>(run.cell)], nodes);
   }
   for (Index c : step.cells)

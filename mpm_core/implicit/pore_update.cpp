@@ -2,6 +2,7 @@
 
 #include "base/eigen.h"
 #include "implicit/pore_water.h"
+#include "transfer/resting.h"
 
 #include <cmath>
 
@@ -79,23 +80,36 @@ void grow_pores(Particles<D>& particles, Index first, Index last, double growth,
   }
 }
 
+/// Mean over the particles of a resting cell of the product of pressure, as it is half way, and increment, beyond
+/// that at the centre.
+template <class G, int D = G::dim>
+double relative_work(const Particles<G::dim>& particles, Index row, const CellMoments<G>& moments,
+                     const CellPressure<G::dim>& pressure)
+{
+  Vector<D> mean = at<D>(particles.pressure_gradient.columns, row);
+  for (int a = 0; a < D; ++a)
+    mean[a] = 0.5 * (mean[a] + pressure.at_end[a]);
+  return relative_product<D>(mean, pressure.of_increment, moments.mass_xixi) / moments.mass;
+}
+
 /// @returns work that compresses the water, by the trapezoidal rule
-template <int D>
-double add_increments(Particles<D>& particles, double modulus, const Run& run, const Vector<D>& centre,
-                      const CellPressure<D>& pressure)
+template <class G, int D = G::dim>
+double add_increments(Particles<G::dim>& particles, double modulus, const Run& run, const Vector<G::dim>& centre,
+                      const CellMoments<G>& moments, const CellPressure<G::dim>& pressure)
 {
   double work = 0;
   for (Index p = run.first; p < run.last; ++p)
   {
     double increment = pressure.increment;
     for (int a = 0; a < D; ++a)
-    {
       increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
-      particles.pressure_gradient[a][p] = pressure.at_end[a];
-    }
-    const double mean = particles.pore_pressure[0][p] + 0.5 * increment;
-    work += particles.volume[p] * particles.porosity[0][p] / modulus * mean * increment;
+    double product = (particles.pore_pressure[0][p] + 0.5 * increment) * increment;
+    if (run.resting)
+      product += relative_work<G>(particles, p, moments, pressure);
+    work += particles.volume[p] * particles.porosity[0][p] / modulus * product;
     particles.pore_pressure[0][p] += increment;
+    for (int a = 0; a < D; ++a)
+      particles.pressure_gradient[a][p] = pressure.at_end[a];
   }
   return work;
 }
@@ -127,16 +141,18 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
   if (!model.water)
     return;
   const auto& mesh = model.mesh;
-  for (const Run& run : model.order.runs)
+  const VelocityField<G>& field = model.fields.front();
+  for (const Run& run : step.runs)
   {
     if (step.pore.flows)
     {
       const auto& centre = mesh.shapes[run.cell].centre;
-      const auto pressure = cell_pressure(mesh, model.fields.front(), step, run.cell);
-      model.energy.stress_work += add_increments<G::dim>(model.particles, model.water->modulus, run, centre, pressure);
+      const auto pressure = cell_pressure(mesh, field, step, run.cell);
+      model.energy.stress_work +=
+          add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
       if (model.water->may_dry())
-        dry_particles(run, *model.water, step, volume_strain(mesh, model.fields.front(), step.dt, run.cell), pressure,
-                      centre, model.particles);
+        dry_particles(run, *model.water, step, volume_strain(mesh, field, step.dt, run.cell), pressure, centre,
+                      model.particles);
     }
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,

@@ -54,6 +54,9 @@ void divide_row(const Mesh<D>& mesh, std::span<const std::array<double, D + 1>> 
         particles.initial_position[i][p] -= strain[i][j] * (x[j] - centre[j]);
       }
     }
+    if (particles.pore_pressure.present && particles.pressure_gradient.present)
+      for (int i = 0; i < D; ++i)
+        particles.pore_pressure[0][p] += particles.pressure_gradient[i][p] * (x[i] - centre[i]);
   }
 }
 

@@ -4,6 +4,8 @@
 #include "model/model.h"
 #include "transfer/resting.h"
 
+#include <cmath>
+
 namespace mpm::model
 {
 template <class G, int D>
@@ -32,8 +34,14 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
   }
   if (model.water && particles.pore_pressure.present)
   {
-    const double pressure = particles.pore_pressure[0][p];
-    of_water = 0.5 * particles.volume[p] * particles.porosity[0][p] * pressure * pressure / model.water->modulus;
+    double squared = std::pow(particles.pore_pressure[0][p], 2);
+    if (is_resting(particles, p) && particles.pressure_gradient.present)
+    {
+      const Vector<D> gradient = at<D>(particles.pressure_gradient.columns, p);
+      const auto& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+      squared += relative_product<D>(gradient, gradient, moments.mass_xixi) / moments.mass;
+    }
+    of_water = 0.5 * particles.volume[p] * particles.porosity[0][p] * squared / model.water->modulus;
   }
   return {kinetic,
           of_water + particles.volume[p] * stored_energy<D>(model.laws[particles.material[p]], stress, state.data())};

@@ -81,6 +81,18 @@ inline Matrix<D> gradient_at(const OptionalColumns<D * D>& columns, Index row)
   return gradient;
 }
 
+/// sum m_p (a . xi) (b . xi) over a cell's particles.
+template <int D>
+inline double relative_product(const Vector<D>& a, const Vector<D>& b,
+                               const std::array<double, n_symmetric<D>>& second_moment)
+{
+  double sum = 0;
+  for (int j = 0; j < D; ++j)
+    for (int k = 0; k < D; ++k)
+      sum += a[j] * second_moment[symmetric_index<D>(j, k)] * b[k];
+  return sum;
+}
+
 /// sum m_p a_p . b_p of two velocities a + A . xi and b + B . xi of a cell's particles, beyond what those of the centre
 /// give: A : B (x) second moment. Twice the kinetic energy of motion relative to the centre where they are the same.
 template <int D>
@@ -89,9 +101,7 @@ inline double relative_product(const Matrix<D>& a, const Matrix<D>& b,
 {
   double sum = 0;
   for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-      for (int k = 0; k < D; ++k)
-        sum += a[i][j] * second_moment[symmetric_index<D>(j, k)] * b[i][k];
+    sum += relative_product<D>(a[i], b[i], second_moment);
   return sum;
 }
 } // namespace mpm::transfer

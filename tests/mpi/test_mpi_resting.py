@@ -86,3 +86,15 @@ def test_implicit_steps_turn_cells_into_particles_on_all_ranks_as_on_one(comm, o
     assert reports[0] == reports[1]
     assert reports[1][0] != reports[1][-1] and reports[1][-1][0] > 0
     assert_same(*(all_by_id(model, FIELDS) for model in models))
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_pore_water_flows_through_resting_cells_on_all_ranks_as_on_one(comm, owners_of):
+    models = steep_block(comm, owners_of), steep_block(MPI.COMM_SELF)
+    for model in models:
+        model.add_water(porosity=0.4, conductivity=1e-3, modulus=1e7)
+        model.convert(where=lambda x: x[:, 0] < 0.3)
+        report = model.implicit(0.06, dt=0.02, conversion=mpm.Conversion(displacement=0.02, layers=1)).last()
+        assert report.converted_cells > 0 and report.resting_cells > 0
+    fields = (*FIELDS, "pore_pressure", "pressure_gradient", "porosity")
+    assert_same(*(all_by_id(model, fields) for model in models))

@@ -34,7 +34,7 @@ from .rayleigh import Rayleigh, checked_rayleigh
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
-from .resting import Conversion, checked_conversion, refuse_resting
+from .resting import Conversion, checked_conversion, refuse_drying
 from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
 from .surfaces import Surface
@@ -387,8 +387,7 @@ class Model(Body):
                 particles have the state after the last step that converged.
         """
         refuse_contacts(self, "the implicit scheme")
-        if self._core.water is not None:
-            refuse_resting(self, "the implicit scheme with pore water")
+        refuse_drying(self, "the implicit scheme")
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()
         refuse_two_phases(self, "implicit()")
@@ -453,8 +452,7 @@ class Model(Body):
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
         refuse_contacts(self, "equilibrate()")
-        if self._core.water is not None:
-            refuse_resting(self, "equilibrate() with pore water")
+        refuse_drying(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
         options = collectively(

@@ -29,10 +29,10 @@ class Conversion:
 
     Args:
         plastic_strain: accumulated plastic deviatoric strain of a cell, or of a particle in it, above which the cell turns into
-        particles [-]. In a shear band it grows without bound, elsewhere it is of the order of the elastic strains.
-    displacement: displacement of a node since its cell became a resting cell, over the cell size h, above which the cell
-        turns into particles [-]. They are placed at the original position of the cell, so that this is the largest error
-        of their positions, over the cell size.
+            particles [-]. In a shear band it grows without bound, elsewhere it is of the order of the elastic strains.
+        displacement: displacement of a node since its cell became a resting cell, over the cell size h, above which the cell
+            turns into particles [-]. They are placed at the original position of the cell, so that this is the largest error
+            of their positions, over the cell size.
         layers: layers of cells around such a cell that turn into particles with it, so that a shear band grows in particles.
 
     Raises:
@@ -71,7 +71,7 @@ class RestingCells:
     def rest(self, cell_tag: Tag | None = None, *, where: Where | None = None) -> int:
         """Turn cells into resting cells: each is a linear finite element with one material point, instead of its particles.
 
-        A resting cell costs about as much as one particle. Its nodes are those of the particles around it, and it has their
+        A resting cell costs about as much as two particles. Its nodes are those of the particles around it, and it has their
         mass, so that waves pass from one to the other. It is for soil that hardly moves: a cell turns into particles where it
         fails (`Conversion`), which changes neither mass, momentum and force of the nodes nor the energy.
 
@@ -135,6 +135,12 @@ def refuse_resting(model: Any, what: str) -> None:
     count = model.comm.allreduce(int(model.particles.is_resting.sum()))
     if count:
         raise InputError(f"{what} does not support resting cells, of which the model has {count}; see Model.convert")
+
+
+def refuse_drying(model: Any, what: str) -> None:
+    """Raises InputError where cells rest in soil that may dry: their mass would not stay as it is. Collective."""
+    if model.has_water and model._core.water.may_dry:
+        refuse_resting(model, f"{what} of soil that dries")
 
 
 def checked_conversion(model: Any, conversion: Conversion | None, integration: Any) -> Any:

@@ -166,10 +166,3 @@ def test_the_collapse_load_does_not_depend_on_where_cells_rest():
     assert 20.0 < low and high < 28.0
     for part in ({}, {"where": lambda x: x[:, 0] > 0.5}, {"where": lambda x: x[:, 1] < 0.4}):
         assert carries(low, **part) and not carries(high, **part)
-
-
-def test_pore_water_in_implicit_steps_is_refused_by_name():
-    model = block(2, ELASTIC)
-    model.add_water(conductivity=1e-4, porosity=0.4)
-    with pytest.raises(mpm.InputError, match="implicit scheme with pore water does not support resting cells"):
-        model.implicit(1.0, dt=0.1)

@@ -1,0 +1,108 @@
+"""Resting cells whose pores hold water, in implicit steps: they stand for particles with the same water."""
+
+import numpy as np
+import pytest
+from core_cases import DIMS
+from water_particle_cases import ELASTIC, Column, on_box
+
+import mpm_core as mpm
+
+SOIL = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=6e3, friction_angle=25.0, dilation_angle=0.0)
+
+
+def terzaghi_degree(factor):
+    m = np.pi * (np.arange(200) + 0.5)
+    return 1 - np.sum(2 / m**2 * np.exp(-(m**2) * factor))
+
+
+@pytest.mark.parametrize("rests", [None, lambda x: x[:, 1] < 0.5], ids=["all", "half"])
+def test_a_loaded_column_at_rest_consolidates_as_terzaghi_has_it(rests):
+    column = Column(20)
+    column.model.rest(where=rests)
+    for factor in (0.05, 0.2, 0.5):
+        *_, report = column.follow(factor)
+        assert column.degree() == pytest.approx(terzaghi_degree(factor), abs=0.006)
+    assert report.resting_cells > 0 and report.converted_cells == 0
+
+
+def soaked(dim, modulus, steep=True, n=4):
+    """A block that rests and drains at its top; steep, it yields beside its right side."""
+    model = on_box((1.0,) * dim, (n,) * dim, SOIL, per_cell=3 if dim == 2 else 4)
+    if steep:
+        model.release(2)  # the right side
+    model.add_water(porosity=0.4, conductivity=1e-6, modulus=modulus)
+    model.hold_pore_pressure(2 * dim, 0.0)
+    model.set_gravity([0.0] * (dim - 1) + [-9.81])
+    model.rest()
+    return model
+
+
+def by_cell(model, name):
+    p, count = model.particles, len(model.mesh.cells)
+    return np.bincount(p.cell, p.volume * getattr(p, name), count) / np.bincount(p.cell, p.volume, count)
+
+
+@pytest.mark.parametrize("options", [{}, {"quasi_static": True}, {"nmd": True}], ids=lambda o: ",".join(o) or "default")
+@pytest.mark.parametrize("modulus", [np.inf, 1e7])
+@pytest.mark.parametrize("dim", DIMS)
+def test_a_step_after_conversion_moves_soil_and_water_as_before(dim, modulus, options):
+    """Neither nodes nor energies can tell a cell from its particles, whose pressures differ within the cell."""
+    found = []
+    options = {"dt": 0.02, "conversion": None, "solver": mpm.Newton(tolerance=1e-12), **options}
+    for converts in (False, True):
+        model = soaked(dim, modulus)
+        before = model.implicit(0.06, **options).last()
+        if converts:
+            assert model.convert() == 0
+            report = model.report()
+            for name in ("kinetic_energy", "stored_energy", "mass"):
+                assert getattr(report, name) == pytest.approx(getattr(before, name), rel=1e-12, abs=1e-12)
+            assert np.ptp(model.particles.pore_pressure[model.particles.cell == 0]) > 0
+        report = model.implicit(0.08, **options).last()
+        found.append((model.nodal("velocity"), by_cell(model, "pore_pressure"), by_cell(model, "porosity"), model.water_inflow(),
+                      report.unexplained_energy))  # fmt: skip
+    assert model.particles.plastic_strain.max() > 0
+    for one, other in zip(*found, strict=True):
+        scale = max(np.abs(one).max(), 1e-9)
+        assert np.abs(one - other).max() < 1e-8 * scale
+
+
+def test_water_is_conserved_at_rest_and_in_conversion():
+    """Pores grow by the water that enters, whichever kind the cells are."""
+    model = soaked(2, np.inf, steep=False, n=8)
+
+    def water():
+        return np.sum(model.particles.volume * model.particles.porosity)
+
+    start = water()
+    model.implicit(0.15, dt=0.05).last()
+    model.convert(where=lambda x: x[:, 1] > 0.5)
+    report = model.implicit(0.3, dt=0.05).last()
+    assert report.converted_cells == report.resting_cells == 64
+    assert water() - start == pytest.approx(model.water_inflow(), abs=1e-9 * start)
+    assert abs(model.water_inflow()) > 1e-6 * start
+
+
+def test_a_model_at_rest_finds_the_equilibrium_of_its_particles():
+    found = []
+    for rest in (False, True):
+        model = on_box((0.5, 1.0), (2, 6), ELASTIC, per_cell=1)  # so that both are integrated at the centres of cells
+        model.set_gravity((0.0, -9.81))
+        model.add_water(porosity=0.4, conductivity=1e-4, modulus=2.2e9)
+        model.set_pore_pressure(lambda x: 9810.0 * (1.0 - x[:, 1]))
+        model.hold_pore_pressure(4, 0.0)
+        if rest:
+            model.rest()
+        assert model.equilibrate(small_displacements=True).unbalanced_ratio < 1e-6
+        found.append(model.particles.stress.copy())
+    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-3)
+    assert np.abs(found[0][:, 1]).max() > 8e3
+
+
+def test_resting_cells_of_soil_that_dries_are_refused():
+    model = on_box((0.5, 1.0), (2, 4), ELASTIC)
+    model.add_water(porosity=0.4, conductivity=1e-6, retention=mpm.VanGenuchten(alpha=2.0, n=1.5))
+    model.rest()
+    for use in (lambda: model.implicit(1.0, dt=1.0), model.equilibrate):
+        with pytest.raises(mpm.InputError, match="of soil that dries does not support resting cells, of which the model has 16"):
+            use()
