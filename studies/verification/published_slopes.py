@@ -31,14 +31,19 @@ UNDRAINED = {1.0: 1.448, 1.5: 2.032, 4.0: 2.032}
 """Factor of safety by the strength of the foundation, as a fraction of that of the slope"""
 
 
+def slope_on_rock(cell, runout):
+    """The mesh of the first example with room to move [m], its soil and supports."""
+    background = bridge.slope_mesh(
+        MPI.COMM_WORLD, height=HEIGHT, angle=ANGLE, crest=1.2 * HEIGHT, cell_size=cell, kind="fitted", runout=runout
+    )
+    soil = mpm.MohrCoulomb(**ELASTIC, cohesion=0.05 * UNIT_WEIGHT * HEIGHT, friction_angle=20.0)
+    return background, soil, [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+
+
 def drained_on_rock(cell):
     """The first example."""
-    background = bridge.slope_mesh(
-        MPI.COMM_WORLD, height=HEIGHT, angle=ANGLE, crest=1.2 * HEIGHT, cell_size=cell, kind="fitted", runout=cell
-    )
+    background, soil, supports = slope_on_rock(cell, runout=cell)
     domain, _, facet_tags = bridge.soil_mesh(*background)
-    soil = mpm.MohrCoulomb(**ELASTIC, cohesion=0.05 * UNIT_WEIGHT * HEIGHT, friction_angle=20.0)
-    supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
     return bridge.QuasiStatic(domain, soil, facet_tags, supports)
 
 

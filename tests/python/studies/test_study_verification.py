@@ -18,7 +18,11 @@ sys.path.insert(0, str(FOLDER))
 
 from _case import Check, Kind, Result  # noqa: E402
 from _slip_surfaces import sliding_blocks  # noqa: E402
+from _static_bound import SIDES, static_bound  # noqa: E402
 from _table import case_row, docs_page, percent, read_table  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+import fenics_bridge as bridge  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +148,19 @@ def test_blocks_on_a_plane_are_one_wedge():
     even = lambda x, y: np.full(len(x), 5e3)  # noqa: E731
     assert sliding_blocks(plane, (2.5, 2.8), surface, even, 20e3) == pytest.approx(4 * 5 / 20, rel=1e-6)
     assert sliding_blocks(plane[::-1], (2.8, 2.5), surface, even, 20e3) == np.inf
+
+
+@pytest.mark.parametrize(("width", "lowest", "highest"), [(0.5, 2.0, 2 * 2.0), (2.0, 2 * 2**0.5, 3.786)])
+def test_stresses_in_equilibrium_are_a_lower_bound(width, lowest, highest):
+    """A cut 1 m high. By hand: uniaxial stress carries 2 c / gamma, Heyman's stresses 2.83 of a wide one; a wedge at 45 degrees needs
+    4 c / gamma at most, and 3.786 is the best mechanism known for a wide one."""
+    domain, cells, facets = bridge.box_mesh(MPI.COMM_WORLD, (width, 1.0), (round(6 * width), 6))
+    sides = bridge.name_tags(facets, {"left": 1, "right": 2, "base": 3, "top": 4})
+    mesh = domain, bridge.name_tags(cells, {"clay": 1}), sides
+    factor = static_bound(mesh, {"clay": 30e3}, 10e3, ["right", "top"], ["left"])
+    assert lowest * np.cos(np.pi / SIDES) - 1e-6 <= factor / 3 <= highest
+    half = static_bound(mesh, {"clay": 15e3}, 10e3, ["right", "top"], ["left"])
+    assert half == pytest.approx(factor / 2, rel=1e-6)
 
 
 def test_percentages_keep_two_digits():
