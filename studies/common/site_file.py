@@ -12,6 +12,10 @@ Example of a file:
     young = 3e6
     cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`
 
+    [soils.fill]
+    unit_weight = 19e3
+    python_law = "law.py:Sand"         # beside this file; or umat = "umat.so", properties, variables, strength_properties
+
     [supports]                         # by default base fixed, and left, right and sides on rollers
     base = "fixed"
 
@@ -153,7 +157,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         if "unit_weight" not in given:
             raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
         weights[soil] = float(given["unit_weight"])
-        parameters = {key: value for key, value in given.items() if key != "unit_weight"}
+        parameters = _located({key: value for key, value in given.items() if key != "unit_weight"}, path)
         if any(isinstance(value, dict) for value in parameters.values()):
             cell_tags, heights = bridge.graded_tags(
                 domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
@@ -162,7 +166,10 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         else:
             law = law_at(parameters, 0.0, where)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
-    others = {name: law_at(given, 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()}
+    others = {
+        name: law_at(_located(given, path), 0.0, f"{path}: laws.{name}")
+        for name, given in table.get("laws", {}).items()
+    }
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
@@ -198,6 +205,12 @@ def law_at(table: dict, height: float, where: str) -> Any:
     if values["shear_strength"] is not None:
         values["cohesion"] = values["shear_strength"]
     return law_of(argparse.Namespace(**values))
+
+
+def _located(table: dict, path: Path) -> dict:
+    """The table of a law whose files are beside the site's."""
+    files = {key: str(path.parent / table[key]) for key in ("umat", "python_law", "python-law") if key in table}
+    return table | files
 
 
 def _at_height(value: Any, height: float) -> Any:

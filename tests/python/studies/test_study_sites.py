@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
@@ -142,6 +143,20 @@ def test_a_soil_of_a_site_may_keep_its_strength(tmp_path):
         assert importlib.import_module("safety").main([str(word) for word in options]) == 0
         factors[kept] = json.loads((folder / "summary.json").read_text())["factor_of_safety"]
     assert factors[()] <= factors["lower",] * (1 + 4e-3) and 1.1 * factors[()] < factors["upper",]
+
+
+def test_the_files_of_a_law_are_beside_the_site(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "class Clay:\n"
+        "    n_state, p_wave_modulus, c = 1, 7e6, 9e3\n"
+        "    strength_parameters = {'c': 'strength'}\n"
+        "    def update(self, *points):\n"
+        "        pass\n"
+    )
+    own = SITE.replace("cohesion = 9e3\nfriction_angle = 0.0\nyoung = 5e6", 'python_law = "law.py:Clay"')
+    site = site_file.read_site(site_in(tmp_path, own), MPI.COMM_WORLD)
+    tag = site.tags_of(["upper"])[0]
+    assert bridge.reduced_strength(site.laws, 1.5)[tag].law.c == pytest.approx(6e3)
 
 
 def test_a_soil_that_the_site_does_not_have_cannot_keep_its_strength(tmp_path):
