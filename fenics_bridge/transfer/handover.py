@@ -61,7 +61,8 @@ def initialise(
     plane strain and 3D with quadratic ones, whose cell means linear test functions cannot distinguish from their stresses.
     In axisymmetric bodies two things differ: the hoop stress acts with the particles at the centre of a cell, which leaves
     some 1e-3 of quadratic elements out of balance; and the weights of nodes are exact for particles at Gauss points of
-    degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size.
+    degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size. Soil that has dried leaves more: the
+    weight of its water and its suction are no polynomials, and particles take other points for them.
 
     Args:
         model: model with particles.
@@ -132,6 +133,7 @@ def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smoo
     if isinstance(fem, Consolidation):
         particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
         particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
+        model.saturate()
     return returned
 
 

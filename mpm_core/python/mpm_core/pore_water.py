@@ -183,12 +183,20 @@ class PoreWater(Conditions):
         gradient = np.linalg.solve(x[:, 1:] - x[:, :1], (values[:, 1:] - values[:, :1])[..., None])[..., 0]
         self.particles.set("pore_pressure", values[:, 0] + np.einsum("pa,pa->p", gradient, position - x[:, 0]))
         self.particles.set("pressure_gradient", gradient)
-        if self._core.water.may_dry:
-            self._saturate()
+        self.saturate()
 
-    def _saturate(self) -> None:
-        """Give particles the saturation of their pressures, and the mass of the water that they then have. Collective."""
+    def saturate(self) -> None:
+        """Give particles the saturation of their pressures, and the mass of the water that they then have.
+
+        Needed after pressures were set as a field of particles. Nothing where soil stays saturated. Collective.
+
+        Raises:
+            InputError: on all ranks, for a model without water.
+        """
+        self._require_water()
         p, water = self.particles, self._core.water
+        if not water.may_dry:
+            return
         after = np.asarray(water.saturation(p.material, p.pore_pressure), dtype=float)
         pores = water.unit_weight / STANDARD_GRAVITY * p.porosity * p.volume
         p.set("mass", p.mass + pores * (after - p.saturation))

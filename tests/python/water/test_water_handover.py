@@ -54,6 +54,38 @@ def test_particles_take_over_in_equilibrium_and_go_on_as_the_elements_do():
     np.testing.assert_allclose(model.particles.pore_pressure, there, rtol=0, atol=2e-3 * excess)
 
 
+def test_dried_soil_is_taken_over_with_its_suction_and_its_lost_weight():
+    curve = water.VanGenuchten(alpha=4e-4, n=2.0)
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.2, 1.0), (4, 20))
+    held = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    elastic = mpm.LinearElastic(young=5e6, poisson=0.3)
+    fem = water.Consolidation(
+        domain, elastic, water.PorousSoil(1e-5, porosity=0.4, retention=curve), facet_tags, held, [water.Head(BASE, 0.0)],
+        load=bridge.Load(unit_weight=WEIGHT), element=water.Element.STABILISED,
+    )  # fmt: skip
+    fem.initialise(pore_pressure=lambda x: 9810.0 * (1.0 - x[:, 1]))
+    assert fem.run(1e5, 10.0, growth=1.5)[-1].converged
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), elastic)
+    model.seed(density=WEIGHT / 9.81, per_cell=3)
+    for side in (LEFT, RIGHT):
+        model.roller(side, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-5, retention=curve)
+    model.hold_pore_pressure(BASE, 0.0)
+    result = bridge.initialise(model, fem)
+    assert result.unbalanced_ratio < 2e-3 and result.equilibrated_ratio < 5e-4
+    p = model.particles
+    np.testing.assert_allclose(p.saturation, curve.saturation(-p.pore_pressure), atol=1e-5)
+    assert p.saturation.min() < 0.5
+    lost = model.comm.allreduce(np.sum(1000.0 * 0.4 * (1 - p.saturation) * p.volume))
+    assert model.comm.allreduce(p.mass.sum()) == pytest.approx(0.2 * WEIGHT / 9.81 - lost, rel=1e-9)
+    assert fem.advance(5e4).converged
+    list(model.implicit(5e4, dt=5e4, quasi_static=True))
+    there = fem.evaluate_at(model.particles.position)["pressure"][:, 0]
+    np.testing.assert_allclose(model.particles.pore_pressure, there, atol=0.01 * 9810)
+
+
 def test_equilibration_leaves_the_pressures():
     fem, model = consolidating(water.Element.TAYLOR_HOOD)
     wet(model)
