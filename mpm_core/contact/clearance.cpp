@@ -19,8 +19,10 @@ double apart(const Vector<D>& a, const Vector<D>& b)
 } // namespace
 
 template <int D>
-void find_clearance(const Mesh<D>& mesh, Contact<D>& contact)
+void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
 {
+  if (!contact.clearance.empty() && contact.travel <= contact.cell_size)
+    return;
   const RigidBody<D>& body = contact.body;
   contact.clearance.resize(static_cast<std::size_t>(mesh.owned_cells));
   contact.cell_reach.resize(static_cast<std::size_t>(mesh.owned_cells));
@@ -44,6 +46,6 @@ void find_clearance(const Mesh<D>& mesh, Contact<D>& contact)
   contact.reach = std::min(rotation_reach<D>(contact.surface, body.centre), farthest);
 }
 
-template void find_clearance<2>(const Mesh<2>&, Contact<2>&);
-template void find_clearance<3>(const Mesh<3>&, Contact<3>&);
+template void keep_clearance<2>(const Mesh<2>&, Contact<2>&);
+template void keep_clearance<3>(const Mesh<3>&, Contact<3>&);
 } // namespace mpm::contact

@@ -6,9 +6,10 @@
 
 namespace mpm::contact
 {
-/// Finds lower bounds of the gaps in all cells of this rank, for the place where the surface is now.
+/// Finds lower bounds of the gaps in all cells of this rank, for the place where the surface is now, unless those from
+/// before still hold.
 template <int D>
-void find_clearance(const Mesh<D>& mesh, Contact<D>& contact);
+void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact);
 
 /// A point as it lies to the surface at its start.
 template <int D>
@@ -20,6 +21,19 @@ inline Vector<D> as_at_start(const RigidBody<D>& body, const Vector<D>& x)
   arm = rotated_back<D>(body.rotation, arm);
   for (int i = 0; i < D; ++i)
     arm[i] += body.centre[i];
+  return arm;
+}
+
+/// A point of the body, given as it was at its start, where it is now.
+template <int D>
+inline Vector<D> as_it_is(const RigidBody<D>& body, const Vector<D>& x)
+{
+  Vector<D> arm;
+  for (int i = 0; i < D; ++i)
+    arm[i] = x[i] - body.centre[i];
+  arm = rotated<D>(body.rotation, arm);
+  for (int i = 0; i < D; ++i)
+    arm[i] += body.centre[i] + body.displacement[i];
   return arm;
 }
 } // namespace mpm::contact

@@ -30,8 +30,7 @@ void begin_step(const Mesh<D>& mesh, const TimeStep& step, Contact<D>& contact)
   if (contact.stiff_step == 0)
     contact.stiff_step = step.dt;
   contact.stiff_step = std::max(contact.stiff_step, std::sqrt(load > 0 ? 1 + load : contact.penalty) * step.dt);
-  if (contact.clearance.empty() || contact.travel > contact.cell_size)
-    find_clearance<D>(mesh, contact);
+  keep_clearance<D>(mesh, contact);
 }
 
 template <int D>
@@ -46,7 +45,7 @@ template <int D>
 void end_step(double dt, Contact<D>& contact)
 {
   move_body(dt, contact.body);
-  contact.travel += step_travel(contact, dt);
+  contact.travel += step_travel(contact, contact.body, dt);
 }
 
 template <class G, int D>

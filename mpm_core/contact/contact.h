@@ -12,6 +12,8 @@
 /// sqrt(beta) / dt_c, whatever the soil and the mesh; and with the gap and the slip at the end of the step, the nodes
 /// never get more work from it than its springs give up, as long as beta dt^2 <= dt_c^2. With a body that moves freely
 /// the same holds for dt_c^2 >= (1 + load) dt^2, load = sum m_p (1/M + r_p^2/I) (docs/contact.md).
+///
+/// Particles that are tied to a surface have the force -kappa (s + dt v) of all their motion s relative to it.
 
 #include "contact/rigid_body.h"
 #include "contact/surfaces.h"
@@ -29,7 +31,8 @@ struct Contact
   double adhesion;    ///< shear strength without pressure [Pa]
   double penalty;     ///< beta, in (0, 1]
   RigidBody<D> body;
-  std::string slip;      ///< name of the particles' field with their elastic slip; empty where it is smooth
+  std::string slip; ///< name of the particles' field with their elastic slip; empty where it is smooth
+  std::string bond; ///< name of their field with 1 where they are tied to it, and where; empty where they only touch it
   double stiff_step = 0; ///< dt_c [s]; 0 before the first step
 
   Reaction<D> reaction;   ///< in the last step; this rank's part
@@ -69,12 +72,13 @@ void accelerate(const TimeStep& step, const Vector<D>& gravity, Contact<D>& cont
 template <int D>
 void end_step(double dt, Contact<D>& contact);
 
-/// Path of the surface's fastest point in a step [m].
+/// Path of the surface's fastest point in a step, moving as the body does [m].
 template <int D>
-inline double step_travel(const Contact<D>& contact, double dt)
+inline double step_travel(const Contact<D>& contact, const RigidBody<D>& body, double dt)
 {
-  return dt * (norm<D>(contact.body.velocity) + contact.reach * norm<3>(contact.body.spin));
+  return dt * (norm<D>(body.velocity) + contact.reach * norm<3>(body.spin));
 }
+
 /// The particles that move with one velocity field.
 struct Movers
 {

@@ -1,4 +1,5 @@
 #include "contact/clearance.h"
+#include "contact/touch.h"
 #include "transfer/affine_field.h"
 
 #include <algorithm>
@@ -9,50 +10,6 @@ namespace mpm::contact
 {
 namespace
 {
-/// Area of surface that a particle covers [m2]; per metre or per radian in two dimensions.
-template <class G>
-double particle_area(const Particles<G::dim>& particles, Index p, double radius)
-{
-  if constexpr (G::dim == 3)
-    return 4 * radius * radius;
-  else
-    return 2 * radius * (G::has_hoop ? particles.position[0][p] : 1);
-}
-
-/// The part of a vector along a surface.
-template <int D>
-Vector<D> tangential(Vector<D> v, const Vector<D>& normal)
-{
-  const double along = dot<D>(v, normal);
-  for (int i = 0; i < D; ++i)
-    v[i] -= along * normal[i];
-  return v;
-}
-
-/// Friction: adds a displacement along the surface to the elastic slip and returns it to the cone.
-/// @param longest  slip at which the spring's force is the shear strength
-/// @returns whether the particle sticks
-template <int D>
-bool update_slip(const Vector<D>& normal, const Vector<D>& increment, double longest, Vector<D>& slip)
-{
-  for (int i = 0; i < D; ++i)
-    slip[i] += increment[i];
-  slip = tangential<D>(slip, normal);
-  const double length = norm<D>(slip), scale = length > longest ? longest / length : 1;
-  for (double& component : slip)
-    component *= scale;
-  return scale == 1;
-}
-
-template <int D>
-std::vector<Column>* slip_columns(Particles<D>& particles, const std::string& name)
-{
-  for (AddedField& field : particles.added)
-    if (!name.empty() && field.name == name)
-      return &field.columns;
-  return nullptr;
-}
-
 /// What all particles need to know in a step.
 template <int D>
 struct Press
@@ -63,10 +20,11 @@ struct Press
   double per_mass;  ///< translation of a free body under a force: 1/M [1/kg]
   double per_inertia;
   std::vector<Column>* slips;
+  const std::vector<Column>* bonds; ///< of particles that are tied to the surface; null where they only touch it
 };
 
 template <int D>
-Press<D> press_of(const Contact<D>& contact, double dt, std::vector<Column>* slips)
+Press<D> press_of(const Contact<D>& contact, double dt, Particles<D>& particles)
 {
   const RigidBody<D>& body = contact.body;
   Vector<3> angle;
@@ -82,7 +40,8 @@ Press<D> press_of(const Contact<D>& contact, double dt, std::vector<Column>* sli
           turn,
           free ? 1 / body.mass : 0,
           body.rotates ? 1 / least : 0,
-          slips};
+          columns_of(particles, contact.slip),
+          columns_of(particles, contact.bond)};
 }
 
 /// A particle at the surface.
@@ -113,31 +72,6 @@ Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector
   return touch;
 }
 
-/// Adds a force on a particle to what the surface feels.
-template <int D>
-void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
-{
-  const Vector<3> moment = cross(in_space<D>(arm), in_space<D>(force));
-  for (int i = 0; i < D; ++i)
-    reaction.force[i] -= force[i];
-  for (std::size_t i = 0; i < 3; ++i)
-    reaction.moment[i] -= moment[i];
-}
-
-/// The cube, or square, as large as a particle [m^D].
-template <class G>
-double particle_cube(const Particles<G::dim>& particles, Index p)
-{
-  return particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
-}
-
-/// Whether a cube with this side is smaller: compared by volumes, since roots take their time.
-template <int D>
-bool fits(double side, double volume)
-{
-  return side <= 0 || (D == 3 ? side * side * side : side * side) < volume;
-}
-
 /// Whether a particle touches the surface or is within its own radius of doing so.
 template <class G>
 bool is_near(const Particles<G::dim>& particles, Index p, double distance)
@@ -153,11 +87,41 @@ void leave_slip(const Press<D>& press, Index p)
     (*press.slips)[i][p] = 0;
 }
 
+/// Force on a particle that is tied to the surface, by all of its motion relative to the body.
+template <class G, int D = G::dim>
+Vector<D> bond_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles, Index p,
+                     Contact<D>& contact)
+{
+  const Vector<D> x = at<D>(particles.position, p);
+  const Touch<D> touch = touch_of<D>(contact, press, x, velocity);
+  const Vector<D> stretch = difference<D>(x, as_it_is<D>(contact.body, anchor_of<D>(*press.bonds, p)));
+  Vector<D> arm, force;
+  for (int i = 0; i < D; ++i)
+    arm[i] = x[i] - contact.body.displacement[i] - contact.body.centre[i];
+  const Vector<D> turned = rotated<D>(press.turn, arm);
+  const double mass = particles.mass[p], stiffness = press.stiffness * mass;
+  for (int i = 0; i < D; ++i)
+    force[i] = -stiffness * (stretch[i] + press.dt * (velocity[i] - contact.body.velocity[i]) - turned[i]);
+  const double area = particle_area<G>(particles, p, particle_radius<G>(particles, p));
+  Reaction<D>& reaction = contact.reaction;
+  reaction.energy += 0.5 * stiffness * dot<D>(stretch, stretch);
+  reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(arm, arm));
+  reaction.area += area;
+  reaction.mass += mass;
+  reaction.sticking += area;
+  reaction.normal += dot<D>(force, touch.normal);
+  react<D>(force, arm, reaction);
+  return force;
+}
+
 /// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
 template <class G, int D = G::dim>
 std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles,
                                         Index p, Contact<D>& contact)
 {
+  if (press.bonds)
+    return is_tied(*press.bonds, p) ? std::optional(bond_force<G, D>(press, velocity, particles, p, contact))
+                                    : std::nullopt;
   const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity);
   if (!is_near<G>(particles, p, touch.after))
   {
@@ -198,22 +162,6 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& 
   return force;
 }
 
-/// Whether any particle of a run can be near: not if the largest would not be where the cell, and the step, bring it
-/// nearest. Most cells that a surface may reach before their bounds are found again are not at it now.
-/// @param gap  smallest possible distance of the cell from the surface at the end of the step, if its nodes rest [m]
-template <class G, int D = G::dim>
-bool may_be_near(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double gap,
-                 const Particles<D>& particles)
-{
-  double fastest = 0, largest = 0;
-  for (Index node : mesh.cells[run.cell])
-    fastest =
-        std::max(fastest, dot<D>(velocity[static_cast<std::size_t>(node)], velocity[static_cast<std::size_t>(node)]));
-  for (Index p = run.first; p < run.last; ++p)
-    largest = std::max(largest, particle_cube<G>(particles, p));
-  return fits<D>(gap - dt * std::sqrt(fastest), largest);
-}
-
 /// Forces on the particles of a run, by their moments.
 /// @returns whether any was in contact
 template <class G, int D = G::dim>
@@ -251,8 +199,8 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
                         std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
                         std::span<Vector<D>> forces)
 {
-  const Press<D> press = press_of(contact, dt, slip_columns(particles, contact.slip));
-  const double travelled = contact.travel + step_travel(contact, dt);
+  const Press<D> press = press_of(contact, dt, particles);
+  const double travelled = contact.travel + step_travel(contact, contact.body, dt);
   bool touched = false;
   for (const Run& run : runs)
   {

@@ -125,6 +125,22 @@ Distance<3> distance_from(const Triangles& triangles, const Vector<3>& x)
   return {sign * length, scaled<3>(nearest.offset, sign / length)};
 }
 
+Distance<3> distance_from(const Revolved& solid, const Vector<3>& x)
+{
+  const Vector<3> arm = difference<3>(x, solid.point);
+  const double z = dot<3>(arm, solid.axis);
+  const Vector<3> radial = difference<3>(arm, scaled<3>(solid.axis, z));
+  const double r = norm<3>(radial);
+  const auto [value, normal] = distance_from(solid.section, {r, z});
+  // On the axis any radial direction is as good; its part of the normal is zero but for the inside of the solid.
+  const Vector<3> out = r > 0 ? scaled<3>(radial, 1 / r) : Vector<3>{};
+  Vector<3> along;
+  for (std::size_t i = 0; i < 3; ++i)
+    along[i] = normal[0] * out[i] + normal[1] * solid.axis[i];
+  const double length = norm<3>(along);
+  return {value, length > 0 ? scaled<3>(along, 1 / length) : solid.axis};
+}
+
 template <int D>
 double reach_of(const Plane<D>&, const Vector<D>&)
 {
@@ -152,6 +168,15 @@ double reach_of(const Polyline& line, const Vector<2>& centre)
   for (const Vector<2>& point : line.points)
     reach = std::max(reach, norm<2>(difference<2>(point, centre)));
   return reach;
+}
+
+double reach_of(const Revolved& solid, const Vector<3>& centre)
+{
+  const double away = norm<3>(difference<3>(solid.point, centre));
+  double reach = 0;
+  for (const Vector<2>& point : solid.section.points)
+    reach = std::max(reach, norm<2>(point));
+  return away + reach;
 }
 
 double reach_of(const Triangles& triangles, const Vector<3>& centre)

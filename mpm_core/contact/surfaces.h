@@ -38,9 +38,17 @@ struct Polyline
   bool closed;
 };
 
+/// A solid of revolution: the closed section, which mirrors itself in the axis, in coordinates (r, z) from a point on
+/// it.
+struct Revolved
+{
+  Vector<3> point, axis; ///< z is along the axis, of length 1
+  Polyline section;
+};
+
 template <int D>
 using Surface = std::conditional_t<D == 2, std::variant<Plane<2>, Ball<2>, Box<2>, Polyline>,
-                                   std::variant<Plane<3>, Ball<3>, Box<3>, Triangles>>;
+                                   std::variant<Plane<3>, Ball<3>, Box<3>, Triangles, Revolved>>;
 
 /// From a rigid body to a point: positive outside of the body; the normal has length 1 and points out of it.
 template <int D>

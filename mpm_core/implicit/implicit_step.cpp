@@ -3,6 +3,7 @@
 #include "explicit/explicit_step.h"
 #include "implicit/averaging.h"
 #include "implicit/balance.h"
+#include "implicit/contact_force.h"
 #include "implicit/external_force.h"
 #include "implicit/far_field.h"
 #include "implicit/ghost.h"
@@ -45,6 +46,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.length = dt;
   if (model.water)
     model.water->time = model.time + dt;
+  step.has_contacts = !model.contacts.empty();
   field.integration.kind = options.integration;
   field.integration.averaged_by_law.assign(options.average_stress ? model.laws.size() : 0, 1.0);
   map_to_nodes(model); // (11), (15)
@@ -89,6 +91,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   const auto count = try_stresses(mesh, points_of(model, step), field, tangents, step);
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
+  try_contacts(model, tangents, step);
   if (step.pore.flows)
     update(step.halos.nodes, step.pore.rate);
   if (model.water && model.water->may_dry())
@@ -96,6 +99,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);
+  add_contact_forces(step, step.forces);
   add_border_forces(exchange, field, step, step.forces);
   add_internal_forces(mesh, step, step.forces);
   add_pore_forces(mesh, step, step.forces);
@@ -121,6 +125,7 @@ void find_tangent(const Mesh<D>& mesh, const VelocityField<G>& field, const Impl
 {
   TangentSum<D> stiffness(system, tangent.stiffness);
   add_internal_entries(mesh, step, stiffness);
+  add_contact_entries(mesh, step, stiffness);
   add_ghost_entries(step, stiffness);
   add_inertia_entries(field, step, system.owned, stiffness);
   add_border_entries(field.far_field, system, stiffness);
@@ -167,11 +172,12 @@ void undo(Model<G>& model, const Particles<G::dim>& start, const EnergyBook& ene
 /// soil has just left keep the velocities of this step until the next one.
 /// @note Collective
 template <class G>
-void map_to_nodes_again(Model<G>& model)
+void map_to_nodes_again(Model<G>& model, const ImplicitStep<G>& step)
 {
   VelocityField<G>& field = model.fields.front();
   const bool shrinks = std::exchange(field.part_shrinks, false);
   map_to_nodes(model);
+  add_contact_tractions(model, step);
   field.part_shrinks = shrinks;
 }
 } // namespace
@@ -189,6 +195,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const auto start = model.particles;
   const EnergyBook energy = model.energy;
   update_pore_water(model, step);
+  keep_slip(model, step);
   particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step),
                         options.hold_positions}); // (18), (20), stresses
   agree_on_failure(model);
@@ -199,6 +206,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   }
   add_work(field, step, model.exchange.owned, model.totals);
   move_border(model.exchange, step.dt, field);
+  move_bodies(model, step);
   if (model.water)
     add_flow(model.mesh, field, step, model.exchange.owned, *model.water, model.totals);
   model.last.dt = step.dt;
@@ -217,7 +225,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
     model.ready = false;
     prepare(model);
   }
-  map_to_nodes_again(model);
+  map_to_nodes_again(model, step);
   return true;
 }
 

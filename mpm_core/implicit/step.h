@@ -2,6 +2,7 @@
 /// @file
 /// An implicit step under way, as plain data.
 
+#include "implicit/contact_step.h"
 #include "implicit/ghost_facets.h"
 #include "implicit/pore_step.h"
 #include "model/material_points.h"
@@ -118,6 +119,8 @@ struct ImplicitStep
   std::vector<GhostFacet<D>> ghosts;    ///< stabilised facets
   Halos halos;                          ///< of the mesh, for those between ranks; made by the first step
   bool halos_ready = false;
+  bool has_contacts = false;         ///< with rigid surfaces, which follow
+  ContactStep<D> contact;            ///< with rigid surfaces
   PoreStep<D> pore;                  ///< flow of the pore water; nothing in it without water
   std::vector<double> elastic;       ///< stiffness of each node, sum V (K + 4G/3) |grad N|^2; this rank's part [N/m]
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts

@@ -79,7 +79,8 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
   std::vector<std::array<Index, 2>> ghosts;
   for (const GhostFacet<D>& facet : step.ghosts)
     ghosts.push_back({facet.nodes[D], facet.nodes[D + 1]});
-  int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts;
+  int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts ||
+                step.has_contacts != system.has_contacts;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
   system.unknowns = step.pore.flows ? D + 1 : D;
@@ -95,6 +96,7 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
 
   system.owned = std::move(owned);
   system.cells = step.cells;
+  system.has_contacts = step.has_contacts;
   system.ghosts = std::move(ghosts);
   system.number.resize(sums.size());
   system.diagonal.resize(sums.size());

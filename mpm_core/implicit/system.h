@@ -31,6 +31,7 @@ struct ImplicitSystem
   std::vector<double> diagonal;             ///< per node: elastic stiffness, the scale of its entries [N/m]
   std::vector<BorderNode<D>> border;        ///< all nodes of the border of the far field
   GlobalIndex total = 0;                    ///< nodes over all ranks
+  bool has_contacts = false;                ///< with rigid surfaces
   int unknowns = D;                         ///< of each node
 };
 

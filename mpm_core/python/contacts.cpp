@@ -162,7 +162,7 @@ void bind_contacts_of(py::module_& m)
         [](const Model<G>& model, const Surface<D>& surface) { return smallest_gap<G>(model.particles, surface); });
   m.def("add_contact",
         [](Model<G>& model, const Surface<D>& surface, double friction, double adhesion, double penalty,
-           const RigidBody<D>& body, const std::string& slip)
+           const RigidBody<D>& body, const std::string& slip, const std::string& bond)
         {
           Contact<D> contact{};
           contact.surface = surface;
@@ -171,6 +171,7 @@ void bind_contacts_of(py::module_& m)
           contact.penalty = penalty;
           contact.body = body;
           contact.slip = slip;
+          contact.bond = bond;
           model.contacts.push_back(std::move(contact));
         });
   m.def("clear_contacts",
@@ -208,6 +209,11 @@ void bind_contacts(py::module_& m)
       .def(py::init(
           [](const std::vector<Vector<2>>& points, bool closed) {
             return Polyline{points, closed};
+          }));
+  py::class_<Revolved>(m, "Revolved3")
+      .def(py::init(
+          [](const Vector<3>& point, const Vector<3>& axis, const std::vector<Vector<2>>& section) {
+            return Revolved{point, axis, {section, true}};
           }));
   py::class_<Triangles>(m, "Triangles3")
       .def(py::init(

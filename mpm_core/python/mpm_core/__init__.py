@@ -51,7 +51,7 @@ from .reports import Reports
 from .resting import Conversion
 from .rigid_body import FreeBody, Servo
 from .space import Space, parts, space
-from .surfaces import Box, Disc, Plane, Polyline, Sphere, distances
+from .surfaces import Box, Cone, Cylinder, Disc, Plane, Polyline, Sphere, Wedge, distances
 from .triangles import Triangles
 
 for _law in law_types:
@@ -60,9 +60,11 @@ for _law in law_types:
 __all__ = [
     "Box",
     "CamClay",
+    "Cone",
     "ConeMatch",
     "Conversion",
     "CriticalCell",
+    "Cylinder",
     "Disc",
     "DruckerPrager",
     "ElementTest",
@@ -105,6 +107,7 @@ __all__ = [
     "Umat",
     "Undrained",
     "ViscoplasticMohrCoulomb",
+    "Wedge",
     "__version__",
     "checkpoint_description",
     "critical_cell",

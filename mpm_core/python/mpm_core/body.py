@@ -21,6 +21,8 @@ from .particles import Particles
 from .pore_water import PoreWater
 from .resting import RestingCells, refuse_resting
 from .space import SpaceWatch
+from .surface_load import load_surface
+from .surfaces import Surface
 from .triangles import Triangles
 
 
@@ -215,6 +217,32 @@ class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
         if area == 0:
             raise InputError(f"facet_tag {facet_tag!r} has no filled cell behind it to carry the traction")
         return area
+
+    def load_surface(
+        self, surface: Surface, *, pressure: float | None = None, traction: ArrayLike | None = None
+    ) -> float:
+        """Load the particles beside a surface that does not follow the mesh: ground, a cavity, a footing's lower side.
+
+        Each part of the surface gives its load to the particle nearest to it, on the side where the soil is; parts without any
+        within the particle's side V^(1/D) are not loaded. The forces move with the particles, keep their direction, and add to
+        those that are there. The sum of forces is that of the surface to round-off; they act half a particle inside of it.
+
+        Args:
+            surface: as for `add_contact`; it bounds the soil where it is to be loaded, and its shape is taken once. Let one
+                that is larger than the soil end with it: a part of up to half a particle beyond the soil counts.
+            pressure: [Pa], towards the soil.
+            traction: force per area [Pa], shape (D,); instead of a pressure.
+
+        Returns:
+            Area of the loaded parts [m^(D-1)] over all ranks; per radian in axial symmetry.
+
+        Raises:
+            InputError: an argument out of its range, a surface without soil beside it. On all ranks alike.
+
+        Example:
+            >>> model.load_surface(mpm.Disc((0.0, -5.0), 1.0), pressure=50e3)  # in a tunnel
+        """
+        return load_surface(self, surface, pressure, traction)
 
     def add_field(self, name: str, *, unit: str, meaning: str, components: int = 1, initial: float = 0.0) -> None:
         """Declare a field of the particles of your own, which from now on is an attribute of ``particles``.

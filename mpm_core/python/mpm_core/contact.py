@@ -1,4 +1,4 @@
-"""Rigid surfaces that touch the particles of a model, with friction and adhesion; explicit scheme."""
+"""Rigid surfaces that touch the particles of a model, or are tied to them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._core import InputError
+from ._core import Geometry, InputError
 from .checks import positive, within
 from .collective import collectively
 from .collisions import add_collision
 from .mesh import floats
-from .outlines import Outline, outline
+from .outlines import Outline, mesh_box, outline
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
-from .surfaces import KINDS, Surface
+from .surfaces import KINDS, Surface, distances
 from .triangles import Triangles
 
 if TYPE_CHECKING:
@@ -123,10 +123,8 @@ class RigidContact:
             Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D).
         """
         if self._outline is None:
-            mesh, entry = self.model.mesh, self.model._contacts[self._number]
-            corners = np.array([mesh.points.min(axis=0, initial=np.inf), -mesh.points.max(axis=0, initial=-np.inf)])
-            self.model.comm.Allreduce(MPI.IN_PLACE, corners, MPI.MIN)
-            self._outline = outline(surface_of(self.model, entry["surface"]), corners[0], -corners[1])
+            entry = self.model._contacts[self._number]
+            self._outline = outline(surface_of(self.model, entry["surface"]), *mesh_box(self.model))
         points, cells = self._outline
         return self._centre + (points - self._start) @ self.rotation.T, cells
 
@@ -185,7 +183,7 @@ class RigidContact:
 
     @property
     def stored_energy(self) -> float:
-        """Elastic energy of the penalty springs at the start of the last step [J]."""
+        """Elastic energy of the penalty springs at the start of the last explicit step, or at the end of an implicit one [J]."""
         return float(self._state()["energy"])
 
     def values(self) -> dict[str, float]:
@@ -228,9 +226,13 @@ def checked(surface: Surface, dim: int) -> Any:
     return surface._checked(dim)
 
 
+ROUND_OFF = 1e-12
+"""Overlap of soil and a surface that counts as touching, over the largest coordinate of the mesh"""
+
+
 def add_contact(
     model: Model, surface: Surface, friction: float, adhesion: float, penalty: float, centre: ArrayLike | None,
-    velocity: Velocity, spin: Velocity, body: FreeBody | Servo | None,
+    velocity: Velocity, spin: Velocity, body: FreeBody | Servo | None, bonded: bool,
 ) -> RigidContact:  # fmt: skip
     """See `Model.add_contact`."""
 
@@ -241,9 +243,13 @@ def add_contact(
         positive("adhesion", adhesion, "Pa", zero=True)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
+        if bonded and (friction or adhesion):
+            raise InputError(
+                f"friction is {friction} and adhesion {adhesion} Pa, expected 0 where bonded is True: nothing slides"
+            )
         return {
             "surface": described(surface), "friction": float(friction), "adhesion": float(adhesion),
-            "penalty": float(penalty),
+            "penalty": float(penalty), "bonded": bool(bonded),
             "body": describe(surface, about, velocity, spin, body, geometry=model.geometry, time=model.time),
         }  # fmt: skip
 
@@ -251,15 +257,47 @@ def add_contact(
     gap = smallest_gap(model, surface)
     if gap == np.inf:
         raise InputError("the model has no particles, seed some before surfaces are added")
-    if gap < 0:
+    if not bonded and gap < -ROUND_OFF * np.abs(mesh_box(model)).max():
         raise InputError(
             f"surface {surface!r} overlaps the soil by {-gap:.6g} m, expected it outside of all particles, which have the radius "
             "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
         )
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
+    tied = bonds_of(model, surface) if bonded else None
     set_contacts(model, [*model._contacts, new])
+    if tied is not None:
+        model.particles.set(bond_name(len(model._contacts) - 1), tied)
     return RigidContact(model, len(model._contacts) - 1)
+
+
+BOND_REACH = 1.5
+"""Distance from a surface up to which particles are tied to it, over their radius: the layer beside it"""
+
+
+def bond_name(number: int) -> str:
+    """The particles' field that says which of them are tied to a surface."""
+    return f"contact_bond_{number}"
+
+
+def bonds_of(model: Model, surface: Surface) -> NDArray[np.float64]:
+    """What ties the layer of particles beside a surface to it: 1 for them, 0 for others, and their places; shape (n, 1 + D).
+
+    Raises:
+        InputError: there are none on any rank, or soil is inside.
+    """
+    particles, dim = model.particles, model.mesh.dim
+    size = particles.volume / (particles.position[:, 0] if model.geometry == Geometry.AXISYMMETRIC else 1)
+    apart, radius = distances(surface, particles.position), 0.5 * size ** (1 / dim)
+    depth = model.comm.allreduce(float(-apart.min(initial=0.0)), MPI.MAX)
+    if depth > 0:
+        raise InputError(f"surface {surface!r} has soil as deep as {depth:.6g} m inside, expected it outside")
+    near = apart < BOND_REACH * radius
+    if not model.comm.allreduce(int(near.sum())):
+        raise InputError(
+            f"no particle is beside surface {surface!r}, expected some within {BOND_REACH} of their radii V^(1/D)/2"
+        )
+    return np.column_stack([near, particles.position])
 
 
 def described(surface: Surface) -> dict[str, Any]:
@@ -271,7 +309,7 @@ def described(surface: Surface) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    return value if isinstance(value, bool) else np.asarray(value, dtype=float).tolist()
+    return value if isinstance(value, bool) or value is None else np.asarray(value, dtype=float).tolist()
 
 
 def require_surfaces(model: Model, surfaces: list[dict[str, Any]]) -> None:
@@ -297,11 +335,19 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     dim, known = model.mesh.dim, len(model._contacts)
     for number, entry in list(enumerate(entries))[known:]:
         surface, _ = surface_of(model, entry["surface"])._checked(dim)
+        bonded = entry.get("bonded", False)  # files of before there were any lack it
         slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
-        if slip and slip not in {field["name"] for field in model.particles.schedule()}:
+        bond = bond_name(number) if bonded else ""
+        known_fields = {field["name"] for field in model.particles.schedule()}
+        if slip and slip not in known_fields:
             model.add_field(slip, unit="m", meaning=f"Elastic slip on rigid surface {number}", components=dim)
+        if bond and bond not in known_fields:
+            meaning = f"1 where the particle is tied to rigid surface {number}, and the place where it was tied"
+            model.add_field(bond, unit="m", meaning=meaning, components=dim + 1)
         body = rigid_body(entry["body"])
-        _core.add_contact(model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip)
+        _core.add_contact(
+            model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip, bond
+        )
     model._contacts = entries
 
 
@@ -309,6 +355,14 @@ def refuse_contacts(model: Model, scheme: str) -> None:
     """Raises InputError where a scheme would leave rigid surfaces out."""
     if model._contacts:
         kinds = ", ".join(entry["surface"]["kind"] for entry in model._contacts)
-        raise InputError(
-            f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not support; use explicit()"
-        )
+        raise InputError(f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not support")
+
+
+def refuse_driven_bodies(model: Model, scheme: str) -> None:
+    """Raises InputError where a scheme would leave out the forces that move a rigid body."""
+    for entry in model._contacts:
+        if any(entry["body"]["drive"]) or entry["body"]["rotates"]:
+            raise InputError(
+                f"the model has a {entry['surface']['kind']} that is a FreeBody or a Servo, expected a prescribed motion, "
+                f"velocity= and spin=, in {scheme}"
+            )

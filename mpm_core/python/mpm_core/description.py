@@ -93,7 +93,8 @@ def _is_surface(value: Any) -> bool:
 def _is_contact(value: Any) -> bool:
     return (
         isinstance(value, dict)
-        and set(value) == {"surface", "friction", "adhesion", "penalty", "body"}
+        and set(value) | {"bonded"} == {"surface", "friction", "adhesion", "penalty", "bonded", "body"}
+        and isinstance(value.get("bonded", False), bool)
         and _is_surface(value["surface"])
         and all(_is_number(value[key]) for key in ("friction", "adhesion", "penalty"))
         and _is_body(value["body"])

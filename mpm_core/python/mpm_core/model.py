@@ -12,7 +12,7 @@ from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import positive
 from .collective import collectively
-from .contact import RigidContact, add_contact, refuse_contacts, smallest_gap
+from .contact import RigidContact, add_contact, refuse_contacts, refuse_driven_bodies, smallest_gap
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
@@ -121,15 +121,18 @@ class Model(Body):
         body: FreeBody | Servo | None = None,
         centre: ArrayLike | None = None,
         penalty: float = 0.2,
+        bonded: bool = False,
     ) -> RigidContact:
-        """Add contact of the particles with a rigid surface, which does not depend on the mesh; explicit scheme only.
+        """Add contact of the particles with a rigid surface, which does not depend on the mesh.
 
         The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without tension, and resists
-        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or moves as a rigid
-        body under the forces on it.
+        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or, in explicit
+        steps, moves as a rigid body under the forces on it. With ``bonded`` the soil beside it is tied to it instead: a
+        prescribed displacement on a boundary that cuts cells.
 
         Args:
-            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Polyline` or `Triangles` at its present position, outside all particles.
+            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Cylinder`, `Cone`, `Wedge`, `Polyline` or `Triangles` at its present
+                position, outside all particles.
             friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
             adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
                 it acts only where the soil touches the surface, and does not resist tension.
@@ -139,10 +142,12 @@ class Model(Body):
                 (times [s], spins (n,) or (n, 3)). Of a body that rotates freely, its initial spin.
             body: a `FreeBody`, which forces move, or a `Servo`, which keeps a load; by default all motion is prescribed.
             centre: centre of mass of a free body; the point about which the surface rotates and moments count [m], shape
-                (D,). By default the centre of a Disc, Sphere or Box, the middle of the extent of Triangles, and the first
-                point of the other surfaces.
+                (D,). By default the centre of a Disc, Sphere, Box, Cylinder, Cone or Wedge, the middle of the extent of
+                Triangles, and the first point of the other surfaces.
             penalty: stiffness beta of the contact in (0, 1], relative to the largest one that the time step allows; with a
-                larger one particles penetrate less.
+                larger one particles penetrate less. In implicit steps its stiffness is 50 beta times that of
+                the particles, ten times with 0.2.
+            bonded: tie the particles that are now within 1.5 of their radii of the surface to it, in tension too.
 
         Returns:
             Motion of the surface and forces on it, which follow the model.
@@ -156,7 +161,7 @@ class Model(Body):
             >>> *_, report = model.explicit(until=1.0)
             >>> ground.force
         """
-        return add_contact(self, surface, friction, adhesion, penalty, centre, velocity, spin, body)
+        return add_contact(self, surface, friction, adhesion, penalty, centre, velocity, spin, body, bonded)
 
     def gap(self, surface: Surface) -> float:
         """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap."""
@@ -386,7 +391,13 @@ class Model(Body):
             RunError: a step of dt / 1024 did not converge, or a particle left the mesh; with the reason. The
                 particles have the state after the last step that converged.
         """
-        refuse_contacts(self, "the implicit scheme")
+        refuse_driven_bodies(self, "the implicit scheme")
+        if small_displacements:
+            refuse_contacts(self, "the implicit scheme with small_displacements")
+        if self._core.water is not None:
+            refuse_contacts(self, "the implicit scheme with pore water")
+        if isinstance(solver, Relaxation):
+            refuse_contacts(self, "relaxation")
         refuse_drying(self, "the implicit scheme")
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()

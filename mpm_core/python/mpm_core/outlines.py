@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from .mesh import floats
-from .surfaces import Box, Disc, Plane, Polyline, Sphere, Surface
+from .surfaces import Box, Cone, Cylinder, Disc, Plane, Polyline, Sphere, Surface, Wedge
 from .triangles import Triangles
+
+if TYPE_CHECKING:
+    from .body import Body
 
 Outline = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D)."""
@@ -17,6 +22,14 @@ SEGMENTS = 96
 """Of a disc."""
 SPHERE_CELLS = 10
 """Squares, each of two triangles, along a quarter of a great circle."""
+
+
+def mesh_box(model: Body) -> NDArray[np.float64]:
+    """Lower and upper corner of the box around a model's mesh [m], shape (2, D). Collective."""
+    points = model.mesh.points
+    corners = np.array([points.min(axis=0, initial=np.inf), -points.max(axis=0, initial=-np.inf)])
+    model.comm.Allreduce(MPI.IN_PLACE, corners, MPI.MIN)
+    return np.array([corners[0], -corners[1]])
 
 
 def outline(surface: Surface, lower: ArrayLike, upper: ArrayLike) -> Outline:
@@ -47,6 +60,17 @@ def outline(surface: Surface, lower: ArrayLike, upper: ArrayLike) -> Outline:
         return _box(np.asarray(surface.lower, dtype=float), np.asarray(surface.upper, dtype=float))
     if isinstance(surface, Polyline):
         return _line(np.asarray(surface.points, dtype=float), surface.closed, low, high)
+    if isinstance(surface, Wedge):
+        corners = surface.corners(dim)
+        return (corners, _loop(3)[:, ::-1]) if dim == 2 else (corners, surface.triangles().triangles)
+    if isinstance(surface, Cylinder):
+        return _revolved(
+            np.asarray(surface.start, dtype=float), np.asarray(surface.end, dtype=float), 1.0, surface.radius
+        )
+    if isinstance(surface, Cone):
+        return _revolved(
+            np.asarray(surface.tip, dtype=float), np.asarray(surface.base, dtype=float), 0.0, surface.radius
+        )
     return _ball(surface)
 
 
@@ -72,6 +96,23 @@ def _ball(ball: Disc | Sphere) -> Outline:
     unit /= np.linalg.norm(unit, axis=1)[:, None]
     cells = np.concatenate([square + k * len(u) for k in range(len(sides))])
     return np.asarray(ball.centre) + ball.radius * unit, _outward(unit, cells, unit)
+
+
+def _revolved(start: NDArray[np.float64], end: NDArray[np.float64], first: float, radius: float) -> Outline:
+    """A cylinder, or a cone whose first end has the radius 0."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    u /= np.linalg.norm(u)
+    angle = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    circle = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.cross(axis, u)
+    points = np.concatenate([[start, end], start + first * radius * circle, end + radius * circle])
+    low = 2 + np.arange(SEGMENTS)
+    low_next, high = 2 + (low - 1) % SEGMENTS, low + SEGMENTS
+    high_next = low_next + SEGMENTS
+    fans = [(np.ones_like(low), high, high_next), (low, high_next, high)]
+    if first > 0:
+        fans += [(np.zeros_like(low), low_next, low), (low, low_next, high_next)]
+    return points, np.concatenate([np.stack(fan, axis=1) for fan in fans]).astype(np.int32)
 
 
 def _outward(points: NDArray[np.float64], cells: NDArray, directions: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -147,8 +147,120 @@ def _crossing(starts: NDArray, ends: NDArray) -> tuple[int, int] | None:
     return None
 
 
-Surface: TypeAlias = Plane | Disc | Sphere | Box | Polyline | Triangles
-KINDS: dict[str, type] = {kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Polyline, Triangles)}
+@dataclass(frozen=True)
+class Cylinder:
+    """A rigid cylinder in three dimensions, with flat ends and sharp edges: a pile, a shaft, a roller.
+
+    Args:
+        start, end: centres of its two ends [m], shape (3,).
+        radius: [m].
+    """
+
+    start: ArrayLike
+    end: ArrayLike
+    radius: float
+
+    def _checked(self, dim: int) -> Any:
+        radius = positive("radius", self.radius, "m")
+        start, axis, length = _axis("Cylinder", "start", self.start, "end", self.end, dim)
+        section = [(-radius, 0.0), (-radius, length), (radius, length), (radius, 0.0)]
+        return _core.Revolved3(start.tolist(), axis.tolist(), section), start + 0.5 * length * axis
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A rigid cone in three dimensions with a flat base: the tip of a pile or of a penetrometer.
+
+    Args:
+        tip: [m], shape (3,).
+        base: centre of its base [m], shape (3,).
+        radius: of its base [m].
+    """
+
+    tip: ArrayLike
+    base: ArrayLike
+    radius: float
+
+    def _checked(self, dim: int) -> Any:
+        radius = positive("radius", self.radius, "m")
+        tip, axis, length = _axis("Cone", "tip", self.tip, "base", self.base, dim)
+        section = [(0.0, 0.0), (-radius, length), (radius, length)]
+        return _core.Revolved3(tip.tolist(), axis.tolist(), section), tip + 0.75 * length * axis
+
+
+def _axis(
+    kind: str, first: str, start: ArrayLike, second: str, end: ArrayLike, dim: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """A point on an axis, its direction, and the distance to the other point."""
+    if dim != 3:
+        raise InputError(f"surface is a {kind}, expected a Plane, Disc, Box, Polyline or Wedge in two dimensions")
+    a, b = floats(first, start, (3,)), floats(second, end, (3,))
+    length = float(np.linalg.norm(b - a))
+    if length == 0:
+        raise InputError(f"{second} is {b.tolist()} m, expected another point than {first}")
+    return a, (b - a) / length, length
+
+
+@dataclass(frozen=True)
+class Wedge:
+    """A rigid wedge: a triangle in two dimensions, a prism over it in three.
+
+    Args:
+        tip: its sharp corner, or the middle of its sharp edge [m], shape (D,).
+        base: middle of the side opposite to it [m], shape (D,).
+        half_width: half the width of that side [m].
+        half_edge: in three dimensions, from the middle of the sharp edge to its end, at right angles to ``base - tip`` [m].
+    """
+
+    tip: ArrayLike
+    base: ArrayLike
+    half_width: float
+    half_edge: ArrayLike | None = None
+
+    def corners(self, dim: int) -> NDArray[np.float64]:
+        """The three corners, clockwise; in three dimensions those at either end, shape (3, 2) or (6, 3) [m].
+
+        Raises:
+            InputError: points that make no wedge.
+        """
+        tip, base = floats("tip", self.tip, (dim,)), floats("base", self.base, (dim,))
+        height, width = base - tip, positive("half_width", self.half_width, "m")
+        length = float(np.linalg.norm(height))
+        if length == 0:
+            raise InputError(f"base is {base.tolist()} m, expected another point than tip")
+        if dim == 2:
+            if self.half_edge is not None:
+                raise InputError(f"half_edge is {self.half_edge!r}, expected None in two dimensions")
+            side = width / length * np.array([-height[1], height[0]])
+            return np.array([tip, base + side, base - side])
+        if self.half_edge is None:
+            raise InputError("half_edge is None, expected the direction and half the length of the sharp edge")
+        edge = floats("half_edge", self.half_edge, (3,))
+        reach = float(np.linalg.norm(edge))
+        if reach == 0 or abs(float(edge @ height)) > 1e-9 * reach * length:
+            raise InputError(f"half_edge is {edge.tolist()} m, expected a vector at right angles to base - tip")
+        side = width / (length * reach) * np.cross(height, edge)
+        section = np.array([tip, base + side, base - side])
+        return np.concatenate([section - edge, section + edge])
+
+    def _checked(self, dim: int) -> Any:
+        corners = self.corners(dim)
+        centre = corners.mean(axis=0)
+        if dim == 2:
+            return _core.Polyline2(corners.tolist(), True), centre
+        return self.triangles()._checked(3)[0], centre
+
+    def triangles(self) -> Triangles:
+        """The sides of the prism, in three dimensions."""
+        return Triangles(self.corners(3), _PRISM)
+
+
+_PRISM = np.array([(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)])
+
+Surface: TypeAlias = Plane | Disc | Sphere | Box | Cylinder | Cone | Wedge | Polyline | Triangles
+KINDS: dict[str, type] = {
+    kind.__name__: kind for kind in (Plane, Disc, Sphere, Box, Cylinder, Cone, Wedge, Polyline, Triangles)
+}
 
 
 def distances(surface: Surface, points: ArrayLike) -> NDArray[np.float64]:

@@ -1,0 +1,216 @@
+#include "contact/end_of_step.h"
+
+#include "contact/clearance.h"
+#include "contact/touch.h"
+
+#include <cmath>
+
+namespace mpm::contact
+{
+namespace
+{
+constexpr double relative_stiffness = 50;  ///< of a spring with beta = 1 to its particle
+constexpr double smoothing = 1e-5;         ///< of the onset of contact, over the radius of a particle
+constexpr double farthest = 30;            ///< gap, over that length, beyond which there is no force any more
+constexpr double difference_length = 1e-6; ///< for derivatives of the normal, over the radius of a particle
+
+template <int D>
+Matrix<D> outer(const Vector<D>& a, const Vector<D>& b)
+{
+  Matrix<D> m;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      m[i][j] = a[i] * b[j];
+  return m;
+}
+
+/// a A + b B
+template <int D>
+Matrix<D> combined(double a, const Matrix<D>& first, double b, const Matrix<D>& second)
+{
+  Matrix<D> m;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      m[i][j] = a * first[i][j] + b * second[i][j];
+  return m;
+}
+
+template <int D>
+Matrix<D> identity()
+{
+  Matrix<D> m{};
+  for (int i = 0; i < D; ++i)
+    m[i][i] = 1;
+  return m;
+}
+
+/// Distance of a place from the body, and its normal, where the body is.
+template <int D>
+Distance<D> distance_at(const Contact<D>& contact, const RigidBody<D>& body, const Vector<D>& x)
+{
+  auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
+  return {apart, rotated<D>(body.rotation, normal)};
+}
+
+/// Derivative of the normal by the place: symmetric.
+template <int D>
+Matrix<D> curvature(const Contact<D>& contact, const RigidBody<D>& body, const Vector<D>& x, double length)
+{
+  Matrix<D> by{};
+  for (int j = 0; j < D; ++j)
+  {
+    Vector<D> ahead = x, behind = x;
+    ahead[j] += length;
+    behind[j] -= length;
+    const Vector<D> a = distance_at<D>(contact, body, ahead).normal, b = distance_at<D>(contact, body, behind).normal;
+    for (int i = 0; i < D; ++i)
+      by[i][j] = (a[i] - b[i]) / (ahead[j] - behind[j]);
+  }
+  return by;
+}
+
+/// The particle's motion relative to the point of the body that it ends at, and its derivative by its displacement but
+/// for that of this point, the rotation less the identity.
+template <int D>
+struct Relative
+{
+  Vector<D> motion;
+  Matrix<D> turn;
+};
+
+template <int D>
+Relative<D> relative_motion(const RigidBody<D>& start, const RigidBody<D>& end, const Vector<D>& u,
+                            const Vector<D>& arm)
+{
+  Relative<D> relative{};
+  for (std::size_t i = 0; i < D; ++i)
+    for (std::size_t j = 0; j < D; ++j)
+    {
+      for (std::size_t k = 0; k < D; ++k)
+        relative.turn[i][j] -= start.rotation[i][k] * end.rotation[j][k];
+      relative.turn[i][j] += i == j ? 1 : 0;
+    }
+  const Vector<D> turned = product<D>(relative.turn, arm);
+  for (int i = 0; i < D; ++i)
+    relative.motion[i] = u[i] - turned[i] - (end.displacement[i] - start.displacement[i]);
+  return relative;
+}
+
+/// d (P a) / du with a = s_0 + w.
+template <int D>
+Matrix<D> trial_slip_derivative(const Vector<D>& normal, const Vector<D>& a, const Matrix<D>& turn, double apart,
+                                const Matrix<D>& h)
+{
+  const Matrix<D> projection = combined<D>(1, identity<D>(), -1, outer<D>(normal, normal));
+  const Matrix<D> arm = combined<D>(1, projection, -apart, h);
+  const Matrix<D> motion = combined<D>(1, identity<D>(), -1, product<D>(turn, arm));
+  const Matrix<D> moved = product<D>(projection, motion);
+  const Matrix<D> tilted = combined<D>(dot<D>(normal, a), h, 1, outer<D>(normal, product<D>(h, a))); // H is symmetric
+  return combined<D>(1, moved, -1, tilted);
+}
+} // namespace
+
+template <int D>
+RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest)
+{
+  RigidBody<D> body = contact.body;
+  body.velocity = {};
+  body.spin = {};
+  if (!at_rest)
+    prescribe_motion(step, contact.of_ranks, body);
+  move_body(step.dt, body);
+  return body;
+}
+
+template <class G>
+Spring spring_of(const Particles<G::dim>& particles, Index p, double modulus, double penalty)
+{
+  const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius);
+  return {radius, area, relative_stiffness * penalty * modulus * area / (2 * radius)};
+}
+
+template <int D>
+bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
+                    const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch)
+{
+  Vector<D> place;
+  for (int i = 0; i < D; ++i)
+    place[i] = x[i] + u[i];
+  const auto [apart, normal] = distance_at<D>(contact, end, place);
+  touch.normal = normal;
+  const double onset = smoothing * spring.radius, overlap = (spring.radius - apart) / onset;
+  if (overlap < -farthest)
+    return false;
+  touch.depth = onset * (std::max(overlap, 0.0) + std::log1p(std::exp(-std::abs(overlap))));
+  for (int i = 0; i < D; ++i)
+    touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
+  const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
+  const bool rough = !contact.slip.empty();
+  const double longest = contact.friction * touch.depth + contact.adhesion * spring.area / spring.stiffness;
+  touch.slip = rough ? old : Vector<D>{};
+  if (rough)
+    touch.sticks = update_slip<D>(normal, relative.motion, longest, touch.slip);
+  for (int i = 0; i < D; ++i)
+    touch.force[i] = spring.stiffness * (touch.depth * normal[i] - touch.slip[i]);
+  if (!tangent)
+    return true;
+
+  const Matrix<D> h = curvature<D>(contact, end, place, difference_length * spring.radius);
+  const double rises = 1 / (1 + std::exp(-overlap)); // d depth / d overlap
+  Matrix<D> by = combined<D>(rises, outer<D>(normal, normal), -touch.depth, h);
+  if (rough)
+  {
+    Vector<D> a;
+    for (int i = 0; i < D; ++i)
+      a[i] = old[i] + relative.motion[i];
+    Matrix<D> slip = trial_slip_derivative<D>(normal, a, relative.turn, apart, h);
+    if (!touch.sticks) // s = longest t, t the direction of the trial
+    {
+      const Vector<D> trial = tangential<D>(a, normal);
+      const double length = norm<D>(trial);
+      Vector<D> t;
+      for (int i = 0; i < D; ++i)
+        t[i] = trial[i] / length;
+      const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
+      slip = combined<D>(longest / length, product<D>(across, slip), -contact.friction * rises, outer<D>(t, normal));
+    }
+    by = combined<D>(1, by, 1, slip);
+  }
+  touch.stiffness = combined<D>(spring.stiffness, by, 0, by);
+  return true;
+}
+
+template <int D>
+EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
+                        const Vector<D>& u, const Vector<D>& anchor)
+{
+  const Vector<D> there = as_it_is<D>(end, anchor);
+  EndTouch<D> touch;
+  Vector<D> place;
+  for (int i = 0; i < D; ++i)
+    place[i] = x[i] + u[i];
+  touch.normal = distance_at<D>(contact, end, place).normal;
+  for (int i = 0; i < D; ++i)
+  {
+    touch.arm[i] = place[i] - end.displacement[i] - end.centre[i];
+    touch.slip[i] = place[i] - there[i];
+    touch.force[i] = -spring.stiffness * touch.slip[i];
+  }
+  touch.stiffness = combined<D>(spring.stiffness, identity<D>(), 0, identity<D>());
+  return touch;
+}
+
+#define INSTANTIATE(D)                                                                                                 \
+  template EndTouch<D> tied_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,         \
+                                      const Vector<D>&, const Vector<D>&);                                             \
+  template RigidBody<D> body_at_end(const Contact<D>&, const TimeStep&, bool);                                         \
+  template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,             \
+                                  const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
+INSTANTIATE(2)
+INSTANTIATE(3)
+#undef INSTANTIATE
+#define INSTANTIATE(G) template Spring spring_of<G>(const Particles<G::dim>&, Index, double, double);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::contact

@@ -1,0 +1,110 @@
+#pragma once
+/// @file
+/// What both schemes ask of a particle at a rigid surface: its size, its slip, and what the surface feels of it.
+
+#include "contact/contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm::contact
+{
+/// The cube, or square, as large as a particle [m^D].
+template <class G>
+double particle_cube(const Particles<G::dim>& particles, Index p)
+{
+  return particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
+}
+
+/// Area of surface that a particle covers [m2]; per metre or per radian in two dimensions.
+template <class G>
+double particle_area(const Particles<G::dim>& particles, Index p, double radius)
+{
+  if constexpr (G::dim == 3)
+    return 4 * radius * radius;
+  else
+    return 2 * radius * (G::has_hoop ? particles.position[0][p] : 1);
+}
+
+/// Whether a cube with this side is smaller: compared by volumes, since roots take their time.
+template <int D>
+bool fits(double side, double volume)
+{
+  return side <= 0 || (D == 3 ? side * side * side : side * side) < volume;
+}
+
+/// Whether any particle of a run can be near: not if the largest would not be where the cell, and the step, bring it
+/// nearest. Most cells that a surface may reach before their bounds are found again are not at it now.
+/// @param gap  smallest possible distance of the cell from the surface at the end of the step, if its nodes rest [m]
+template <class G, int D = G::dim>
+bool may_be_near(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double gap,
+                 const Particles<D>& particles)
+{
+  double fastest = 0, largest = 0;
+  for (Index node : mesh.cells[run.cell])
+    fastest =
+        std::max(fastest, dot<D>(velocity[static_cast<std::size_t>(node)], velocity[static_cast<std::size_t>(node)]));
+  for (Index p = run.first; p < run.last; ++p)
+    largest = std::max(largest, particle_cube<G>(particles, p));
+  return fits<D>(gap - dt * std::sqrt(fastest), largest);
+}
+
+/// The part of a vector along a surface.
+template <int D>
+Vector<D> tangential(Vector<D> v, const Vector<D>& normal)
+{
+  const double along = dot<D>(v, normal);
+  for (int i = 0; i < D; ++i)
+    v[i] -= along * normal[i];
+  return v;
+}
+
+/// Friction: adds a displacement along the surface to the elastic slip and returns it to the cone.
+/// @param longest  slip at which the spring's force is the shear strength
+/// @returns whether the particle sticks
+template <int D>
+bool update_slip(const Vector<D>& normal, const Vector<D>& increment, double longest, Vector<D>& slip)
+{
+  for (int i = 0; i < D; ++i)
+    slip[i] += increment[i];
+  slip = tangential<D>(slip, normal);
+  const double length = norm<D>(slip), scale = length > longest ? longest / length : 1;
+  for (double& component : slip)
+    component *= scale;
+  return scale == 1;
+}
+
+/// The particles' field with a name; null for an empty one.
+template <int D>
+std::vector<Column>* columns_of(Particles<D>& particles, const std::string& name)
+{
+  for (AddedField& field : particles.added)
+    if (!name.empty() && field.name == name)
+      return &field.columns;
+  return nullptr;
+}
+
+/// Whether a particle is tied to a surface.
+inline bool is_tied(const std::vector<Column>& bonds, Index p) { return bonds[0][p] > 0; }
+
+/// The point of the body that a particle is tied to, where it was at the start [m].
+template <int D>
+Vector<D> anchor_of(const std::vector<Column>& bonds, Index p)
+{
+  Vector<D> anchor;
+  for (std::size_t i = 0; i < D; ++i)
+    anchor[i] = bonds[i + 1][p];
+  return anchor;
+}
+
+/// Adds a force on a particle to what the surface feels.
+template <int D>
+void react(const Vector<D>& force, const Vector<D>& arm, Reaction<D>& reaction)
+{
+  const Vector<3> moment = cross(in_space<D>(arm), in_space<D>(force));
+  for (int i = 0; i < D; ++i)
+    reaction.force[i] -= force[i];
+  for (std::size_t i = 0; i < 3; ++i)
+    reaction.moment[i] -= moment[i];
+}
+} // namespace mpm::contact

@@ -1,0 +1,217 @@
+#include "implicit/contact_force.h"
+
+#include "contact/clearance.h"
+#include "contact/touch.h"
+#include "transfer/affine_field.h"
+
+namespace mpm::implicit
+{
+namespace
+{
+/// Shape functions of a cell's vertices at a particle.
+template <int D>
+std::array<double, D + 1> weights_at(const CellShape<D>& shape, const Vector<D>& x)
+{
+  std::array<double, D + 1> weights;
+  for (std::size_t k = 0; k <= D; ++k)
+    weights[k] = 1.0 / (D + 1) + dot<D>(shape.gradient[k], difference<D>(x, shape.centre));
+  return weights;
+}
+
+template <int D>
+Vector<D> slip_of(const std::vector<Column>* slips, Index p)
+{
+  Vector<D> slip{};
+  for (std::size_t i = 0; slips && i < D; ++i)
+    slip[i] = (*slips)[i][p];
+  return slip;
+}
+
+/// The particles of a run that touch a surface when the nodes move with a velocity over a time.
+template <class G, int D = G::dim>
+void find_touching(const Model<G>& model, const Contact<D>& contact, const std::vector<Column>* slips, const Run& run,
+                   const std::vector<Column>* bonds, std::span<const Vector<D>> velocity, double dt, bool tangents,
+                   TrialContact<D>& trial)
+{
+  const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
+  const AffineField<D> field = affine_field<D>(model.mesh, run.cell, nodal);
+  const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
+  for (Index p = run.first; p < run.last; ++p)
+  {
+    if (bonds && !is_tied(*bonds, p))
+      continue;
+    const Vector<D> x = at<D>(model.particles.position, p);
+    const Vector<D> xi = difference<D>(x, model.mesh.shapes[run.cell].centre);
+    Vector<D> u;
+    for (int i = 0; i < D; ++i)
+      u[i] = dt * (field.value[i] + dot<D>(field.gradient[i], xi));
+    TouchingParticle<D> found{p, {}, spring_of<G>(model.particles, p, modulus, contact.penalty)};
+    bool touches = bonds;
+    if (bonds)
+      found.touch = tied_at_end<D>(contact, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
+    else
+      touches = touches_at_end<D>(contact, trial.end, found.spring, x, u, slip_of<D>(slips, p), tangents, found.touch);
+    if (touches)
+      trial.touching.push_back(found);
+  }
+}
+
+/// Adds the particles' forces, and their blocks, to the nodes of a cell.
+template <class G, int D = G::dim>
+void scatter(const Model<G>& model, Index cell, std::span<const TouchingParticle<D>> particles, bool tangents,
+             ContactStep<D>& step)
+{
+  for (const TouchingParticle<D>& at_surface : particles)
+  {
+    const auto weights = weights_at<D>(model.mesh.shapes[cell], at<D>(model.particles.position, at_surface.particle));
+    for (std::size_t k = 0; k <= D; ++k)
+      for (int i = 0; i < D; ++i)
+        step.forces[static_cast<std::size_t>(model.mesh.cells[cell][k])][i] += weights[k] * at_surface.touch.force[i];
+    if (!tangents)
+      continue;
+    if (step.block_of_cell[cell] == none)
+    {
+      step.block_of_cell[cell] = static_cast<Index>(step.blocks.size());
+      step.blocks.push_back({});
+    }
+    CellBlocks<D>& blocks = step.blocks[static_cast<std::size_t>(step.block_of_cell[cell])];
+    for (std::size_t k = 0; k <= D; ++k)
+      for (std::size_t l = 0; l <= D; ++l)
+        for (int i = 0; i < D; ++i)
+          for (int j = 0; j < D; ++j)
+            blocks[k][l][i][j] += weights[k] * weights[l] * at_surface.touch.stiffness[i][j];
+  }
+}
+
+/// Finds what touches all surfaces when the nodes move with a velocity, and the forces at nodes.
+template <class G, int D = G::dim>
+void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const TimeStep& time, bool at_rest,
+                   bool tangents, ContactStep<D>& step)
+{
+  step.surfaces.resize(model.contacts.size());
+  step.forces.assign(model.mesh.points.size(), {});
+  step.blocks.clear();
+  step.block_of_cell.assign(static_cast<std::size_t>(model.mesh.owned_cells), none);
+  for (std::size_t k = 0; k < model.contacts.size(); ++k)
+  {
+    Contact<D>& contact = model.contacts[k];
+    keep_clearance<D>(model.mesh, contact);
+    TrialContact<D>& trial = step.surfaces[k];
+    trial.end = body_at_end(contact, time, at_rest);
+    trial.touching.clear();
+    const auto* slips = columns_of(model.particles, contact.slip);
+    const auto* tied = columns_of(model.particles, contact.bond);
+    const double travelled = contact.travel + step_travel(contact, trial.end, time.dt);
+    for (const Run& run : model.order.runs)
+    {
+      const auto cell = static_cast<std::size_t>(run.cell);
+      const double gap = contact.clearance[cell] + 2 * contact.cell_reach[cell] - travelled;
+      if (!may_be_near<G, D>(model.mesh, run, velocity, time.dt, gap, model.particles))
+        continue;
+      const std::size_t before = trial.touching.size();
+      find_touching<G, D>(model, contact, slips, run, tied, velocity, time.dt, tangents, trial);
+      scatter<G, D>(model, run.cell, std::span<const TouchingParticle<D>>(trial.touching).subspan(before), tangents,
+                    step);
+    }
+  }
+}
+} // namespace
+
+template <class G>
+void try_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
+{
+  if (model.contacts.empty())
+    step.contact = {};
+  else
+    find_contacts<G, G::dim>(model, model.fields.front().velocity, {step.time, step.dt}, step.options.at_rest, tangents,
+                             step.contact);
+}
+
+template <class G, int D>
+void add_contact_forces(const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces)
+{
+  for (std::size_t i = 0; i < step.contact.forces.size(); ++i)
+    for (int a = 0; a < D; ++a)
+      forces[i].external[a] += step.contact.forces[i][a];
+}
+
+template <class G, int D>
+void add_contact_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, TangentSum<D>& tangent)
+{
+  if (step.contact.surfaces.empty())
+    return;
+  static constexpr CellBlocks<D> nothing{};
+  for (Index c : step.cells) // also those where nothing touches, so that the order of entries is always the same
+  {
+    const Index number = step.contact.block_of_cell[static_cast<std::size_t>(c)];
+    const CellBlocks<D>& blocks = number == none ? nothing : step.contact.blocks[static_cast<std::size_t>(number)];
+    for (std::size_t k = 0; k <= D; ++k)
+      for (std::size_t l = 0; l <= D; ++l)
+        tangent.add(mesh.cells[c][k], mesh.cells[c][l], blocks[k][l]);
+  }
+}
+
+template <class G>
+void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
+{
+  constexpr int D = G::dim;
+  for (std::size_t k = 0; k < model.contacts.size(); ++k)
+  {
+    Contact<D>& contact = model.contacts[k];
+    Reaction<D>& reaction = contact.reaction = {};
+    auto* slips = columns_of(model.particles, contact.slip);
+    for (std::size_t i = 0; slips && i < D; ++i)
+      std::ranges::fill((*slips)[i], 0.0);
+    for (const auto& [p, touch, spring] : step.contact.surfaces[k].touching)
+    {
+      for (std::size_t i = 0; slips && i < D; ++i)
+        (*slips)[i][p] = touch.slip[i];
+      if (contact.bond.empty() && !(touch.depth > 0))
+        continue;
+      react<D>(touch.force, touch.arm, reaction);
+      reaction.normal += dot<D>(touch.force, touch.normal);
+      reaction.area += spring.area;
+      reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? spring.area : 0;
+      reaction.mass += model.particles.mass[p];
+      reaction.energy += 0.5 * spring.stiffness * (touch.depth * touch.depth + dot<D>(touch.slip, touch.slip));
+    }
+  }
+}
+
+template <class G>
+void move_bodies(Model<G>& model, const ImplicitStep<G>& step)
+{
+  for (std::size_t k = 0; k < model.contacts.size(); ++k)
+  {
+    auto& contact = model.contacts[k];
+    contact.body = step.contact.surfaces[k].end;
+    contact.travel += step_travel(contact, contact.body, step.length);
+    for (int i = 0; i < G::dim; ++i)
+      contact.impulse[i] += step.length * contact.reaction.force[i];
+  }
+}
+
+template <class G>
+void add_contact_tractions(Model<G>& model, const ImplicitStep<G>& step)
+{
+  if (model.contacts.empty())
+    return;
+  VelocityField<G>& field = model.fields.front();
+  auto forces = step.contact.forces;
+  sum_shared(model.exchange, forces);
+  for (Index i : field.part.nodes)
+    for (int a = 0; a < G::dim; ++a)
+      field.nodes[i].traction[a] += forces[static_cast<std::size_t>(i)][a];
+}
+
+#define INSTANTIATE(G)                                                                                                 \
+  template void try_contacts(Model<G>&, bool, ImplicitStep<G>&);                                                       \
+  template void add_contact_forces(const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);                         \
+  template void add_contact_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);                 \
+  template void keep_slip(Model<G>&, const ImplicitStep<G>&);                                                          \
+  template void move_bodies(Model<G>&, const ImplicitStep<G>&);                                                        \
+  template void add_contact_tractions(Model<G>&, const ImplicitStep<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::implicit

@@ -1,0 +1,36 @@
+"""Contact in implicit steps, tied soil and loads on surfaces on several ranks: the motion and the reactions of one."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from partitions import FIELDS, all_by_id, assert_same, bands, one_does_all, scattered, spread_box
+
+import mpm_core as mpm
+
+
+def layer(comm, owners_of):
+    """A loaded block on rough ground, tied to a plate that turns, across the borders of the ranks."""
+    mesh = spread_box((16, 8), (2.0, 1.0), comm, owners_of, diagonals="alternating")
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+    grid = 0.0625 * (np.indices((16, 8)).reshape(2, -1).T + 0.5) + (0.513, 0.207)
+    model.seed_points(grid, np.full(len(grid), 0.0625**2), density=1000.0)
+    model.set_gravity((1.0, -9.0))
+    ground = model.add_contact(mpm.Plane((0.0, 0.207 - 1e-9), (0, 1)), friction=0.3)
+    plate = model.add_contact(mpm.Box((0.3, 0.3), (0.51, 0.6)), bonded=True, spin=0.02)
+    area = model.load_surface(mpm.Polyline([(1.5, 0.707), (0.5, 0.707)]), pressure=500.0)
+    return model, ground, plate, area
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_implicit_contact_is_the_same_on_any_partition(comm, owners_of):
+    runs = [layer(comm, owners_of), layer(MPI.COMM_SELF, one_does_all)]
+    assert runs[0][3] == pytest.approx(runs[1][3], rel=1e-12)
+    for model, *_ in runs:
+        list(model.implicit(0.05, dt=0.01, solver=mpm.Newton(tolerance=1e-11)))
+    assert_same(all_by_id(runs[0][0], (*FIELDS, "contact_slip_0", "contact_bond_1")),
+                all_by_id(runs[1][0], (*FIELDS, "contact_slip_0", "contact_bond_1")))  # fmt: skip
+    for one, other in zip(runs[0][1:3], runs[1][1:3], strict=True):
+        for name in ("force", "impulse", "moment"):
+            value = getattr(other, name)
+            assert getattr(one, name) == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max())
+    assert runs[0][1].impulse[1] < 0  # the ground carries the block

@@ -1,0 +1,173 @@
+"""Contact in implicit steps: tangent, Newton's method, closed forms of sliding and of compression, and tied surfaces."""
+
+import numpy as np
+import pytest
+from core_cases import box, rollers
+from implicit_cases import tangent
+from mpi4py import MPI
+
+import mpm_core as mpm
+from mpm_core import _core
+
+G = 9.81
+pytestmark = pytest.mark.filterwarnings("error:nothing holds the particles")  # a surface does
+ELASTIC = mpm.LinearElastic(young=1e6, poisson=0.3)
+
+
+def soil(dim, *, geometry=None, side=0.1, cells=None, size=(4, 3, 3), corner=0.5, law=ELASTIC):
+    """A block of particles of this side whose low corner is at (corner, ...), on a mesh that does not follow it."""
+    mesh = box(cells or [6] * dim, [1.5] * dim, shake=0.15, diagonals="alternating")
+    model = mpm.Model(mesh, law, geometry=geometry)
+    grid = corner + side * (np.indices(size[:dim]).reshape(dim, -1).T + 0.5)
+    volume = side**dim * (grid[:, 0] if geometry else np.ones(len(grid)))
+    model.seed_points(grid, volume, density=2000.0)
+    return model
+
+
+def started(model, dt, **options):
+    chosen = _core.ImplicitOptions()
+    for name, value in options.items():
+        setattr(chosen, name, value)
+    step = getattr(_core, type(model._core).__name__.replace("Model", "ImplicitStep"))(model._core)
+    step.start(chosen, dt)
+    return step
+
+
+SURFACES = {
+    "rough": (lambda dim: mpm.Plane([0.5] * dim, [0.0] * (dim - 1) + [1.0]), {"friction": 0.3, "adhesion": 300.0}),
+    "sticks": (lambda dim: mpm.Plane([0.5] * dim, [0.0] * (dim - 1) + [1.0]), {"friction": 50.0}),
+    "ball": (
+        lambda dim: (mpm.Disc if dim == 2 else mpm.Sphere)([0.7] * (dim - 1) + [0.3], 0.2),
+        {"friction": 0.4, "velocity": None},  # set below
+    ),
+    "turns": (lambda dim: mpm.Box([0.4] * dim, [1.2] * (dim - 1) + [0.5]), {"friction": 0.4, "spin": 3.0}),
+    "tied": (lambda dim: mpm.Plane([0.5] * dim, [0.0] * (dim - 1) + [1.0]), {"bonded": True, "spin": 3.0}),
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("dim, geometry", [(2, None), (3, None), (2, mpm.Geometry.AXISYMMETRIC)])
+def test_the_tangent_is_the_derivative_of_the_residual(name, dim, geometry):
+    model, dt = soil(dim, geometry=geometry), 0.02
+    surface, options = SURFACES[name][0](dim), dict(SURFACES[name][1])
+    if "spin" in options and geometry:
+        del options["spin"]
+    elif "spin" in options and dim == 3:
+        options["spin"] = (1.0, -2.0, 3.0)
+    if "velocity" in options:
+        options["velocity"] = [0.0 if geometry else 0.2] * (dim - 1) + [0.5]
+    model.add_contact(surface, **options)
+    rng = np.random.default_rng(3)
+    step = started(model, dt)
+    v = rng.normal(0.0, 0.1, step.iterate.shape).reshape(-1, dim)
+    v += [0.3] * (dim - 1) + [-0.6]  # along the surface and into it
+    v = v.ravel()
+    step.iterate = v
+    assert step.trial(tangents=True)["failed"] == 0
+    step.assemble()
+    j = tangent(step, dim)
+    for _ in range(3):
+        direction, h = rng.normal(0.0, 1.0, len(v)), 1e-7
+        forces = []
+        for side in (1, -1):
+            step.iterate = v + side * h / dt * direction
+            step.trial()
+            forces.append(step.residual)
+        difference = (forces[1] - forces[0]) / (2 * h)
+        assert np.abs(j @ direction - difference).max() < 5e-6 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("slope, friction", [(30, 0.0), (30, 0.3), (45, 0.5), (30, 0.62)])
+@pytest.mark.parametrize("turned", [0.0, 0.3])
+def test_a_block_slides_as_coulomb_says(slope, friction, turned):
+    # Backward Euler under a constant acceleration a goes a dt^2 n (n + 1) / 2 in n steps.
+    theta = np.radians(slope)
+    turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+    model = mpm.Model(box((16, 8), (4.0, 2.0), shake=0.2), mpm.LinearElastic(young=2e7, poisson=0.3))
+    grid = (np.indices((8, 4)).reshape(2, -1).T + 0.5) / 8
+    model.seed_points((0.4, 0.5) + grid @ turn.T, np.full(len(grid), 1 / 64), density=1000.0)
+    ground = model.add_contact(mpm.Plane((0.4, 0.5) - 1e-12 * turn[:, 1], turn[:, 1]), friction=friction)
+    model.set_gravity(turn @ (G * np.sin(theta), -G * np.cos(theta)))
+    dt, steps = 0.02, 30
+    *_, report = model.implicit(steps * dt, dt=dt)
+    slides = max(G * (np.sin(theta) - friction * np.cos(theta)), 0.0)
+    distance = (model.particles.displacement @ turn[:, 0]).mean()
+    assert distance == pytest.approx(slides * dt**2 * steps * (steps + 1) / 2, rel=5e-3, abs=1e-4)
+    weight = report.mass * G
+    held = min(friction * np.cos(theta), np.sin(theta))
+    expected = weight * np.array([held, -np.cos(theta)]) * report.time
+    assert turn.T @ ground.impulse == pytest.approx(expected, abs=5e-3 * weight * report.time)
+    assert (ground.sticking_fraction > 0.8) == (np.tan(theta) < friction)
+
+
+def compressed(bonded, n, shift):
+    """Force on a plate that moves by a thousandth of the layer's height, over that in closed form; particles of 0.05 / n."""
+    side, rows = 0.05 / n, 10 * n
+    model = mpm.Model(box((3 * n, 15 * n), (0.3, 1.5)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    grid = side * (np.indices((6 * n, rows)).reshape(2, -1).T + 0.5) + (0.0, 0.4 + shift)
+    model.seed_points(grid, np.full(len(grid), side**2), density=2000.0)
+    rollers(model, axes=[0])
+    move = 5e-4 if bonded else -5e-4
+    plates = [
+        model.add_contact(mpm.Plane((0, 0.4 + shift), (0, 1)), bonded=bonded),
+        model.add_contact(mpm.Plane((0, 0.9 + shift), (0, -1)), bonded=bonded, velocity=(0.0, move)),
+    ]
+    *_, report = model.implicit(1.0, dt=0.5, quasi_static=True, integration=mpm.Integration.MIXED)
+    force = 1e6 * 0.7 / (1.3 * 0.4) * move / 0.5 * 0.3  # M times the strain times the width
+    assert plates[0].force[1] + plates[1].force[1] == pytest.approx(0, abs=1e-6 * abs(force))
+    return -plates[1].force[1] / force
+
+
+@pytest.mark.parametrize("bonded", [False, True])
+def test_plates_compress_or_pull_a_layer(bonded):
+    # They act on the middles of the particles beside them: the layer is up to a particle shorter, of which there are 10 or 20.
+    errors = [compressed(bonded, n, 0.0) - 1 for n in (1, 2)]
+    assert 0 < errors[1] < 0.6 * errors[0] < 0.6 * 0.1
+    assert 0 < compressed(bonded, 2, 0.0371) - 1 < 0.05  # the layer cuts cells
+
+
+def test_newtons_method_converges_quadratically():
+    model = soil(2, law=mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0, dilation_angle=30.0))
+    model.add_contact(mpm.Disc((0.72, 0.3), 0.2 - 1e-9), friction=0.2, velocity=(0.05, 0.3))
+    model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)), friction=0.3)
+    model.set_gravity((0.0, -G))
+    step = started(model, 0.02)
+    solution = mpm.Newton(tolerance=1e-12).solver(MPI.COMM_SELF, 2).solve(step, step.dt, True)
+    assert solution.converged
+    last = [r for r in solution.residuals if r > 1e-12][-3:]  # until round-off
+    assert last[-1] < 10 * last[-2] ** 2 < 1e3 * last[-3] ** 4
+
+
+def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
+    def built():
+        model = soil(2)
+        model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)), friction=0.3)
+        model.add_contact(mpm.Disc((0.72, 0.9), 0.1), friction=0.3, velocity=(0.1, -0.2), spin=1.0)
+        model.set_gravity((2.0, -G))
+        return model
+
+    first, second = built(), built()
+    list(first.implicit(0.04, dt=0.01))
+    first.save(tmp_path / "half.h5")
+    list(first.implicit(0.08, dt=0.01))
+    second.restore(tmp_path / "half.h5")
+    list(second.implicit(0.08, dt=0.01))
+    for name in ("position", "velocity", "stress", "contact_slip_0", "contact_slip_1"):
+        assert np.array_equal(getattr(first.particles, name), getattr(second.particles, name))
+    assert first.contacts[1].values() == second.contacts[1].values()
+
+
+def test_what_the_scheme_leaves_out_is_refused():
+    model = soil(2)
+    model.add_contact(mpm.Disc((0.72, 0.3), 0.15), body=mpm.FreeBody(mass=3.0))
+    with pytest.raises(mpm.InputError, match="Disc that is a FreeBody or a Servo, expected a prescribed motion"):
+        model.implicit(1.0, dt=0.1)
+    model = soil(2)
+    model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)))
+    for options in ({"small_displacements": True, "quasi_static": True}, {"solver": mpm.Relaxation()}):
+        with pytest.raises(mpm.InputError, match=r"rigid surfaces \(Plane\)"):
+            model.implicit(1.0, dt=0.1, **options)
+    with pytest.raises(mpm.InputError, match="friction is 0.3 and adhesion 0.0 Pa, expected 0 where bonded"):
+        model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)), friction=0.3, bonded=True)
+    with pytest.raises(mpm.InputError, match="no particle is beside surface"):
+        model.add_contact(mpm.Plane((0.2, 0.2), (0, 1)), bonded=True)
