@@ -16,6 +16,7 @@ from .energy import EnergyWatch
 from .partition import keep_balance
 from .rayleigh import Rayleigh
 from .report import Report
+from .setup_warnings import FailureWatch
 from .space import SpaceWatch
 
 if TYPE_CHECKING:
@@ -99,13 +100,14 @@ def run_explicit(
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+    energy, failure = EnergyWatch(energy_limit, model.comm.rank == 0), FailureWatch(model, options.nmd)
     if model._space_watch is None:
         model._space_watch = SpaceWatch(model)
 
     def report() -> Report:
         now = model.report()
         energy.look(now)
+        failure.look(now)
         return now
 
     for until in times:

@@ -16,6 +16,7 @@ from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
+from .setup_warnings import FailureWatch
 from .solution import Solution
 from .step_control import StepControl
 
@@ -173,12 +174,13 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0)
+    energy, failure = EnergyWatch(energy_limit, model.comm.rank == 0), FailureWatch(model, options.nmd)
 
     def report() -> ImplicitReport:
         now = stepper.report()
         if not options.quasi_static:  # without inertia what a sudden load does beyond the stresses' work goes nowhere
             energy.look(now)
+            failure.look(now)
         return now
 
     for until in times:

@@ -1,4 +1,4 @@
-"""Warnings before the first step of a model, where input is probably missing or of the wrong magnitude."""
+"""Warnings of input that is probably missing, of the wrong magnitude, or not what the motion of the soil asks for."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from . import _core
 
 if TYPE_CHECKING:
     from .model import Model
+    from .report import Report
 
 UNIT_WEIGHTS = (1e3, 200e3)
 """Bounds of the unit weight of a soil [N/m3]; peat has 10 kN/m3, published slopes have up to 80"""
+
+YIELDS_ABOVE = 0.2
+"""Plastic work over the energy at work above which a body counts as one that fails"""
 
 NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
@@ -73,6 +77,35 @@ def _locks(model: Model, nmd: bool) -> str:
         f"linear cells lock in soil that keeps its volume ({', '.join(reasons)}): it is too stiff and too strong, more so the "
         "coarser the mesh; nmd=True averages volumetric strains against that (docs/locking.md)"
     )
+
+
+class FailureWatch:
+    """Warns once where frictional soil fails that locks only then: its dilation angle is below its friction angle.
+
+    Args:
+        model: the model.
+        nmd: whether its strains are averaged.
+    """
+
+    def __init__(self, model: Model, nmd: bool) -> None:
+        locks = any(_core.associated_fraction(law) < 1 for law in model.laws) and not _locks(model, nmd)
+        self._speaks = locks and not nmd and model.comm.rank == 0
+
+    def look(self, report: Report) -> None:
+        """Warn if the soil has failed.
+
+        Args:
+            report: the state of the run.
+        """
+        if self._speaks and report.plastic_work > YIELDS_ABOVE * report.energy_scale > 0:
+            self._speaks = False
+            warnings.warn(
+                "the soil fails, with a dilation angle below its friction angle: it then keeps its volume, and plain linear cells "
+                "are too strong, more so the coarser the mesh. nmd=True averages volumetric strains against that, best together "
+                "with integration=MIXED (docs/howto/switches.md)",
+                RuntimeWarning,
+                stacklevel=5,
+            )
 
 
 def _reasons_to_lock(law: Any) -> Iterator[str]:

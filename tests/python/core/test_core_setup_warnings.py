@@ -65,3 +65,19 @@ def test_laws_that_lock_are_named_unless_strains_are_averaged(law, reason):
     (one,) = said(model_of(law))
     assert reason in one and "nmd=True" in one
     assert said(model_of(law), nmd=True) == []
+
+
+@pytest.mark.parametrize("dilation_angle, nmd", [(0.0, False), (0.0, True), (30.0, False)])
+def test_soil_that_keeps_its_volume_as_it_fails_is_named_unless_strains_are_averaged(dilation_angle, nmd):
+    # A weight that is many times what the cohesion carries, on a smooth base without walls.
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=6e3, friction_angle=30.0, dilation_angle=dilation_angle)
+    model = mpm.Model(box([12, 4], lengths=(3.0, 1.0), diagonals="alternating", body=((1.0, 0.0), (2.0, 1.0))), soil)
+    model.seed(density=5000.0, per_cell=3, cell_tag=1)
+    model.roller(3, (0, 1))
+    model.set_gravity((0.0, -9.81))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        reports = list(model.explicit(0.3, every=0.1, nmd=nmd, integration=mpm.Integration.MIXED, energy_limit=None))
+    assert reports[-1].plastic_work > 0.3 * reports[-1].energy_scale
+    said = [str(each.message) for each in caught if "the soil fails" in str(each.message)]
+    assert len(said) == (dilation_angle == 0 and not nmd)
