@@ -139,7 +139,8 @@ void map_to_nodes(Model<G>& model)
     particles_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, field);
     if (model.water)
     {
-      add_pore_forces(model.mesh, model.particles, *model.water, model.order.runs, field);
+      for (const auto* runs : {&model.order.runs, &field.resting.runs})
+        add_pore_forces(model.mesh, model.particles, *model.water, *runs, field);
       add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
     }
     sum_shared(model.exchange, field.nodes);
