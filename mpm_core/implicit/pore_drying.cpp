@@ -49,6 +49,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
   for (const Run& run : runs)
   {
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const auto standing = standing_water(mesh, water, run.cell);
     const double growth = volume_strain(mesh, field, step.dt, run.cell);
     for (Index p = run.first; p < run.last; ++p)
     {
@@ -64,7 +65,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
                                     growth,
                                     particles.pore_pressure[0][p],
                                     end,
-                                    standing_pressure(water, x[D - 1])};
+                                    pressure_at<D>(standing, n)};
       add_particle<D>(particle, water.retention[static_cast<std::size_t>(run.material)], n,
                       pore.drying[static_cast<std::size_t>(run.cell)]);
     }

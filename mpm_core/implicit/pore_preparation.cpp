@@ -56,8 +56,8 @@ RuleMoments<D> shape_products(const Particles<D>& particles, Index p, const std:
 /// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
-                  double modulus, double factor, Rules<D>& rules, PoreCell<D>& cell, PoreSums<D>& sums,
-                  std::vector<NodalWater>& nodes)
+                  double modulus, double factor, const StandingWater<D>& standing, Rules<D>& rules, PoreCell<D>& cell,
+                  PoreSums<D>& sums, std::vector<NodalWater>& nodes)
 {
   const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
@@ -71,7 +71,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
     compliance += particles.porosity[0][p] *
                   wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
-  add_pore_load(mesh.shapes[run.cell], particles, water, run.material, p, volume, cell.load);
+  add_pore_load(mesh.shapes[run.cell], particles, water, standing, run.material, p, volume, cell.load);
   sums.volume += volume;
   sums.mobility += volume * mobility;
   sums.compliance += volume * compliance;
@@ -118,9 +118,10 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   {
     const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const auto standing = standing_water(mesh, *model.water, run.cell);
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, rules, step.pore.cells[run.cell],
-                      sums[static_cast<std::size_t>(run.cell)], nodes);
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, standing, rules,
+                      step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)], nodes);
   }
   for (Index c : step.cells)
   {

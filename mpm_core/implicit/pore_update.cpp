@@ -181,7 +181,7 @@ void add_flow(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Imp
     const auto& load = pore.cells[c].load; // standing water works on the surface
     totals.external_work += load.standing * volume_strain(mesh, field, step.dt, c);
     for (std::size_t k = 0; k < nodes.size(); ++k)
-      totals.external_work += step.dt * load.buoyancy[k] * field.velocity[nodes[k]][G::dim - 1];
+      totals.external_work -= step.dt * load.volume[k] * dot<G::dim>(load.gradient, field.velocity[nodes[k]]);
     const auto drive = driving_gradient(mesh, field, step, c);
     const auto weight = water_weight(mesh, field, step, c);
     totals.external_work -= flux_of(pore, c) * dot<G::dim>(drive, weight);

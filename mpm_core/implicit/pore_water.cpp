@@ -102,8 +102,7 @@ void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vect
       const Vector<D> dilation = dilation_gradient<G>(mesh.shapes[c], k);
       Vector<D>& internal = forces[mesh.cells[c][k]].internal;
       for (int a = 0; a < D; ++a)
-        internal[a] -= pressure * dilation[a];
-      internal[D - 1] -= cell.load.buoyancy[k];
+        internal[a] += cell.load.volume[k] * cell.load.gradient[a] - pressure * dilation[a];
     }
   }
 }

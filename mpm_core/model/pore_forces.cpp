@@ -13,9 +13,11 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
   for (const Run& run : runs)
   {
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const auto standing = standing_water(mesh, water, run.cell);
     PoreLoad<D> load{};
     for (Index p = run.first; p < run.last; ++p)
-      add_pore_load(mesh.shapes[run.cell], particles, water, run.material, p, factor * particles.volume[p], load);
+      add_pore_load(mesh.shapes[run.cell], particles, water, standing, run.material, p, factor * particles.volume[p],
+                    load);
     Working<G> stress{};
     for (int k : normal_component<G>)
       stress[k] = -load.pressure;
@@ -24,8 +26,7 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
       const Vector<D> force = internal_force<G>(stress, mesh.shapes[run.cell], k);
       Vector<D>& internal = field.nodes[mesh.cells[run.cell][k]].internal;
       for (int a = 0; a < D; ++a)
-        internal[a] += force[a];
-      internal[D - 1] -= load.buoyancy[k];
+        internal[a] += force[a] + load.volume[k] * load.gradient[a];
     }
   }
 }

@@ -7,39 +7,72 @@
 
 namespace mpm::model
 {
+/// Pressure p_s of the water that stands over the soil, linear in a cell as that of finite elements is.
+template <int D>
+struct StandingWater
+{
+  std::array<double, D + 1> pressure; ///< at the vertices [Pa]
+  Vector<D> gradient;                 ///< [Pa/m]
+};
+
+template <int D>
+inline StandingWater<D> standing_water(const Mesh<D>& mesh, const PoreWater& water, Index cell)
+{
+  StandingWater<D> standing{};
+  for (int k = 0; k <= D && !water.standing.empty(); ++k)
+  {
+    standing.pressure[k] = standing_pressure(water, mesh.points[mesh.cells[cell][k]][D - 1]);
+    for (int a = 0; a < D; ++a)
+      standing.gradient[a] += standing.pressure[k] * mesh.shapes[cell].gradient[k][a];
+  }
+  return standing;
+}
+
+template <int D>
+inline double pressure_at(const StandingWater<D>& standing, const std::array<double, D + 1>& shape)
+{
+  double pressure = 0;
+  for (int k = 0; k <= D; ++k)
+    pressure += standing.pressure[k] * shape[k];
+  return pressure;
+}
+
 /// What the particles of a cell say of the total stress beside their effective ones. Water that stands over the free
 /// surface presses on it by p_s, wherever the surface is: div(s - p_a I) + rho g with p_a = p_s there is the same as
-/// div(s - (p_a - p_s) I) + rho g - grad p_s with no load there, and - grad p_s is the buoyancy, gamma_w upwards.
+/// div(s - (p_a - p_s) I) + rho g - grad p_s with no load there.
 template <int D>
 struct PoreLoad
 {
-  double pressure;                    ///< sum V (S_e p - p_s) [N m]
-  double standing;                    ///< sum V p_s [N m]
-  std::array<double, D + 1> buoyancy; ///< sum V gamma_w N_k under standing water [N]
+  double pressure;                  ///< sum V (S_e p - p_s) [N m]
+  double standing;                  ///< sum V p_s [N m]
+  std::array<double, D + 1> volume; ///< sum V N_k, where water stands [m3]
+  Vector<D> gradient;               ///< of p_s [Pa/m]
 };
 
-/// Adds a particle of a law, at a pressure, to its cell's.
+/// Adds a particle of a law to its cell's.
 template <int D>
 inline void add_pore_load(const CellShape<D>& shape, const Particles<D>& particles, const PoreWater& water,
-                          Index material, Index p, double volume, PoreLoad<D>& load)
+                          const StandingWater<D>& standing, Index material, Index p, double volume, PoreLoad<D>& load)
 {
   double pressure = particles.pore_pressure[0][p];
   if (water.may_dry())
     pressure = acting_pressure(water.retention[static_cast<std::size_t>(material)], pressure);
-  if (const double above = standing_pressure(water, particles.position[D - 1][p]); above > 0)
+  if (!water.standing.empty())
   {
+    const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
+    const double above = pressure_at<D>(standing, n);
     pressure -= above;
     load.standing += volume * above;
-    const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
     for (int k = 0; k <= D; ++k)
-      load.buoyancy[k] += volume * water.unit_weight * n[k];
+      load.volume[k] += volume * n[k];
+    load.gradient = standing.gradient;
   }
   load.pressure += volume * pressure;
 }
 
 /// Adds the internal forces of pore pressures, -B^T sum V_p (S_e p - p_s), to those of the stresses of a field, and the
-/// buoyancy of standing water; this rank's part. Nothing where water has its own velocity, which `water_to_nodes` looks
-/// after.
+/// weight that standing water takes; this rank's part. Nothing where water has its own velocity, which `water_to_nodes`
+/// looks after.
 /// @pre the internal forces of the stresses have been integrated: with mixed integration the full cells are known
 template <class G, int D = G::dim>
 void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,

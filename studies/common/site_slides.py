@@ -6,6 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -88,14 +89,18 @@ class Slide:
 
 
 def slide(
-    a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt, update: Callable[[], None] = lambda: None
-) -> tuple[Slide, str | None]:
+    a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt, update: Callable[[], None] = lambda: None,
+    step: float | None = None,
+) -> tuple[Slide, str | None]:  # fmt: skip
     """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective.
 
     Args:
         a: options with time, frames, damping, pic and nmd.
         update: called after each frame, such as for loads that change with the shape of the body.
+        step: of the implicit scheme, in the place of the explicit one [s].
     """
+    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": a.nmd}
+    scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,
         ModelOutput(model, folder / "particles", folder / "mesh") as files,
@@ -104,9 +109,7 @@ def slide(
         result = Slide(model, history, files)
         result.look(model.report())
         try:
-            for report in model.explicit(
-                model.time + a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd
-            ):
+            for report in scheme(model.time + a.time, **options):
                 result.look(report)
                 update()
                 progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")

@@ -16,11 +16,14 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.transfer.particle_forces import seepage_forces
+from fenics_bridge.water import Reservoir
+from fenics_bridge.water.boundary import value_at
+from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .figures import Pictures
 from .interrupt import Interrupt
 from .movie import Movie
-from .options import add_choice, add_flag
+from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, slide, slide_pictures
 from .slope_site import SlopeSite
@@ -38,6 +41,9 @@ def add_optional_slide(parser: ArgumentParser) -> None:
     add_flag(p, "--slide", "compute the slide by particles if the slope fails")
     add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
                "begin the slide at the first factor of safety below 1, or at the lowest one")  # fmt: skip
+    add_choice(p, "--slide-water", "still", ("still", "flows"), "pore pressures of the slide stay in space as they are at failure, or "
+               "the water flows through the particles and out at their surface, by implicit steps")  # fmt: skip
+    add_number(p, "--slide-step", 0.02, "s", "longest step of the slide where its water flows", above=0)
     add_slide_options(p, damping=0.0, pic=0.01)
 
 
@@ -54,8 +60,13 @@ def slide_of(
     instant = failing[0] if a.slide_from == "failure" else lowest(failing)
     model, handover, act = handed_over(a, slope, instant)
     scene = scene_of(model, sorted(slope.site.laws))
+    step = None
+    if a.slide_water == "flows":
+        step, act = a.slide_step, lambda: None
+        let_water_flow(slope, instant, model)
+    unbalanced = model.out_of_balance()
     with Interrupt(comm) as interrupt:
-        result, stopped = slide(a, model, folder, interrupt, act)
+        result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
     if comm.rank == 0:
         print(f"slide from {instant.time / DAY:.3g} days on: largest displacement {moved:.3f} m after "
@@ -64,12 +75,28 @@ def slide_of(
             print(f"the slide ended early: {stopped}", file=sys.stderr)
     summary = {
         "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
-        "initial_out_of_balance_ratio": handover.unbalanced_ratio, "newly_yielded_fraction": handover.yielded_fraction,
+        "initial_out_of_balance_ratio": max(handover.unbalanced_ratio, unbalanced), "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
     }  # fmt: skip
     movies = [Movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)] if scene is not None else []
     code = interrupt.exit_code or (1 if stopped else 0)
     return summary, movies, slide_pictures(a, result, scene, folder), code
+
+
+def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None:
+    """Fill the pores of the particles with the water of an instant, and let what stands beside the slope stand over it. Collective.
+
+    The soil is saturated: water leaves, and may enter, at its surface without pressure.
+    """
+    model.particles.set("traction", np.zeros_like(model.particles.position))
+    soils = slope.porous
+    conductivity = {name: float(np.min(soil.conductivity)) for name, soil in soils.items()}
+    model.add_water(porosity={name: soil.porosity for name, soil in soils.items()}, conductivity=conductivity,
+                    unit_weight=WATER_WEIGHT, drained_surface=True)  # fmt: skip
+    model.set_pore_pressure(lambda points: np.maximum(instant.pore_pressure(points), 0.0))
+    levels = [value_at(c.level, instant.time) for c in slope.boundary if isinstance(c, Reservoir)]
+    if levels:
+        model.stand_water(max(levels))
 
 
 def handed_over(

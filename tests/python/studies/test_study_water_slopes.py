@@ -84,11 +84,13 @@ def test_slower_tables_take_longer(tmp_path):
 # --- the slide -------------------------------------------------------------------------------------------------------
 
 
-def test_the_slide_begins_in_equilibrium_and_gathers_speed(tmp_path):
+@pytest.mark.parametrize("water", ["still", "flows"])
+def test_the_slide_begins_in_equilibrium_and_gathers_speed(water, tmp_path):
     # Particles on the cells of the finite elements, under the same pore pressures, are in equilibrium to round-off; then the
     # slope, too weak for them, moves ever faster.
     path = site("drawdown", tmp_path, ("= 4e3", "= 2e3"), ("= 27.0", "= 20.0"))
     options = "--days 3 --slide --slide-from lowest --time 1 --frames 4 --particles-per-cell 3 --no-film"
+    options += f" --slide-water {water}"
     summary, rows = run("drawdown", path, tmp_path, options)
     assert summary["slide_from_days"] == summary["lowest_factor_time_days"] == 3.0
     assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_fraction"] == 0.0
