@@ -28,7 +28,7 @@ from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
-from fenics_bridge.water.motion import Motion, inertia, over_gravity
+from fenics_bridge.water.motion import STANDARD_GRAVITY, Motion
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.soils import PorousSoil
 
@@ -81,7 +81,8 @@ class WaterTerms:
         domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
-        self._motion, self._driving = motion, self._up + over_gravity(motion) if motion else self._up
+        self._motion = motion
+        self._driving = self._up + motion.at_end / STANDARD_GRAVITY if motion else self._up
         self._soils, (self._gamma, self._modulus) = soils, weights
         rule = {"quadrature_degree": degree}
         curved = [_may_dry(soil) for soil in soils]
@@ -105,7 +106,8 @@ class WaterTerms:
             end = self._p + self._dp
             forces = self._sum(lambda s: self._pressing(s, end) * self._volume(v) + self._missing(s, end, v))
             if self._motion is not None:
-                forces -= self._sum(lambda s: inertia(self._motion, s.density / self._unit, v))
+                acceleration = self._motion.at_end
+                forces -= self._sum(lambda s: ((s.density or 0.0) / self._unit) * ufl.inner(acceleration, v))
             water = self._sum(lambda s: q * self._stored(s), self._storing)
             pushed = (self._unit / self._gamma) * ufl.grad(end)
             water += self.dt * (self._flow(pushed + self._driving, q, end) - applied.unit * applied.inflow_form(q))

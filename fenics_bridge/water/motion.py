@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import ufl
 from dolfinx import fem
 from numpy.typing import ArrayLike, NDArray
 
@@ -33,7 +32,7 @@ class Newmark:
     gamma: float = 0.6
     """Its part in the velocity [-]"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (np.isfinite(self.gamma) and self.gamma >= 0.5):
             raise InputError(f"gamma: got {self.gamma!r}, expected 0.5 or more")
         least = 0.25 * (self.gamma + 0.5) ** 2
@@ -98,13 +97,3 @@ class Motion:
         )
         self.velocity.x.array[:] = np.broadcast_to(values, x.shape).ravel()
         self.acceleration.x.array[:] = 0.0
-
-
-def over_gravity(motion: Motion | None) -> Any:
-    """Acceleration at the end of the step over that of gravity, UFL; 0 where soil does not move fast."""
-    return 0 if motion is None else motion.at_end / STANDARD_GRAVITY
-
-
-def inertia(motion: Motion | None, density: float | None, v: Any) -> Any:
-    """Force of inertia against a test function, UFL."""
-    return 0 if motion is None else density * ufl.inner(motion.at_end, v)

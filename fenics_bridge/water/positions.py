@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import OfPosition
@@ -18,11 +19,11 @@ def at_positions(pressure: Any, outside: OfPosition | None) -> OfPosition:
         outside: function of positions for points outside the body; None for zero there.
     """
 
-    def at(points):
-        points = np.ascontiguousarray(points, dtype=float)
-        search = PointSearch(pressure.function_space.mesh, points)
+    def at(points: ArrayLike) -> NDArray[np.float64]:
+        x = np.ascontiguousarray(points, dtype=float)
+        search = PointSearch(pressure.function_space.mesh, x)
         values = search.values(pressure)[:, 0]
-        elsewhere = np.zeros(len(points)) if outside is None else np.broadcast_to(outside(points), len(points))
+        elsewhere = np.zeros(len(x)) if outside is None else np.broadcast_to(outside(x), len(x))
         return np.where(search.found, values, elsewhere)
 
     return at
