@@ -59,7 +59,7 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
     )
-    add_number(p, "--displacement", 0.01, "-", "displacement over the cell size above which it does", above=0)
+    add_number(p, "--displacement", 0.015, "-", "displacement over the cell size above which it does", above=0)
     return p
 
 
