@@ -11,18 +11,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 from typing import Any
 
 import numpy as np
+from arc_length import carried_fraction
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 
 STUDIES = Path(__file__).parents[2] / "studies"
 sys.path[:0] = [str(STUDIES), str(STUDIES / "verification")]
 
-from published_slopes import ELASTIC, UNIT_WEIGHT, drained_on_rock, safety  # noqa: E402
+from published_slopes import ELASTIC, HEIGHT, UNIT_WEIGHT, drained_on_rock, safety, slope_on_rock  # noqa: E402
 
 NEWTON = bridge.Solver(relaxation=False)
 
@@ -69,8 +72,46 @@ def elastic(tangent: np.ndarray) -> np.ndarray:
     return np.broadcast_to(stiffness, tangent.shape)
 
 
+@dataclass(frozen=True)
+class Bracket:
+    """The largest factor that a method carries, the smallest that it does not, and whether failure is shown there."""
+
+    value: float
+    failed_at: float
+    failed: bool
+
+
+def by_arc_length(fem: bridge.QuasiStatic) -> Bracket:
+    """Reduced strengths under which an arc-length method reaches the weight from zero, to 1 %. It shows no failure."""
+    carried, failed, soil, unloaded = 0.4, np.inf, fem.law, fem._body.snapshot()
+    while failed - carried > 0.01:
+        factor = min(carried + 0.2, 0.5 * (carried + failed))
+        fem._body.restore(unloaded)
+        fem.law = bridge.reduced_strength(soil, factor)
+        reached = carried_fraction(fem, bridge.Load(unit_weight=UNIT_WEIGHT)) >= 1.0
+        carried, failed = (factor, failed) if reached else (carried, factor)
+    return Bracket(carried, failed, False)
+
+
+def by_particles(cell: float) -> bridge.ParticleSafety:
+    """Dynamic relaxation: the explicit scheme with local damping on linear cells of a size [m], with averaged strains."""
+    mesh, soil, supports = slope_on_rock(cell, runout=HEIGHT)
+    background = bridge.background_mesh(*mesh)
+
+    def weakened(factor: float) -> mpm.Model:
+        model = mpm.Model(background, bridge.reduced_strength(soil, factor))
+        model.seed(density=UNIT_WEIGHT / 9.81, per_cell=3, cell_tag=bridge.SOIL)
+        bridge.apply_supports(model, supports)
+        model.set_gravity((0.0, -9.81))
+        return model
+
+    return bridge.particle_safety(weakened, start=0.8, nmd=True)
+
+
 METHODS = {
     "newton": solved_by(NEWTON),
+    "arc-length": solved_by(NEWTON),
+    "explicit": solved_by(NEWTON),
     "symmetric": with_tangent(symmetric, 100),
     "elastic": with_tangent(elastic, 500),
     "relaxation": solved_by(bridge.Solver()),
@@ -84,13 +125,18 @@ METHODS = {
 def row(method: str, cell: float) -> dict[str, Any]:
     """The factor of safety and what it took to find it."""
     fem, cpu = METHODS[method](cell), process_time()
-    if method == "davis":
-        found = bridge.factor_of_safety(
-            fem, bridge.Load(unit_weight=UNIT_WEIGHT), start=0.4, first_step=0.2, tolerance=1e-3,
-            reduce=bridge.davis_reduced_strength,
-        )  # fmt: skip
-    else:
-        found = safety(fem)
+    match method:
+        case "davis":
+            found = bridge.factor_of_safety(
+                fem, bridge.Load(unit_weight=UNIT_WEIGHT), start=0.4, first_step=0.2, tolerance=1e-3,
+                reduce=bridge.davis_reduced_strength,
+            )  # fmt: skip
+        case "arc-length":
+            found = by_arc_length(fem)
+        case "explicit":
+            found = by_particles(cell)
+        case _:
+            found = safety(fem)
     return {"method": method, "cell_size_m": cell, "factor_of_safety": found.value, "failure_shown": found.failed,
             "failed_at": found.failed_at, "systems": len(fem.linear_iterations), "cpu_seconds": process_time() - cpu}  # fmt: skip
 
