@@ -10,6 +10,7 @@
 #include "model/field_contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
+#include "model/reproducible.h"
 #include "model/resting_nodes.h"
 
 #include <algorithm>
@@ -70,7 +71,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
     clock.begin(Phase::mapping);
     find_velocity_change(field, options.pic_fraction, dt);
-    scatter_momentum<G>(mesh, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
+    scatter_momentum<G>(mesh, exchange, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
     map_resting_change<G>(field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - options.pic_fraction, field);
@@ -195,6 +196,9 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
     field.integration.kind = options.integration;
     find_averaged_laws(model.laws, options.nmd, has_two_phases(model), field.integration.averaged_by_law);
   }
+  model.exchange.reproducible = options.reproducible;
+  if (options.reproducible)
+    sum_rounded_moments(model);
   model.last.dt = dt;
   begin_contacts(model, {model.time, dt});
   take_step(model, options, dt);

@@ -23,6 +23,7 @@ struct ExplicitOptions
   double pic_fraction = 0; ///< of a step, in [0, 1]
   bool nmd = false;        ///< nodal mixed discretisation
   Integration integration = Integration::particles;
+  bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
 };
 
 /// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.

@@ -71,6 +71,26 @@ void require_integration(const Model<G>& model, const ExplicitOptions& options)
                      "velocity fields");
 }
 
+/// @throws InputError what reproducible runs do not cover
+template <class G>
+void require_reproducible(const Model<G>& model, const ExplicitOptions& options)
+{
+  const auto refuse = [](bool asked, const std::string& what)
+  {
+    if (asked)
+      throw InputError("reproducible is True with " + what + ", expected a run without");
+  };
+  refuse(options.integration == Integration::dual_domain, "integration DUAL_DOMAIN");
+  refuse(options.stress_update == StressUpdate::first, "stress_update FIRST");
+  refuse(options.stress_update == StressUpdate::last, "stress_update LAST");
+  refuse(options.rayleigh.mass > 0 || options.rayleigh.stiffness > 0, "rayleigh damping");
+  refuse(model.particles.resting.present, "resting cells");
+  refuse(!model.contacts.empty() || !model.field_contacts.empty(), "contact");
+  refuse(model.water.has_value(), "pore water");
+  for (const VelocityField<G>& field : model.fields)
+    refuse(!field.dashpots.empty() || !field.free_fields.empty(), "absorbing sides");
+}
+
 template <class G>
 double next_step(const Model<G>& model, const RunOptions& run, double critical)
 {
@@ -92,6 +112,8 @@ template <class G>
 std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const RunOptions& run)
 {
   require_integration(model, options);
+  if (options.reproducible)
+    require_reproducible(model, options);
   prepare(model);
   ExplicitOptions of_step = options;
   std::int64_t done = 0;

@@ -38,7 +38,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   for (VelocityField<G>* phase : {&soil, &water.motion})
   {
     find_velocity_change(*phase, options.pic_fraction, dt);
-    scatter_momentum<G>(mesh, phase->part, phase->moments, phase->velocity_change, phase->velocity);
+    scatter_momentum<G>(mesh, model.exchange, phase->part, phase->moments, phase->velocity_change, phase->velocity);
     sum_shared(exchange, phase->velocity);
     find_mapped_velocity(1 - options.pic_fraction, *phase);
   }

@@ -21,10 +21,15 @@ void find_whole_cells(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
   };
   fills.assign(mesh.points.size(), {0.0, 0.0});
   whole.resize(static_cast<std::size_t>(mesh.owned_cells));
-  for (Index c = 0; c < mesh.owned_cells; ++c)
-    for (Index node : mesh.cells[c])
-      for (std::size_t k = 0; k < 2; ++k)
-        fills[node][k] += fill(c)[k];
+  const auto each_term = [&](auto&& add)
+  {
+    for (Index c = 0; c < mesh.owned_cells; ++c)
+      for (Index node : mesh.cells[c])
+        add(node, fill(c));
+  };
+  using Fill = std::array<double, 2>;
+  sum_at_nodes<Fill>(
+      exchange, [&fills](Index node) -> Fill& { return fills[node]; }, each_term);
   sum_shared(exchange, fills);
   const auto is_full = [](const std::array<double, 2>& f, double fraction) { return f[0] >= fraction * f[1]; };
   for (Index c = 0; c < mesh.owned_cells; ++c)

@@ -104,9 +104,9 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
   const auto scatter_particles = [&](auto&& stress_of, std::span<const NodeSums<D>> of_resting_cells)
   {
-    field.has_light_nodes =
-        scatter<G>(mesh, part_of_particles(field), field.moments, stress_of, field.tractions, of_resting_cells,
-                   field.nodes, 2 * field.least_mass); // twice: sums of several cells have round-off
+    field.has_light_nodes = scatter<G>(mesh, exchange, part_of_particles(field), field.moments, stress_of,
+                                       field.tractions, of_resting_cells, field.nodes,
+                                       2 * field.least_mass); // twice: sums of several cells have round-off
   };
   if (!field.integration.averaged_by_law.empty())
   {

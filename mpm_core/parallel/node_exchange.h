@@ -20,6 +20,7 @@ struct NodeExchange
   std::vector<Index> shared_nodes;  ///< all nodes that have a neighbour
   std::vector<double> own;          ///< this rank's part of them during a sum
   std::vector<unsigned char> owned; ///< per node: 1 on exactly one of the ranks that share it, for global sums
+  bool reproducible = false;        ///< sums at nodes are the same to the last bit on any number of ranks
 };
 
 /// Whether a rank is this one or one of its neighbours.

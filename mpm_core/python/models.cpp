@@ -493,7 +493,8 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
             options.rayleigh = {std::get<0>(given), std::get<1>(given), std::get<2>(given)};
           })
       .def_readwrite("nmd", &ExplicitOptions::nmd)
-      .def_readwrite("integration", &ExplicitOptions::integration);
+      .def_readwrite("integration", &ExplicitOptions::integration)
+      .def_readwrite("reproducible", &ExplicitOptions::reproducible);
   py::class_<RunOptions>(m, "RunOptions")
       .def(py::init<>())
       .def_readwrite("until", &RunOptions::until)

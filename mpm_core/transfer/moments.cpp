@@ -1,6 +1,8 @@
 #include "transfer/moments.h"
 
+#include "parallel/rounded_sums.h"
 #include "transfer/affine_field.h"
+#include "transfer/lanes.h"
 
 namespace mpm::transfer
 {
@@ -33,9 +35,53 @@ void add_particle(const Particles<D>& particles, Index p, const CellShape<D>& sh
 }
 } // namespace
 
-template <class G, int D>
-void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
-                 CellMoments<G>& moments)
+namespace
+{
+template <class G>
+constexpr std::size_t n_members = sizeof(CellMoments<G>) / sizeof(double);
+
+/// What some particles add to the moments, in the order of these.
+template <class G>
+using Terms = std::array<Lanes, n_members<G>>;
+
+/// @param piece  positions, velocities, stresses, mass and volume
+template <class G, int D = G::dim>
+inline Terms<G> terms_of(const Piece<2 * D + G::n_working + 2>& piece, const LaneMask& mine, const Vector<D>& centre)
+{
+  constexpr int S = G::n_working;
+  struct // as the moments, lane by lane
+  {
+    Lanes volume, mass;
+    std::array<Lanes, D> mass_xi;
+    std::array<Lanes, n_symmetric<D>> mass_xixi;
+    std::array<Lanes, D> momentum;
+    std::array<std::array<Lanes, D>, D> momentum_xi;
+    std::array<Lanes, S> stress;
+  } terms;
+  terms.mass = mine ? piece[2 * D + S] : Lanes{};
+  terms.volume = mine ? piece[2 * D + S + 1] : Lanes{};
+  std::array<Lanes, D> xi;
+  for (int i = 0; i < D; ++i)
+  {
+    xi[i] = piece[i] - centre[i];
+    terms.mass_xi[i] = terms.mass * xi[i];
+  }
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    terms.mass_xixi[k] = terms.mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+  for (int k = 0; k < S; ++k)
+    terms.stress[k] = terms.volume * piece[2 * D + k];
+  for (int a = 0; a < D; ++a)
+  {
+    terms.momentum[a] = terms.mass * piece[D + a];
+    for (int b = 0; b < D; ++b)
+      terms.momentum_xi[a][b] = terms.mass_xi[b] * piece[D + a];
+  }
+  return std::bit_cast<Terms<G>>(terms);
+}
+
+/// Calls `take` with the terms of the particles [first, last), some at a time.
+template <class G, class Take, int D = G::dim>
+inline void each_terms(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape, Take&& take)
 {
   constexpr int S = G::n_working;
   std::array<const double*, 2 * D + S + 2> columns;
@@ -48,52 +94,80 @@ void add_moments(const Particles<D>& particles, Index first, Index last, const C
     columns[2 * D + k] = particles.stress[working_component<G>[k]].data();
   columns[2 * D + S] = particles.mass.data();
   columns[2 * D + S + 1] = particles.volume.data();
+  add_lanes(columns, first, last,
+            [&take, centre = shape.centre](const Piece<2 * D + S + 2>& piece, const LaneMask& mine)
+            { take(terms_of<G, D>(piece, mine, centre)); });
+}
 
+/// Changes the numbers of moments one by one; `change` is a callable (std::size_t k, double& number).
+template <class G, class Change>
+inline void each_number(CellMoments<G>& moments, Change&& change)
+{
+  auto numbers = std::bit_cast<std::array<double, n_members<G>>>(moments);
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    change(k, numbers[k]);
+  moments = std::bit_cast<CellMoments<G>>(numbers);
+}
+} // namespace
+
+template <class G, int D>
+void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                 CellMoments<G>& moments)
+{
   if (last - first < lanes) // such as a particle that has changed cells; vectors would not be filled
   {
     for (Index p = first; p < last; ++p)
       add_particle<G>(particles, p, shape, moments);
     return;
   }
-  constexpr std::size_t members = sizeof(CellMoments<G>) / sizeof(double);
-  struct Sums // as the moments, lane by lane
+  Terms<G> sums{};
+  each_terms<G>(particles, first, last, shape,
+                [&sums](const Terms<G>& terms)
+                {
+                  for (std::size_t k = 0; k < sums.size(); ++k)
+                    sums[k] += terms[k];
+                });
+  each_number(moments, [&sums](std::size_t k, double& number) { number += sum(sums[k]); });
+}
+
+template <class G, int D>
+void keep_largest_terms(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                        CellMoments<G>& largest)
+{
+  Terms<G> most{};
+  each_terms<G>(particles, first, last, shape,
+                [&most](const Terms<G>& terms)
+                {
+                  for (std::size_t k = 0; k < most.size(); ++k)
+                  {
+                    const Lanes size = terms[k] < 0 ? -terms[k] : terms[k];
+                    most[k] = size <= most[k] ? most[k] : size; // so that NaN is kept
+                  }
+                });
+  const auto keep = [&most](std::size_t k, double& number)
   {
-    Lanes volume, mass;
-    std::array<Lanes, D> mass_xi;
-    std::array<Lanes, n_symmetric<D>> mass_xixi;
-    std::array<Lanes, D> momentum;
-    std::array<std::array<Lanes, D>, D> momentum_xi;
-    std::array<Lanes, S> stress;
-  } sums{};
-  const auto add = [&sums, centre = shape.centre](const Piece<2 * D + S + 2>& piece, const LaneMask& mine)
-  {
-    const Lanes mass = mine ? piece[2 * D + S] : Lanes{}, volume = mine ? piece[2 * D + S + 1] : Lanes{};
-    std::array<Lanes, D> xi, mass_xi;
-    sums.volume += volume;
-    sums.mass += mass;
-    for (int i = 0; i < D; ++i)
-    {
-      xi[i] = piece[i] - centre[i];
-      mass_xi[i] = mass * xi[i];
-      sums.mass_xi[i] += mass_xi[i];
-    }
-    for (int k = 0; k < n_symmetric<D>; ++k)
-      sums.mass_xixi[k] += mass_xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
-    for (int k = 0; k < S; ++k)
-      sums.stress[k] += volume * piece[2 * D + k];
-    for (int a = 0; a < D; ++a)
-    {
-      sums.momentum[a] += mass * piece[D + a];
-      for (int b = 0; b < D; ++b)
-        sums.momentum_xi[a][b] += mass_xi[b] * piece[D + a];
-    }
+    for (int l = 0; l < lanes; ++l)
+      number = most[k][l] <= number ? number : most[k][l];
   };
-  add_lanes(columns, first, last, add);
-  const auto by_lane = std::bit_cast<std::array<Lanes, members>>(sums);
-  auto numbers = std::bit_cast<std::array<double, members>>(moments);
-  for (std::size_t k = 0; k < members; ++k)
-    numbers[k] += sum(by_lane[k]);
-  moments = std::bit_cast<CellMoments<G>>(numbers);
+  each_number(largest, keep);
+}
+
+template <class G, int D>
+void add_rounded_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                         const CellMoments<G>& largest, CellMoments<G>& moments)
+{
+  const auto bounds = std::bit_cast<std::array<double, n_members<G>>>(largest);
+  std::array<double, n_members<G>> by;
+  for (std::size_t k = 0; k < by.size(); ++k)
+    by[k] = rounding(bounds[k]);
+  Terms<G> sums{};
+  each_terms<G>(particles, first, last, shape,
+                [&sums, &by](const Terms<G>& terms)
+                {
+                  for (std::size_t k = 0; k < sums.size(); ++k)
+                    sums[k] += (terms[k] + by[k]) - by[k];
+                });
+  each_number(moments, [&sums](std::size_t k, double& number) { number += sum(sums[k]); });
 }
 
 template <int D>
@@ -201,6 +275,9 @@ Working<G> stress_sum(const Particles<D>& particles, Index first, Index last)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_moments(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&, CellMoments<G>&);        \
+  template void keep_largest_terms(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&, CellMoments<G>&); \
+  template void add_rounded_moments(const Particles<G::dim>&, Index, Index, const CellShape<G::dim>&,                  \
+                                    const CellMoments<G>&, CellMoments<G>&);                                           \
   template void move(CellMoments<G>&, const CellMotion<G::dim>&);                                                      \
   template Working<G> stress_sum<G>(const Particles<G::dim>&, Index, Index);
 INSTANTIATE(PlaneStrain)

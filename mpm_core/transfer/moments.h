@@ -70,7 +70,18 @@ template <class G, int D = G::dim>
 void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
                  CellMoments<G>& moments);
 
-/// The same for the tractions they carry.
+/// Raises `largest` to the magnitudes of what each of the particles [first, last) adds to the moments of their cell.
+template <class G, int D = G::dim>
+void keep_largest_terms(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                        CellMoments<G>& largest);
+
+/// Adds the particles [first, last) to the moments of their cell, each term rounded as `add_rounded` does.
+/// @param largest  terms of all particles of the cell
+template <class G, int D = G::dim>
+void add_rounded_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                         const CellMoments<G>& largest, CellMoments<G>& moments);
+
+/// Adds the tractions that particles carry.
 template <int D>
 void add_moments(const Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
                  TractionMoments<D>& moments);

@@ -3,7 +3,7 @@
 /// Nodal mixed discretisation (NMD): the remedy of Detournay & Dzik against the locking of linear simplices.
 
 #include "mesh/part.h"
-#include "parallel/node_exchange.h"
+#include "parallel/rounded_sums.h"
 
 #include <span>
 
@@ -26,20 +26,22 @@ template <int D, class VolumeOf, class IntegralOf>
 void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, VolumeOf&& volume_of, IntegralOf&& integral_of,
                         NodeExchange& exchange, std::span<VolumeMean> nodes)
 {
+  const auto each_term = [&](auto&& add)
+  {
+    for (Index c : part.cells)
+    {
+      const double volume = volume_of(c);
+      if (volume == 0)
+        continue;
+      const VolumeMean term{integral_of(c, volume), volume};
+      for (Index node : mesh.cells[c])
+        add(node, term);
+    }
+  };
   for (Index node : part.nodes)
     nodes[node] = {};
-  for (Index c : part.cells)
-  {
-    const double volume = volume_of(c);
-    if (volume == 0)
-      continue;
-    const double integral = integral_of(c, volume);
-    for (Index node : mesh.cells[c])
-    {
-      nodes[node].value += integral;
-      nodes[node].volume += volume;
-    }
-  }
+  sum_at_nodes<VolumeMean>(
+      exchange, [nodes](Index node) -> VolumeMean& { return nodes[node]; }, each_term);
   sum_shared(exchange, nodes);
   for (Index node : part.nodes)
     if (nodes[node].volume > 0)

@@ -3,6 +3,7 @@
 /// From cell moments to nodal sums. Conservative: the sum over nodes equals the sum over particles.
 
 #include "mesh/part.h"
+#include "parallel/rounded_sums.h"
 #include "transfer/by_vertex.h"
 
 #include <limits>
@@ -10,13 +11,19 @@
 
 namespace mpm::transfer
 {
-/// Nodal sums of one step; plain doubles, so that shared nodes are summed in one message.
+/// What all particles give to the nodes.
 template <int D>
-struct NodeSums
+struct InnerSums
 {
   double mass;        ///< m_i (11)
   Vector<D> momentum; ///< sum m_p N_i v_p
   Vector<D> internal; ///< f_int,i (14)
+};
+
+/// Nodal sums of one step; plain doubles, so that shared nodes are summed in one message.
+template <int D>
+struct NodeSums : InnerSums<D>
+{
   Vector<D> traction; ///< the part of f_ext,i (15) that boundary particles carry
 };
 
@@ -58,15 +65,24 @@ inline Vector<D> internal_force(const Working<G>& stress, const CellShape<D>& sh
   return force;
 }
 
-/// Adds the tractions in a cell to its nodes.
+/// Adds the tractions in the cells of a part of the mesh to its nodes.
 template <int D>
-inline void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMoments<D>& moments,
-                              std::span<NodeSums<D>> nodes)
+void scatter_tractions(const Mesh<D>& mesh, NodeExchange& exchange, const MeshPart& part,
+                       std::span<const TractionMoments<D>> cells, std::span<NodeSums<D>> nodes)
 {
-  for (int k = 0; k <= D; ++k)
-    for (int a = 0; a < D; ++a)
-      nodes[mesh.cells[cell][k]].traction[a] +=
-          at_vertex<D>(moments.force[a], moments.force_xi[a], mesh.shapes[cell].gradient[k]);
+  const auto traction_of = [nodes](Index node) -> Vector<D>& { return nodes[node].traction; };
+  const auto each_term = [&](auto&& add)
+  {
+    for (Index c : part.cells)
+      for (int k = 0; k <= D; ++k)
+      {
+        Vector<D> force;
+        for (int a = 0; a < D; ++a)
+          force[a] = at_vertex<D>(cells[c].force[a], cells[c].force_xi[a], mesh.shapes[c].gradient[k]);
+        add(mesh.cells[c][k], force);
+      }
+  };
+  sum_at_nodes<Vector<D>>(exchange, traction_of, each_term);
 }
 
 /// Sums of mass, momentum, internal force and traction at the nodes of a part of the mesh over its cells.
@@ -76,49 +92,60 @@ inline void scatter_tractions(const Mesh<D>& mesh, Index cell, const TractionMom
 /// @param least_mass  [kg]
 /// @returns whether a vertex gets no more than the least mass from a cell, whose particles then lie on the facet
 /// opposite to it
+/// @note Collective where the exchange asks for reproducible sums
 template <class G, class StressOf>
-bool scatter(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
-             StressOf&& stress_of, std::span<const TractionMoments<G::dim>> tractions,
-             std::span<const NodeSums<G::dim>> others, std::span<NodeSums<G::dim>> nodes, double least_mass = 0)
+bool scatter(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MeshPart& part,
+             std::span<const CellMoments<G>> cells, StressOf&& stress_of,
+             std::span<const TractionMoments<G::dim>> tractions, std::span<const NodeSums<G::dim>> others,
+             std::span<NodeSums<G::dim>> nodes, double least_mass = 0)
 {
   constexpr int D = G::dim;
   double least = std::numeric_limits<double>::infinity();
-  for (Index node : part.nodes)
-    nodes[node] = others.empty() ? NodeSums<D>{} : others[node];
-  for (Index c : part.cells)
+  const auto each_term = [&](auto&& add)
   {
-    const CellMoments<G>& moments = cells[c];
-    if (moments.mass == 0)
-      continue;
-    const auto gradients = gradients_by_vertex<D>(mesh.shapes[c]);
-    const ByVertex<D> mass = at_vertices<D>(moments.mass, moments.mass_xi, gradients);
-    const Working<G> stress = stress_of(c);
-    std::array<ByVertex<D>, D> momentum, internal;
-    for (int a = 0; a < D; ++a)
+    for (Index c : part.cells)
     {
-      momentum[a] = at_vertices<D>(moments.momentum[a], moments.momentum_xi[a], gradients);
-      internal[a] = internal_forces<G>(stress, a, gradients, mesh.shapes[c]);
-    }
-    for (int k = 0; k <= D; ++k)
-    {
-      NodeSums<D>& node = nodes[mesh.cells[c][k]];
-      least = mass[k] < least ? mass[k] : least;
-      node.mass += mass[k];
+      const CellMoments<G>& moments = cells[c];
+      if (moments.mass == 0)
+        continue;
+      const CellShape<D>& shape = mesh.shapes[c];
+      const auto gradients = gradients_by_vertex<D>(shape);
+      const ByVertex<D> mass = at_vertices<D>(moments.mass, moments.mass_xi, gradients);
+      const Working<G> stress = stress_of(c);
+      std::array<ByVertex<D>, D> momentum, internal;
       for (int a = 0; a < D; ++a)
       {
-        node.momentum[a] += momentum[a][k];
-        node.internal[a] += internal[a][k];
+        momentum[a] = at_vertices<D>(moments.momentum[a], moments.momentum_xi[a], gradients);
+        internal[a] = internal_forces<G>(stress, a, gradients, shape);
+      }
+      for (int k = 0; k <= D; ++k)
+      {
+        least = mass[k] < least ? mass[k] : least;
+        InnerSums<D> term;
+        term.mass = mass[k];
+        for (int a = 0; a < D; ++a)
+        {
+          term.momentum[a] = momentum[a][k];
+          term.internal[a] = internal[a][k];
+        }
+        add(mesh.cells[c][k], term);
       }
     }
-    if (!tractions.empty())
-      scatter_tractions<D>(mesh, c, tractions[c], nodes);
-  }
+  };
+  for (Index node : part.nodes)
+    nodes[node] = others.empty() ? NodeSums<D>{} : others[node];
+  sum_at_nodes<InnerSums<D>>(
+      exchange, [nodes](Index node) -> InnerSums<D>& { return nodes[node]; }, each_term);
+  if (!tractions.empty())
+    scatter_tractions<D>(mesh, exchange, part, tractions, nodes);
   return least <= least_mass;
 }
 
 /// The momentum `sum m_p N_i sum_j N_j change_j` of particles that all had the velocity of the nodal field `change` at
 /// their place: the consistent mass matrix times `change`. The particles are not visited.
+/// @note Collective where the exchange asks for reproducible sums
 template <class G>
-void scatter_momentum(const Mesh<G::dim>& mesh, const MeshPart& part, std::span<const CellMoments<G>> cells,
-                      std::span<const Vector<G::dim>> change, std::span<Vector<G::dim>> momentum);
+void scatter_momentum(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MeshPart& part,
+                      std::span<const CellMoments<G>> cells, std::span<const Vector<G::dim>> change,
+                      std::span<Vector<G::dim>> momentum);
 } // namespace mpm::transfer

@@ -131,6 +131,7 @@ struct Gathered : Filled<D>
 {
   std::vector<CellMoments<Cartesian<D>>> moments;
   MeshPart part;
+  NodeExchange exchange; // one rank: nothing is shared
   std::vector<NodeSums<D>> nodes;
   std::vector<Vector<D>> change, momentum;
 
@@ -167,7 +168,7 @@ void scatter_to_nodes(benchmark::State& state)
   Gathered<D> box(static_cast<int>(state.range(0)));
   const auto stress_of = [&](Index c) { return box.moments[c].stress; };
   for (auto _ : state)
-    scatter<Cartesian<D>>(box.mesh, box.part, box.moments, stress_of, {}, {}, box.nodes);
+    scatter<Cartesian<D>>(box.mesh, box.exchange, box.part, box.moments, stress_of, {}, {}, box.nodes);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(scatter_to_nodes<2>)->Arg(18)->Arg(112);
@@ -178,7 +179,7 @@ void scatter_changes(benchmark::State& state)
 {
   Gathered<D> box(static_cast<int>(state.range(0)));
   for (auto _ : state)
-    scatter_momentum<Cartesian<D>>(box.mesh, box.part, box.moments, box.change, box.momentum);
+    scatter_momentum<Cartesian<D>>(box.mesh, box.exchange, box.part, box.moments, box.change, box.momentum);
   count_particles(state, static_cast<Index>(box.moments.size()));
 }
 BENCHMARK(scatter_changes<2>)->Arg(18)->Arg(112);

@@ -64,7 +64,8 @@ std::vector<NodeSums<D>> mapped(const Mesh<D>& mesh, const Particles<D>& particl
   }
   std::vector<NodeSums<D>> nodes(mesh.points.size());
   const auto stress_of = [&](Index c) { return moments[c].stress; };
-  scatter<Cartesian<D>>(mesh, mpm::test::whole(mesh), moments, stress_of, tractions, {}, nodes);
+  NodeExchange exchange; // one rank: nothing is shared
+  scatter<Cartesian<D>>(mesh, exchange, mpm::test::whole(mesh), moments, stress_of, tractions, {}, nodes);
   return nodes;
 }
 

@@ -23,13 +23,16 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def explicit_options(damping: float, nmd: bool, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> Any:
+def explicit_options(
+    damping: float, nmd: bool, integration: Any, stress_update: Any, rayleigh: Rayleigh, reproducible: bool
+) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.nmd = bool(nmd)
     options.integration = integration
     options.stress_update = stress_update
+    options.reproducible = bool(reproducible)
     options.rayleigh = rayleigh._as_core()
     return options
 

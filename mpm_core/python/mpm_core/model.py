@@ -272,6 +272,7 @@ class Model(Body):
         rebalance: float | None = None,
         energy_limit: float | None = 0.2,
         conversion: Conversion | None = CONVERSION,
+        reproducible: bool = False,
     ) -> Reports[Report]:
         """Run the explicit scheme (16)-(20) of the paper; yields reports at the given intervals and at the end.
 
@@ -300,9 +301,11 @@ class Model(Body):
             energy_limit: `Report.unexplained_fraction` at which the run ends with an error; None for no limit. Above 0.01
                 there is an `EnergyWarning`.
             conversion: when resting cells turn into particles (see ``rest``); None if only those do that a particle enters.
+            reproducible: compute the same particles to the last bit on any number of ranks, from the same start and by the same
+                program on the same kind of processor; sums in reports differ by round-off.
 
         Raises:
-            InputError: an argument out of its range; ``dt`` above the critical time step, with both numbers.
+            InputError: an argument out of its range; ``reproducible`` with what it does not cover; ``dt`` above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; or the unexplained
                 energy reached its limit.
         """
@@ -316,7 +319,7 @@ class Model(Body):
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
-                explicit_options(damping, nmd, integration, stress_update, damped),
+                explicit_options(damping, nmd, integration, stress_update, damped, reproducible),
                 run_options(dt, courant, pic, allow_unstable),
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),
