@@ -68,7 +68,7 @@ class PressureProjection:
         Args:
             function: the function.
             dt: length of the step [s].
-            beta: Newmark's parameter of steps with inertia. The mass of a cell then resists as a stiffness does, rho h^2 / (12 beta
+            beta: Newmark's parameter of steps with inertia. The mass of a cell then resists as stiffness does, rho h^2 / (12 beta
                 dt^2) for displacements that alternate from node to node; without it waves would be too slow.
         """
         stiffness = self._stiffness + (0.0 if beta is None else self._mass / (beta * dt**2))

@@ -320,7 +320,7 @@ class PoreWater(Conditions):
         self._set_water_conditions(collectively(self.comm, remaining))
 
     def water_volume(self) -> float:
-        """Volume of the water in the pores at atmospheric pressure [m3], per metre or per radian in two dimensions. Collective."""
+        """Volume of the water in the pores at atmospheric pressure [m3], per metre or radian in two dimensions. Collective."""
         self._require_water()
         p = self.particles
         pores = p.porosity * p.volume

@@ -100,7 +100,7 @@ class FailureWatch:
         if self._speaks and report.plastic_work > YIELDS_ABOVE * report.energy_scale > 0:
             self._speaks = False
             warnings.warn(
-                "the soil fails, with a dilation angle below its friction angle: it then keeps its volume, and plain linear cells "
+                "the soil fails, with a dilation angle below its friction angle: it then keeps its volume, and linear cells "
                 "are too strong, more so the coarser the mesh. nmd=True averages volumetric strains against that, best together "
                 "with integration=MIXED (docs/howto/switches.md)",
                 RuntimeWarning,

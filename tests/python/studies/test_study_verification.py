@@ -152,7 +152,7 @@ def test_blocks_on_a_plane_are_one_wedge():
 
 @pytest.mark.parametrize(("width", "lowest", "highest"), [(0.5, 2.0, 2 * 2.0), (2.0, 2 * 2**0.5, 3.786)])
 def test_stresses_in_equilibrium_are_a_lower_bound(width, lowest, highest):
-    """A cut 1 m high. By hand: uniaxial stress carries 2 c / gamma, Heyman's stresses 2.83 of a wide one; a wedge at 45 degrees needs
+    """A cut 1 m high. By hand: uniaxial stress carries 2 c / gamma, Heyman's stresses 2.83 of a wide one; a wedge at 45° needs
     4 c / gamma at most, and 3.786 is the best mechanism known for a wide one."""
     domain, cells, facets = bridge.box_mesh(MPI.COMM_WORLD, (width, 1.0), (round(6 * width), 6))
     sides = bridge.name_tags(facets, {"left": 1, "right": 2, "base": 3, "top": 4})

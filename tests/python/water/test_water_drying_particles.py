@@ -1,4 +1,4 @@
-"""Implicit particles in soil that dries, under rain, and under standing water whose level changes; the free surface cuts cells."""
+"""Implicit particles in soil that dries, under rain and under standing water whose level changes; the surface cuts cells."""
 
 import numpy as np
 import pytest
