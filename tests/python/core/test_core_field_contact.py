@@ -139,10 +139,11 @@ def test_bodies_on_a_curved_interface():
     mesh = box((16, 16), (2.0, 2.0), diagonals="alternating")
     soil = mpm.LinearElastic(young=1e6, poisson=0.2)
     model = mpm.Model(mesh, [soil, soil], velocity_fields=[0, 1])
-    grid = (np.indices((64, 64)).reshape(2, -1).T + 0.5) / 32
+    # Not on diagonals, where a point could be in either triangle, so that mesh and particles are symmetric.
+    grid = (np.indices((64, 48)).reshape(2, -1).T + 0.5) / (32, 24)
     radius = np.linalg.norm(grid - 1.0, axis=1)
     for law, inside in ((0, radius < 0.4), (1, (radius > 0.4) & (radius < 0.8))):
-        model.seed_points(grid[inside], np.full(inside.sum(), 32.0**-2), density=1000.0, material=law)
+        model.seed_points(grid[inside], np.full(inside.sum(), 1 / (32 * 24)), density=1000.0, material=law)
     contact = model.add_field_contact(mpm.Disc((1.0, 1.0), 0.4), friction=0.2)
     outward = (model.particles.position - 1.0) / np.linalg.norm(model.particles.position - 1.0, axis=1)[:, None]
     model.particles.set("velocity", -0.1 * outward * (model.particles.material == 1)[:, None])
@@ -152,7 +153,7 @@ def test_bodies_on_a_curved_interface():
     arms = points - 1.0
     np.testing.assert_allclose(normals, arms / np.linalg.norm(arms, axis=1)[:, None], atol=1e-12)
     assert (np.einsum("ni,ni->n", forces, normals) > 0).all()  # pushes the ring outward
-    assert np.linalg.norm(contact.impulse) < 0.05 * np.abs(forces).sum() * 2e-3  # it is symmetric
+    assert np.linalg.norm(contact.impulse) < 1e-9 * np.abs(forces).sum() * 2e-3  # as it is symmetric
 
 
 @pytest.mark.parametrize(
