@@ -62,11 +62,22 @@ inline void add_rounded(const T& term, const T& largest, T& sum)
 template <class T>
 inline void add_plainly(const T& term, T& sum)
 {
-  const auto terms = std::bit_cast<NumbersOf<T>>(term);
-  auto numbers = std::bit_cast<NumbersOf<T>>(sum);
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-    numbers[k] += terms[k];
-  sum = std::bit_cast<T>(numbers);
+  constexpr std::size_t size = NumbersOf<T>{}.size();
+  if constexpr (size <= 4) // copies stay in registers
+  {
+    const auto terms = std::bit_cast<NumbersOf<T>>(term);
+    auto numbers = std::bit_cast<NumbersOf<T>>(sum);
+    for (std::size_t k = 0; k < size; ++k)
+      numbers[k] += terms[k];
+    sum = std::bit_cast<T>(numbers);
+  }
+  else // copies of many numbers go through memory: a tenth more instructions of the sums at nodes
+  {
+    const auto* terms = reinterpret_cast<const double*>(&term);
+    auto* numbers = reinterpret_cast<double*>(&sum);
+    for (std::size_t k = 0; k < size; ++k)
+      numbers[k] += terms[k];
+  }
 }
 
 /// Adds terms of this rank to sums at nodes; rounded where the exchange asks for reproducible sums, which must be zero

@@ -132,8 +132,12 @@ bool scatter(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MeshPart& p
       }
     }
   };
-  for (Index node : part.nodes)
-    nodes[node] = others.empty() ? NodeSums<D>{} : others[node];
+  if (others.empty())
+    for (Index node : part.nodes)
+      nodes[node] = {};
+  else
+    for (Index node : part.nodes)
+      nodes[node] = others[node];
   sum_at_nodes<InnerSums<D>>(
       exchange, [nodes](Index node) -> InnerSums<D>& { return nodes[node]; }, each_term);
   if (!tractions.empty())
