@@ -99,3 +99,13 @@ def crest_displacement(model):
     """Length of the displacement of the particle that was nearest to the slope's crest [m]."""
     start = model.particles.initial_position
     return np.linalg.norm(model.particles.displacement[np.argmin(np.hypot(start[:, 0] - 1.1, start[:, 1] - 1.0))])
+
+
+def difference_of_residual(step, v, direction, dt, h=1e-7):
+    """-dr/du along a direction by central differences of h [m] about the iterate v: the tangent times the direction."""
+    forces = []
+    for side in (1, -1):
+        step.iterate = v + side * h / dt * direction
+        step.trial()
+        forces.append(step.residual)
+    return (forces[1] - forces[0]) / (2 * h)
