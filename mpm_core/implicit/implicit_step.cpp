@@ -37,6 +37,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
     throw InputError("the model has " + std::to_string(model.fields.size()) +
                      " velocity fields, expected one in implicit steps");
   prepare(model);
+  model.exchange.reproducible = false; // an explicit run before may have asked for it
   VelocityField<G>& field = model.fields.front();
   step.runs = model.order.runs;
   step.runs.insert(step.runs.end(), field.resting.runs.begin(), field.resting.runs.end());
