@@ -14,7 +14,7 @@ from time import perf_counter
 
 import numpy as np
 from common.files import OutputError
-from common.movie import Movie, frame_of
+from common.movie import frame_of, particle_movie
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.plots import Quantity, save_history
@@ -115,7 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
         pictures["imbalance"] = lambda: save_history(
             folder / "imbalance.png", np.array(first.time), {name: run.imbalance for name, run in runs.items()},
             "Load imbalance (maximum over mean) [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
-        page = Page(movies=[Movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
+        page = Page(movies=[particle_movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
                     captions={"imbalance": "Load imbalance: maximum over mean number of particles per rank"})  # fmt: skip
         print(f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
               f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions; "

@@ -22,7 +22,7 @@ from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.flow_impact import bore
 from common.history import History
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
@@ -234,7 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     return body_runs.write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[Movie("flow and wall", scene, result.frames)] if scene is not None else [],
+        movies=[particle_movie("flow and wall", scene, result.frames)],
         captions={"force": "Force on the wall"},
         pictures=drawn(a, scene, result, folder),
     )  # fmt: skip

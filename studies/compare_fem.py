@@ -18,7 +18,7 @@ import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
 from common.figures import Pictures
 from common.files import OutputError
-from common.movie import Movie, fem_frame, particle_frame
+from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
 from common.plots import Quantity
@@ -235,7 +235,7 @@ def main(arguments: list[str] | None = None) -> int:
         "wall_seconds": perf_counter() - start,
     }
     scene = case.scene() if frames else None
-    movies = [Movie(name, scene, shown) for name, shown in zip(("FEM", "MPM"), zip(*frames))] if scene else []
+    movies = [particle_movie(name, scene, shown) for name, shown in zip(("FEM", "MPM"), zip(*frames))]
     write_summary(folder, a, summary, comm, Page(movies=movies, slider=("unit weight", "kN/m\u00b3")), pictures)
     if comm.rank == 0:
         print(f"results in {folder}")

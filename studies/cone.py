@@ -24,7 +24,7 @@ from common.cone_theory import lu, spherical_limit_pressure, teh_houlsby
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
@@ -240,7 +240,7 @@ def main(arguments: list[str] | None = None) -> int:
     said = f"cone factor {factor:.2f}{change}; {others}"
     return write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[Movie("cone", scene, result.frames)] if scene is not None else [],
+        movies=[particle_movie("cone", scene, result.frames)],
         captions={"resistance": "Resistance of the cone over the strength of the soil, over the depth"},
         pictures=drawn(a, scene, result, folder),
     )  # fmt: skip

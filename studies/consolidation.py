@@ -23,7 +23,7 @@ from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
 from common.files import OutputError
-from common.movie import PORE, Movie
+from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, study_parser
 from common.page import Page
 from common.plots import DISPLACEMENT, save_particles
@@ -214,7 +214,7 @@ def main(arguments: list[str] | None = None) -> int:
         }
         summary |= {"particles": particles.count, "largest_newton_iterations_particles": particles.iterations}
         if particles.scene is not None:
-            movies = [Movie("particles", particles.scene, particles.frames, {"displacement": DISPLACEMENT})]
+            movies = [particle_movie("particles", particles.scene, particles.frames, {"displacement": DISPLACEMENT})]
     page = Page(movies=movies, slider=("t", "days"), captions=CAPTIONS)
     write_summary(folder, a, summary, comm, page, drawn(site, files, folder))
     if comm.rank == 0:

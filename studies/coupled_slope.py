@@ -20,7 +20,7 @@ from common.followed import cells_near, mean_displacement, numbers_in
 from common.movie import frame_of
 from common.options import add_count, add_number, check, study_parser
 from common.page import Page
-from common.plots import AXES, SHEAR_STRAIN, WIDTH, paper_style, save_history
+from common.plots import SHEAR_STRAIN, WIDTH, paper_style, save_history
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -173,7 +173,7 @@ def save_kinds(path: Path, run: dict) -> None:
         axes.add_collection(PolyCollection(corners, facecolor="#e9e2d8", edgecolor="#b8ab98", linewidth=0.25))
         x, y = frame["position"][~rest].T
         dots = axes.scatter(x, y, c=strain[~rest], s=1.2, lw=0, norm=norm, cmap=SHEAR_STRAIN.colours)
-        axes.set(aspect="equal", xlabel=AXES[0], ylabel=AXES[1], title=f"$t$ = {frame['time']:.2f} s")
+        axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", title=f"$t$ = {frame['time']:.2f} s")
         axes.autoscale_view()
         figure.colorbar(dots, ax=axes, shrink=0.7, label=SHEAR_STRAIN.label)
         save_figure(figure, path)

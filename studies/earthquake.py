@@ -32,7 +32,7 @@ from common.files import OutputError
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.motions import ricker
-from common.movie import Movie, gathered, own_frame
+from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
@@ -261,7 +261,7 @@ def main(arguments: list[str] | None = None) -> int:
         "displacement": "Displacement that stays", "shear_strain": "Plastic shear strain at the end",
     }  # fmt: skip
     scene = scene_of(model, [bridge.SOIL, STIFF])
-    page = Page(movies=[Movie("slope", scene, frames) if scene else None], captions=captions)
+    page = Page(movies=[particle_movie("slope", scene, frames)], captions=captions)
     pictures = drawn(a, folder, record, history, slips, ratios, frames, scene) if a.pictures else {}
     write_summary(folder, a, summary, comm, page, pictures)
     if comm.rank == 0:

@@ -16,7 +16,7 @@ import numpy as np
 from common import site_slides
 from common.files import OutputError
 from common.interrupt import Interrupt
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import study_parser
 from common.page import Page
 from common.ranks import run_study
@@ -127,7 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
         **(stage_pictures(site.stages, rows, pictures, folder) if a.pictures else {}),
         **site_slides.slide_pictures(a, result, scene, folder),
     }
-    movie = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
+    movie = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
     write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn)
     if comm.rank == 0:
         for who, message in (("finite elements", failed), ("particles", failed_particles), ("slide", stopped)):

@@ -21,7 +21,7 @@ from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style
 from common.ranks import run_study
@@ -206,7 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
     said = f"{name}: N_c {shown}, exact {exact:.2f}; load factor {load:.2f} at a settlement of {settlement:.3g} m"
     return write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[Movie(name, scene, result.frames)] if scene is not None else [],
+        movies=[particle_movie(name, scene, result.frames)],
         captions={"load": "Load over area and shear strength, over the settlement"},
         pictures=drawn(a, scene, result, folder),
     )  # fmt: skip

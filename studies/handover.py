@@ -16,7 +16,7 @@ import numpy as np
 from common.field_plots import save_curves
 from common.figures import Pictures
 from common.files import OutputError
-from common.movie import Movie, fem_frame, particle_frame
+from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
 from common.plots import save_history
@@ -30,6 +30,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from particle_player import Movie
 
 comm = MPI.COMM_WORLD
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
@@ -121,15 +122,15 @@ def drawn(runs: list[dict], folder: Path) -> Pictures:
     }  # fmt: skip
 
 
-def movies(runs: list[dict]) -> list[Movie]:
+def movies(runs: list[dict]) -> list[Movie | None]:
     """The slides from zero stress and from the latest hand-over, and the finite elements at that hand-over."""
     first, last = runs[0], runs[-1]
     return [
         *(
-            Movie(f"MPM, handed over at {run['fraction']:.0%} of collapse", run["scene"], run["frames"])
+            particle_movie(f"MPM, handed over at {run['fraction']:.0%} of collapse", run["scene"], run["frames"])
             for run in (first, last)
         ),
-        Movie(f"FEM at {last['fraction']:.0%} of collapse", last["scene"], [last["before"]]),
+        particle_movie(f"FEM at {last['fraction']:.0%} of collapse", last["scene"], [last["before"]]),
     ]
 
 

@@ -24,7 +24,7 @@ from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
-from common.movie import QUANTITIES, WET_QUANTITIES, Movie
+from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
 from common.plots import CURVES, Scene, paper_style, save_particles
 from common.ranks import run_study
@@ -230,7 +230,7 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     return body_runs.write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[Movie("flow slide", scene, result.frames, {**WET_QUANTITIES, **QUANTITIES})] if scene is not None else [],
+        movies=[particle_movie("flow slide", scene, result.frames, {**WET_QUANTITIES, **QUANTITIES})],
         captions=captions, pictures=drawn(a, scene, result, folder),
     )  # fmt: skip
 

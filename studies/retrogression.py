@@ -22,7 +22,7 @@ from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
-from common.movie import Movie, particle_frame
+from common.movie import particle_frame, particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
@@ -235,7 +235,7 @@ def main(arguments: list[str] | None = None) -> int:
             if not interrupt.requested():
                 results.append(slide(a, size, folder, interrupt))
                 scene = results[-1].case.scene()
-                movies.append(Movie(f"cells of {size:g} m", scene, results[-1].frames) if scene else None)
+                movies.append(particle_movie(f"cells of {size:g} m", scene, results[-1].frames))
                 pictures |= drawn(a, results[-1], scene, folder)
     pictures["meshes"] = lambda: compare(results, folder)
     found = {

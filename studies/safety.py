@@ -63,7 +63,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     options = p.parse_args(arguments)
     check_fem_slope_options(p, options)
     check(p, options.site is not None or not options.unreduced,
-          lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site beside it: the slope has one soil")  # fmt: skip
+          lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site: the slope has one soil")  # fmt: skip
     check(p, options.depth == 0 or not options.particles,
           lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
     return options

@@ -24,7 +24,7 @@ from common.figures import Pictures
 from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
-from common.movie import PORE, Movie, fem_frame, has_pore_pressure
+from common.movie import PORE, fem_frame, has_pore_pressure, particle_movie
 from common.notes import notes_of
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.output_options import add_output_options, add_picture_options, check_frames
@@ -259,11 +259,11 @@ def drawn(a: Namespace, scene: Scene | None, frames: list[dict], history: Histor
 def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
     """What the page ``report.html`` shows beside figures and tables. Collective."""
     a, scene = case.args, case.scene()
-    movies = [Movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, frames)]
+    movies = [particle_movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, frames)]
     if case.fem is not None:
         before = fem_frame(case.model, case.fem, 0.0, case.model.particles.initial_position)
         title = f"FEM, equilibrium under {a.initial_unit_weight / 1e3:g} kN/m\u00b3 before the slide"
-        movies.append(Movie(title, scene, [before]))
+        movies.append(particle_movie(title, scene, [before]))
     captions = {
         "figure_2_mesh": "Background mesh and particles at the start", "figure_3_displacement": "Total displacement at the end",
         "figure_4_shear_strain": "Accumulated plastic shear strain at the end",

@@ -18,7 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import Pictures, save_figure
 from common.files import OutputError
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.page import Page
 from common.plots import (
@@ -227,7 +227,7 @@ def main(arguments: list[str] | None = None) -> int:
     for row in table.values():
         row["over_explicit"] = row["crest_displacement_m"] / reference
     names = dict(zip(table, runs))
-    movies = [Movie(name, scene, run.frames) for name, run in names.items()] if scene else []
+    movies = [particle_movie(name, scene, run.frames) for name, run in names.items()]
     write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]), drawn(runs, scene, folder))
     if comm.rank == 0:
         print_table(table, folder)

@@ -23,7 +23,7 @@ from common.earth_pressure import coulomb, stress_field, wall_acceleration
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.history import History
-from common.movie import Movie
+from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, GREY, Scene, paper_style
 from common.ranks import run_study
@@ -281,7 +281,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     return body_runs.write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[Movie(f"{a.motion} wall", scene, result.frames)] if scene is not None else [],
+        movies=[particle_movie(f"{a.motion} wall", scene, result.frames)],
         captions={"pressure": "Coefficient of the horizontal earth pressure on the wall"},
         pictures=drawn(a, scene, result, folder),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import Normalize
 
 from .figures import save_figure
-from .plots import AXES, CURVES, WIDTH, Quantity, colour_limits, disc_diameter, draw_bar, paper_style
+from .plots import CURVES, WIDTH, Quantity, colour_limits, disc_diameter, draw_bar, paper_style
 
 Curve = tuple[np.ndarray, np.ndarray]
 
@@ -111,7 +111,7 @@ def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity
         for collection in (cells, discs):
             axes.add_collection(collection)
         margin = 0.02 * (high - low)[0]
-        axes.set(aspect="equal", xlabel=AXES[0], ylabel=AXES[1], xlim=(low[0] - margin, high[0] + margin),
+        axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
                  ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
         axes.set_title(f"$t$ = {frame['time']:.1f} s; cells that rest as triangles", loc="left", pad=4)
         draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator
 
 import fenics_bridge as bridge
+from particle_player import axis_labels, boundary_edges
 
 from .figures import save_figure
 from .plots import (
@@ -24,8 +25,6 @@ from .plots import (
     WIDTH,
     Quantity,
     Scene,
-    axis_labels,
-    boundary_edges,
     colour_limits,
     discs,
     paper_style,

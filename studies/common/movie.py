@@ -1,30 +1,18 @@
-"""Particles over time for the page of a run: frames are gathered while a study runs, and packed small when it ends."""
+"""Particles over time for the page of a run: frames are gathered while a study runs."""
 
 from __future__ import annotations
 
-import base64
-import zlib
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
 
 import mpm_core as mpm
+import particle_player
+from particle_player import Quantity, Scene
 
-from .plots import (
-    DISPLACEMENT,
-    PORE_PRESSURE,
-    POROSITY,
-    SHEAR_STRAIN,
-    SPEED,
-    VERTICAL_STRESS,
-    WATER_PRESSURE,
-    Quantity,
-    Scene,
-    axis_labels,
-    disc_diameter,
-)
+from .plots import DISPLACEMENT, PORE_PRESSURE, POROSITY, SHEAR_STRAIN, SPEED, VERTICAL_STRESS, WATER_PRESSURE
 
 QUANTITIES = {
     "shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS, "speed": SPEED
@@ -35,39 +23,38 @@ PORE = "excess_pore_pressure"
 """The state variable; frames of models that have it have it too"""
 ALIKE = ("time", "bodies")
 """Entries of a frame that all ranks have alike"""
-LEVELS = 65534
-ABSENT = 65535
-MOST_BYTES = 60e6
-"""Of one movie before it is packed; of a longer one some frames are left out."""
-MOST_PARTICLES = 200_000
-"""In one movie; of more particles every second, third ... is drawn, larger."""
 
 
-@dataclass(frozen=True)
-class Movie:
-    """Particles over time, for one panel of the player.
+def particle_movie(
+    title: str,
+    scene: Scene | None,
+    frames: Sequence[Mapping[str, np.ndarray] | None],
+    quantities: Mapping[str, Quantity] = QUANTITIES,
+) -> particle_player.Movie | None:
+    """Frames of a model for one panel of the player, with the excess pore pressure where there is one.
 
     Args:
         title: stands above the panel.
         scene: mesh behind the particles.
-        frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
-            (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,)
-            when rows change their order or number from frame to frame; ``bodies`` (k, 2, 2) are segments of rigid surfaces [m],
-            as many in each frame. On ranks other than the first each is None.
-        quantities: those of the frames that can be chosen, by key; the excess pore pressure is added where there is one.
+        frames: as `particle_frame` gives them.
+        quantities: those of the frames that can be chosen, by key.
+
+    Returns:
+        The movie; None where there are no frames, and on ranks other than the first, where scene and frames are None.
     """
-
-    title: str
-    scene: Scene
-    frames: Sequence[Mapping[str, np.ndarray] | None]
-    quantities: Mapping[str, Quantity] = field(default_factory=lambda: QUANTITIES)
-
-    def __post_init__(self) -> None:
-        if self.frames and self.frames[0] is not None and PORE in self.frames[0]:
-            object.__setattr__(self, "quantities", {**self.quantities, PORE: PORE_PRESSURE})
+    here = [frame for frame in frames if frame is not None]
+    if scene is None or not here:
+        return None
+    pore = {PORE: PORE_PRESSURE} if PORE in here[0] else {}
+    return particle_player.Movie(title, scene, here, {**quantities, **pore})
 
 
-# --- frames ----------------------------------------------------------------------------------------------------------
+def __getattr__(name: str) -> object:
+    if name == "Movie":
+        text = "common.movie.Movie is now common.movie.particle_movie; the old name will go with the next version"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return particle_movie
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
@@ -140,90 +127,3 @@ def gathered(comm: MPI.Comm, frame: dict[str, np.ndarray]) -> dict[str, np.ndarr
     if parts is None:
         return None
     return {name: frame[name] if name in ALIKE else np.concatenate([part[name] for part in parts]) for name in frame}
-
-
-# --- packing ---------------------------------------------------------------------------------------------------------
-
-
-def packed(movie: Movie) -> dict:
-    """A movie as JSON: each field (frames, particles), rows by rising id.
-
-    Raises:
-        ValueError: a movie without frames.
-    """
-    if not movie.frames:
-        raise ValueError("frames is empty, expected at least one")
-    frames, ids, every = _chosen(movie)
-    places = [_columns(frame, ids) for frame in frames]
-
-    def over_time(values: Sequence[np.ndarray]) -> dict:
-        table = np.full((len(frames), len(ids)), np.nan, np.float32)
-        for row, (rows, columns), value in zip(table, places, values):
-            row[columns] = value[rows]
-        return quantised(table)
-
-    fields = {
-        "x": over_time([frame["position"][:, 0] for frame in frames]),
-        "y": over_time([frame["position"][:, 1] for frame in frames]),
-        "radius": over_time([0.5 * np.sqrt(every) * disc_diameter(frame["volume"]) for frame in frames]),
-    }
-    for key, quantity in movie.quantities.items():
-        fields[key] = over_time([quantity.scale * frame[key] for frame in frames])
-    return {
-        "title": movie.title + (f" (one particle in {every})" if every > 1 else ""),
-        "times": [float(frame["time"]) for frame in frames],
-        "count": len(ids),
-        "ids": ids.tolist() if (ids != np.arange(len(ids))).any() else None,
-        "fields": fields,
-        "bodies": [np.round(frame["bodies"].reshape(-1), 5).tolist() if "bodies" in frame else [] for frame in frames],
-        "scene": _scene(movie.scene),
-        "axes": [label.replace("$", "") for label in axis_labels(movie.scene.half_section)],
-    }
-
-
-def _ids(frame: Mapping[str, np.ndarray]) -> np.ndarray:
-    return np.asarray(frame.get("id", np.arange(len(frame["position"])))).astype(np.int64)
-
-
-def _chosen(movie: Movie) -> tuple[list[Mapping[str, np.ndarray]], np.ndarray, int]:
-    """Frames and particles' numbers that are drawn, and of how many particles one is."""
-    ids = np.unique(np.concatenate([_ids(frame) for frame in movie.frames]))
-    every = -(-len(ids) // MOST_PARTICLES)
-    ids = ids[::every]
-    size = 2 * len(ids) * (3 + len(movie.quantities))
-    skip = max(1, int(np.ceil(len(movie.frames) * size / MOST_BYTES)))
-    return list(movie.frames)[::-1][::skip][::-1], ids, every  # counted backwards: the last frame always stays
-
-
-def _columns(frame: Mapping[str, np.ndarray], ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of a frame that are drawn, and their columns among ``ids``."""
-    numbers = _ids(frame)
-    columns = np.minimum(np.searchsorted(ids, numbers), len(ids) - 1)
-    rows = np.flatnonzero(ids[columns] == numbers)
-    return rows, columns[rows]
-
-
-def quantised(table: np.ndarray) -> dict:
-    """A field (frames, particles) in 16 bits, packed for ``readField`` in ``data.js``; NaN where a particle is absent.
-
-    Successive frames hardly differ, nor do the high bytes: differences and bytes set apart pack well.
-    """
-    present = np.isfinite(table)
-    low = float(np.min(table, where=present, initial=np.inf))
-    high = float(np.max(table, where=present, initial=-np.inf))
-    if not low <= high:
-        low = high = 0.0
-    span = high - low if high > low else 1.0
-    levels = np.where(present, np.rint((np.where(present, table, low) - low) / span * LEVELS), ABSENT).astype(np.uint16)
-    differences = np.concatenate([levels[:1], levels[1:] - levels[:-1]]).ravel()
-    apart = np.concatenate([(differences & 255).astype(np.uint8), (differences >> 8).astype(np.uint8)])
-    data = base64.b64encode(zlib.compress(apart.tobytes(), 6)).decode("ascii")
-    return {"low": low, "high": low + span, "data": data}
-
-
-def _scene(scene: Scene) -> dict:
-    """Lines behind the particles, each as x0 y0 x1 y1 [m]."""
-    cells = scene.cells
-    edges = np.unique(np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1), axis=0)
-    lines = {"boundary": scene.boundary, "outline": scene.initial_outline, "mesh": scene.points[edges]}
-    return {name: np.round(segments.reshape(-1), 5).tolist() for name, segments in lines.items()}

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .movie import Movie
+from particle_player import Movie
+
 from .options import Options
 from .report import Report, Section, name_and_unit, save_report, shown
 
@@ -60,7 +61,7 @@ def write_page(
         title=title,
         subtitle=page.subtitle or subtitle,
         facts={**(page.facts or _facts(numbers)), "computing time": f"{seconds_since_start():.3g} s"},
-        movies=[movie for movie in page.movies if movie is not None and movie.frames],
+        movies=[movie for movie in page.movies if movie is not None],
         slider=page.slider,
         curves={**dict(_histories(folder)), **curves},
         figures={path: page.captions.get(path.stem, _caption(path)) for path in _recent(folder, "*.png")},

@@ -1,15 +1,14 @@
 """Pictures of particles, background mesh and histories, ready for a paper; plane problems.
 
-Each quantity keeps its colour map and unit everywhere (`Quantity`), and one colour scale over time is found by
-`colour_limits`. Particles are drawn as discs that fit their volume, so that a picture shows how they fill space.
+Each quantity keeps its colour map and unit everywhere (`particle_player.Quantity`), and one colour scale over time is found by
+`particle_player.colour_limits`. Particles are drawn as discs that fit their volume, so that a picture shows how they fill space.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from copy import copy
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib
@@ -22,7 +21,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+
+from particle_player import Quantity, Scene, axis_labels, colour_limits, disc_diameter
+from particle_player.scene import ROUND_TICKS
 
 from .figures import save_figure
 
@@ -31,7 +32,6 @@ GREY = "#8c8c8c"
 BODY = "#1d3a5f"
 """Of rigid surfaces"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
-ROUND_TICKS = MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
 WIDTH = 6.9  # in; a page's text width
 STYLE = Path(__file__).with_name("paper.mplstyle")
 
@@ -41,27 +41,6 @@ def paper_style() -> AbstractContextManager[None]:
     return plt.style.context(STYLE)
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """What is drawn in colour.
-
-    Args:
-        name: as it stands at the colour bar.
-        unit: as shown; "-" for none.
-        scale: shown value = value in SI units times this.
-        colours: a perceptually uniform colour map of Matplotlib.
-    """
-
-    name: str
-    unit: str
-    scale: float = 1.0
-    colours: str = "viridis"
-
-    @property
-    def label(self) -> str:
-        return f"{self.name} [{self.unit}]"
-
-
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
 VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="viridis")
@@ -69,88 +48,6 @@ PORE_PRESSURE = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="vir
 WATER_PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
 POROSITY = Quantity("Porosity", "-", colours="cividis")
 SPEED = Quantity("Speed", "m/s", colours="plasma")
-
-
-AXES = "$x$ [m]", "$y$ [m]"
-HALF_SECTION_AXES = "$r$ [m] (half section, axis at the left)", "$z$ [m]"
-"""Labels of pictures in the plane of the mesh, in plane strain and of bodies of revolution"""
-
-
-def axis_labels(half_section: bool) -> tuple[str, str]:
-    """Labels of the axes of a picture of a plane body, or of the half section of an axisymmetric one."""
-    return HALF_SECTION_AXES if half_section else AXES
-
-
-@dataclass
-class Scene:
-    """The background mesh that particles are drawn in front of.
-
-    Args:
-        points: (n, 2), m.
-        cells: (m, 3) rows of ``points``.
-        is_soil: (m,) true for cells that held soil at the start; all if not given.
-        half_section: whether the body is axisymmetric, about the axis x = 0.
-    """
-
-    points: np.ndarray
-    cells: np.ndarray
-    is_soil: np.ndarray | None = None
-    half_section: bool = False
-    boundary: np.ndarray = field(init=False, repr=False)
-    initial_outline: np.ndarray = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        soil = self.cells if self.is_soil is None else self.cells[self.is_soil]
-        self.boundary = self.points[boundary_edges(self.cells)]
-        self.initial_outline = self.points[boundary_edges(soil)]
-
-    def limits(
-        self, positions: Iterable[np.ndarray], bodies: Iterable[np.ndarray] = ()
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner of the soil at the start and the given positions, with a margin.
-
-        Args:
-            positions: (n, 2), m.
-            bodies: segments of rigid surfaces (k, 2, 2), m; what lies beyond the mesh does not count.
-        """
-        ends = [segments.reshape(-1, 2) for segments in bodies]
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        inside = [points[((points >= low) & (points <= high)).all(axis=1)] for points in ends]
-        corners = [self.initial_outline.reshape(-1, 2), *positions, *inside]
-        corners = [corner for corner in corners if len(corner)]
-        lower = np.min([corner.min(axis=0) for corner in corners], axis=0)
-        upper = np.max([corner.max(axis=0) for corner in corners], axis=0)
-        margin = 0.04 * (upper - lower).max()
-        return lower - margin, upper + margin
-
-
-def boundary_edges(cells: np.ndarray) -> np.ndarray:
-    """Edges that belong to one triangle only, (k, 2) node numbers."""
-    edges = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
-    return unique[counts == 1]
-
-
-def colour_limits(quantity: Quantity, values: Iterable[np.ndarray]) -> tuple[float, float]:
-    """One colour scale for a quantity over time, in its shown unit, with round numbers at its ends.
-
-    The hundredth part of particles with the most extreme values is left out at each end, in the frame where they are
-    most extreme: in a thin sheet or at a sharp toe single particles carry values that would hide all others.
-
-    Args:
-        values: per frame, in SI units.
-    """
-    shown = [quantity.scale * frame for frame in values if len(frame)]
-    if not shown:
-        return 0.0, 1.0
-    low = min(np.percentile(frame, 1) for frame in shown)
-    high = max(np.percentile(frame, 99) for frame in shown)
-    if all(frame.min() >= 0 for frame in shown):
-        low = 0.0
-    if not high > low:
-        low, high = low - 0.5, high + 0.5
-    ticks = ROUND_TICKS.tick_values(low, high)
-    return float(ticks[0]), float(ticks[-1])
 
 
 def figure_with_bar(lower: np.ndarray, upper: np.ndarray, half_section: bool = False) -> tuple[Figure, Axes, Axes]:
@@ -182,14 +79,6 @@ def bodies_drawn(axes: Axes, segments: np.ndarray) -> LineCollection:
     lines = LineCollection(segments, colors=BODY, linewidths=1.6, capstyle="round", zorder=4)
     axes.add_collection(lines)
     return lines
-
-
-def disc_diameter(volume: np.ndarray) -> np.ndarray:
-    """Diameter of discs that cover the plane without gaps where each stands for its volume, m.
-
-    A square packing needs sqrt(2 V); the patterns inside triangles are a little looser.
-    """
-    return 1.15 * np.sqrt(2.0 * volume)
 
 
 def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) -> EllipseCollection:

@@ -1,30 +1,28 @@
 """The page of a run: one HTML file that opens without a network, with a player for the particles, curves, figures, parameters.
 
-The template and the program of the page lie in ``report_page/``; both and all data are written into the file. The numbers that
-the player shows are rounded to one part in 65,534 of their range.
+The template and the program of the page lie in ``report_page/``, the player is that of `particle_player`; all of it and all data
+are written into the file.
 """
 
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import jinja2
-import matplotlib
 import numpy as np
 from markupsafe import Markup
 
+from particle_player import Movie, parts_of_page
+from particle_player.page import as_json
+
 from .files import expendable
-from .movie import Movie, packed
 from .parameters import Parameter
-from .plots import colour_limits
 
 PAGE = Path(__file__).parent / "report_page"
-SCRIPTS = ("data.js", "view.js", "player.js", "curves.js", "main.js")
-MAPS = ("viridis", "inferno", "plasma", "cividis")
+SCRIPTS = ("curves.js", "main.js")
 UNITS = {
     "_J_per_m": "J/m", "_N_per_m": "N/m", "_kPa": "kPa", "_Pa": "Pa", "_m": "m", "_mm": "mm", "_s": "s", "_seconds": "s",
     "_degrees": "degrees",
@@ -98,8 +96,8 @@ def save_report(path: Path, report: Report) -> None:
     Raises:
         ValueError: a movie without frames.
     """
-    # "</" would end the script element that the data stand in.
-    data = json.dumps(_data(report), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    player = parts_of_page(report.movies, report.slider)
+    curves = [_curves(title, table) for title, table in report.curves.items() if _drawable(table)]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(PAGE), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -107,9 +105,10 @@ def save_report(path: Path, report: Report) -> None:
     environment.tests["numeric"] = _is_number
     text = environment.get_template("page.html").render(
         report=report,
-        style=Markup(_part("page.css")),
-        script=Markup("\n".join(map(_part, SCRIPTS))),
-        data=Markup(data),
+        player=Markup(player.html),
+        style=Markup(player.style + _part("page.css")),
+        script=Markup("\n".join([player.script, *map(_part, SCRIPTS)])),
+        data=Markup(as_json({**player.data, "curves": curves})),
     )
     with expendable(path) as aside:
         aside.write_text(text, encoding="utf-8")
@@ -140,63 +139,6 @@ def _part(name: str) -> str:
     return (PAGE / name).read_text(encoding="utf-8")
 
 
-# --- data of the player ----------------------------------------------------------------------------------------------
-
-
-def _data(report: Report) -> dict:
-    movies = report.movies
-    quantities = {key: quantity for movie in movies for key, quantity in movie.quantities.items()}
-    limits = {key: colour_limits(q, _values(movies, key)) for key, q in quantities.items()}
-    bodies = [[frame["bodies"] for frame in movie.frames if "bodies" in frame] for movie in movies]
-    corners = [
-        movie.scene.limits([frame["position"] for frame in movie.frames], segments)
-        for movie, segments in zip(movies, bodies, strict=True)
-    ]
-    return {
-        "movies": [packed(movie) for movie in movies],
-        "slider": report.slider,
-        "quantities": {k: {"name": q.name, "unit": q.unit, "colours": q.colours} for k, q in quantities.items()},
-        "first": _first(movies, limits),
-        "limits": limits,
-        "extent": [np.min([c[0] for c in corners], 0).tolist(), np.max([c[1] for c in corners], 0).tolist()]
-        if corners
-        else [],
-        "maps": {
-            name: _base64(_colours(name)) for name in dict.fromkeys([*MAPS, *(q.colours for q in quantities.values())])
-        },
-        "curves": [_curves(title, table) for title, table in report.curves.items() if _drawable(table)],
-    }
-
-
-def _first(movies: Sequence[Movie], limits: Mapping[str, tuple[float, float]]) -> str | None:
-    """The quantity shown first: one that varies in all panels, so that none is of one colour; otherwise the first there is."""
-
-    def varies(movie: Movie, key: str) -> bool:
-        if key not in movie.quantities:
-            return False
-        low, high = limits[key]
-        values = [
-            np.clip(movie.quantities[key].scale * frame[key], low, high) for frame in movie.frames if len(frame[key])
-        ]
-        span = max((v.max() for v in values), default=low) - min((v.min() for v in values), default=low)
-        return bool(span > 0.05 * (high - low))
-
-    return next((key for key in limits if all(varies(movie, key) for movie in movies)), next(iter(limits), None))
-
-
-def _values(movies: Sequence[Movie], key: str) -> list[np.ndarray]:
-    return [frame[key] for movie in movies if key in movie.quantities for frame in movie.frames]
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(data).decode("ascii")
-
-
-def _colours(name: str) -> bytes:
-    rgb = matplotlib.colormaps[name](np.arange(256) / 255.0)[:, :3]
-    return np.rint(255 * rgb).astype(np.uint8).tobytes()
-
-
 def _drawable(table: Mapping[str, np.ndarray]) -> bool:
     return len(table) > 1 and len(next(iter(table.values()))) > 1
 
@@ -221,7 +163,7 @@ def _curves(title: str, table: Mapping[str, np.ndarray]) -> dict:
 
 def _png(path: Path) -> str | None:
     """A picture as text; None where there is none."""
-    return _base64(path.read_bytes()) if path.exists() else None
+    return base64.b64encode(path.read_bytes()).decode("ascii") if path.exists() else None
 
 
 def _is_number(text: str) -> bool:

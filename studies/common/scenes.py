@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import mpm_core as mpm
-
-from .plots import Scene
+from particle_player import Scene
 
 
 def scene_of(model: mpm.Model, soil_tags: Sequence[int]) -> Scene | None:

@@ -21,7 +21,7 @@ from .animation import film_frames, save_animation
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
-from .movie import Movie, particle_frame
+from .movie import particle_frame, particle_movie
 from .options import add_count, add_number, add_switch
 from .output_options import add_picture_options
 from .page import Page
@@ -179,7 +179,7 @@ def site_slide(a: Namespace) -> int:
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     scene = scene_of(model, sorted(site.laws))
-    movies = [Movie(f"strength divided by {a.factor:g}", scene, result.frames)] if scene is not None else []
+    movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
     write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS),
                   slide_pictures(a, result, scene, folder))  # fmt: skip
     if comm.rank == 0:

@@ -16,10 +16,11 @@ from mpi4py import MPI
 from mpm_core.output import MeshOutput
 
 import fenics_bridge as bridge
+from particle_player import axis_labels, boundary_edges
 
 from .field_plots import Field, gathered
 from .figures import Pictures
-from .plots import CURVES, Quantity, axis_labels, boundary_edges, paper_style
+from .plots import CURVES, Quantity, paper_style
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")

@@ -19,10 +19,11 @@ from fenics_bridge.transfer.particle_forces import seepage_forces
 from fenics_bridge.water import Reservoir
 from fenics_bridge.water.boundary import value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
+from particle_player import Movie
 
 from .figures import Pictures
 from .interrupt import Interrupt
-from .movie import Movie
+from .movie import particle_movie
 from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, slide, slide_pictures
@@ -41,15 +42,15 @@ def add_optional_slide(parser: ArgumentParser) -> None:
     add_flag(p, "--slide", "compute the slide by particles if the slope fails")
     add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
                "begin the slide at the first factor of safety below 1, or at the lowest one")  # fmt: skip
-    add_choice(p, "--slide-water", "still", ("still", "flows"), "pore pressures of the slide stay in space as they are at failure, or "
-               "the water flows through the particles and out at their surface, by implicit steps")  # fmt: skip
+    add_choice(p, "--slide-water", "still", ("still", "flows"), "pore pressures of the slide stay in space as they are at "
+               "failure, or the water flows through the particles and out at their surface, by implicit steps")  # fmt: skip
     add_number(p, "--slide-step", 0.02, "s", "longest step of the slide where its water flows", above=0)
     add_slide_options(p, damping=0.0, pic=0.01)
 
 
 def slide_of(
     a: Namespace, slope: SlopeSite, instants: list[Instant], folder: Path
-) -> tuple[dict, list[Movie], Pictures, int]:
+) -> tuple[dict, list[Movie | None], Pictures, int]:
     """The slide of a slope that fails: entries of the summary, movies, pictures, exit code. Collective.
 
     Args:
@@ -75,18 +76,19 @@ def slide_of(
             print(f"the slide ended early: {stopped}", file=sys.stderr)
     summary = {
         "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
-        "initial_out_of_balance_ratio": max(handover.unbalanced_ratio, unbalanced), "newly_yielded_fraction": handover.yielded_fraction,
+        "initial_out_of_balance_ratio": max(handover.unbalanced_ratio, unbalanced),
+        "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
     }  # fmt: skip
-    movies = [Movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)] if scene is not None else []
+    movies = [particle_movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)]
     code = interrupt.exit_code or (1 if stopped else 0)
     return summary, movies, slide_pictures(a, result, scene, folder), code
 
 
 def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None:
-    """Fill the pores of the particles with the water of an instant, and let what stands beside the slope stand over it. Collective.
+    """Fill the pores of the particles with the water of an instant, and let what stands beside the slope stand over it.
 
-    The soil is saturated: water leaves, and may enter, at its surface without pressure.
+    Collective. The soil is saturated: water leaves, and may enter, at its surface without pressure.
     """
     model.particles.set("traction", np.zeros_like(model.particles.position))
     soils = slope.porous

@@ -33,7 +33,7 @@ class _Path:
     factor: float = 0.0
 
     def residual(self, factor):
-        """Out-of-balance forces at the increment, as a vector, and their norm over that of the load; infinite where a law fails."""
+        """Out-of-balance forces at the increment, and their norm over that of the load; infinite where a law fails."""
         failure = self.body.points.update(self.laws, self.body.kinematics.strain_increment())
         forces = self.body.kinematics.internal_forces(self.body.points.trial_stress)
         forces.array[:] = factor * self.load - forces.array

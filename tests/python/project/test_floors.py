@@ -89,7 +89,9 @@ def imported(module, path, modules):
                     yield base
 
 
-@pytest.mark.parametrize("package", ["mpm_core/python/mpm_core", "fenics_bridge", "studies/common", "talus"])
+@pytest.mark.parametrize(
+    "package", ["mpm_core/python/mpm_core", "fenics_bridge", "studies/common", "particle_player", "talus"]
+)
 def test_python_modules_import_in_no_circle(package):
     folder = ROOT / package
     modules = {}

@@ -12,7 +12,7 @@ HOOKS = (ROOT / ".pre-commit-config.yaml").read_text()
 SOURCES = [
     path for suffix in ("h", "cpp") for folder in ("mpm_core", "tests") for path in (ROOT / folder).rglob(f"*.{suffix}")
 ]
-PYTHON = ["mpm_core", "fenics_bridge", "studies", "tests", "docs"]
+PYTHON = ["mpm_core", "fenics_bridge", "particle_player", "talus", "studies", "tests", "docs"]
 
 
 def call(*command):

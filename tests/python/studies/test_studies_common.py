@@ -15,6 +15,7 @@ import pytest
 from matplotlib import colormaps
 from matplotlib.image import imread
 
+from particle_player import boundary_edges
 from studies.common import animation, interrupt, plots
 from studies.common.files import NOT_WRITTEN
 from studies.common.history import History
@@ -211,7 +212,7 @@ def scene():
 
 
 def test_boundary_edges_belong_to_one_triangle():
-    assert sorted(map(tuple, plots.boundary_edges(CELLS))) == [(0, 1), (0, 2), (1, 3), (2, 3)]
+    assert sorted(map(tuple, boundary_edges(CELLS))) == [(0, 1), (0, 2), (1, 3), (2, 3)]
 
 
 def test_colour_limits_hold_over_time_and_are_round():

@@ -6,7 +6,7 @@ import re
 import numpy as np
 from PIL import Image
 
-from studies.common.movie import Movie
+from particle_player import Movie
 from studies.common.page import TITLES
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, Scene

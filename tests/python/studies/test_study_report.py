@@ -10,7 +10,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from studies.common.movie import Movie
+from particle_player import Movie
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene
 from studies.common.report import Report, save_report

@@ -248,3 +248,21 @@ class Player {
     for (const view of this.views) view.decorate(this.find("mesh").checked, within(view, this.marked), within(view, this.pinned));
   }
 }
+
+// The player with all movies at their end; null where there are none. What goes wrong is said on the page, too.
+async function startPlayer(data) {
+  try {
+    const movies = [];
+    for (const movie of data.movies) movies.push(await readMovie(movie));
+    if (!movies.length) return null;
+    const player = new Player(data, movies);
+    player.show(player.times.at(-1));
+    return player;
+  } catch (error) {
+    const note = document.createElement("p");
+    note.className = "problem";
+    note.textContent = `The moving picture cannot be shown: ${error.message}. A browser from 2023 or later is needed.`;
+    document.querySelector("main").prepend(note);
+    throw error;
+  }
+}
