@@ -17,6 +17,8 @@ from mpm_core.petsc import (
 )
 from petsc4py import PETSc
 
+from fenics_bridge.fem.averaged_stiffness import FactoredStiffness
+
 EXACT = 1e-10
 """Relative tolerance of a single linear system."""
 
@@ -29,28 +31,33 @@ PARTS = (0.01, 0.1)
 MOST_ITERATIONS = 100
 """Krylov iterations in an iteration of Newton's method; a tangent that needs more is close to singular"""
 
+FACTORISING = ("lu", "cholesky", "telescope", "redundant")
+"""PETSc's preconditioners that factorise the matrix"""
+
 
 class LinearSolver:
     """Solution of linear systems on a space by PETSc.
 
     The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
-    `ALONE_LIMIT`, and GMRES with algebraic multigrid above; PETSc options with `options_prefix` change it, for instance
-    -elastic_ksp_type cg -elastic_pc_type gamg.
+    `ALONE_LIMIT` (for averaged strains in three dimensions up to that limit only), and GMRES with algebraic multigrid above;
+    PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
 
     Args:
         space: space of the unknowns.
         options_prefix: prefix of the PETSc options.
         newton: whether systems are those of Newton's iterations: an iterative solver need not solve the first ones well, and a
             tangent that is singular, as where all soil around a node has failed in tension, gets a part of the first matrix.
+        averaged: whether strains are averaged over nodes, which gives a matrix many entries.
     """
 
-    def __init__(self, space: Any, options_prefix: str, newton: bool = False) -> None:
+    def __init__(self, space: Any, options_prefix: str, newton: bool = False, averaged: bool = False) -> None:
         self._comm, index_map = space.mesh.comm, space.dofmap.index_map
         dim, bs = space.mesh.geometry.dim, space.dofmap.index_map_bs
         self._n_owned = index_map.size_local * bs
         displacements = bs == dim
-        direct = not displacements or index_map.size_global <= DIRECT_LIMIT[dim]
         alone = index_map.size_global <= ALONE_LIMIT[dim]
+        limit = (ALONE_LIMIT if averaged and dim == 3 else DIRECT_LIMIT)[dim]
+        direct = not displacements or index_map.size_global <= limit
         choice = direct_options(self._comm.size, alone, pivoting=not displacements)
         self._options = choice if direct else multigrid_options(dim, EXACT)
         if newton and not direct:
@@ -66,11 +73,17 @@ class LinearSolver:
         self.iterations: list[int] = []
         """Krylov iterations of each solution so far"""
 
-    def solve(self, matrix: PETSc.Mat, residual: Any, increment: fem.Function) -> str:
+    @property
+    def direct(self) -> bool:
+        """Whether systems are factorised, which needs their matrix: by default, or by the user's PETSc options."""
+        chosen = PETSc.Options(self._options_prefix).getString("pc_type", self._options["pc_type"])
+        return chosen in FACTORISING
+
+    def solve(self, matrix: PETSc.Mat | FactoredStiffness, residual: Any, increment: fem.Function) -> str:
         """Solve a linear system.
 
         Args:
-            matrix: matrix of the system; it may be changed.
+            matrix: matrix of the system, for an iterative solver perhaps in factors; it may be changed.
             residual: right-hand side, a vector (`dolfinx.la`).
             increment: function on the same space, to which the solution is written.
 
@@ -97,9 +110,10 @@ class LinearSolver:
         return failure
 
     def _solved(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> Any:
+        operators = (matrix, matrix) if isinstance(matrix, PETSc.Mat) else (matrix.operator, matrix.preconditioner)
         if self._rigid is not None:
-            matrix.setNearNullSpace(self._rigid)
-        self._ksp.setOperators(matrix)
+            operators[1].setNearNullSpace(self._rigid)
+        self._ksp.setOperators(*operators)
         with defaults(self._options_prefix, options):
             self._ksp.setFromOptions()
             failure = solved(self._ksp, right, solution)

@@ -130,10 +130,12 @@ class QuasiStatic(PointFunctions):
         """The Body that a step changes, with the present points and the given constraints. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
         parts = self.increment, self.points, constraints
+        linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True, averaged=self._nmd)
         self._kinematics: Any = (
-            AveragedKinematics(*parts, self.laws, self.geometry) if self._nmd else Kinematics(*parts, self.geometry)
+            AveragedKinematics(*parts, self.laws, self.geometry, assembled=linear.direct)
+            if self._nmd
+            else Kinematics(*parts, self.geometry)
         )
-        linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True)
         self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
 
     def reconfigure(

@@ -12,12 +12,13 @@ LOAD = bridge.Load(unit_weight=20e3)
 
 
 @pytest.mark.parametrize("limit", [0, 10**9], ids=["multigrid", "all ranks factorise"])
-def test_equilibrium_is_that_of_one_rank(comm, limit, monkeypatch):
-    alone = slope_in_space(MPI.COMM_SELF, 6)
+@pytest.mark.parametrize("nmd", [False, True], ids=["", "averaged"])
+def test_equilibrium_is_that_of_one_rank(comm, limit, nmd, monkeypatch):
+    alone = slope_in_space(MPI.COMM_SELF, 6, nmd=nmd)
     assert alone.equilibrate(LOAD, tolerance=1e-11).converged
     monkeypatch.setattr(linear_solver, "DIRECT_LIMIT", {3: limit})
-    monkeypatch.setattr(linear_solver, "ALONE_LIMIT", {3: 0})
-    model = slope_in_space(comm, 6)
+    monkeypatch.setattr(linear_solver, "ALONE_LIMIT", {3: limit if nmd else 0})
+    model = slope_in_space(comm, 6, nmd=nmd)
     assert model.equilibrate(LOAD, tolerance=1e-11).converged
     assert (max(model.linear_iterations) > 1) == (limit == 0)
     n = 200

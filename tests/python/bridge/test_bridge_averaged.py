@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem import linear_solver
 
 
 def strain_of(dim, field):
@@ -99,7 +100,7 @@ def test_forces_are_those_of_the_stress_where_soil_does_not_dilate_and_conjugate
     assert np.allclose(forces(averaged), forces(plain), rtol=0, atol=1e-12 * np.abs(forces(plain)).max())
     averaged._kinematics.follow([loam(34.0)])
     averaged.increment.x.array[:] = 1e-3 * np.random.default_rng(8).normal(size=len(averaged.increment.x.array))
-    volumes = averaged._kinematics._volumes
+    volumes = averaged._kinematics._strain.volumes
     work = np.sum(volumes[:, None] * stress * averaged._kinematics.strain_increment())
     assert forces(averaged) @ averaged.increment.x.array == pytest.approx(work, rel=1e-12)
 
@@ -112,6 +113,41 @@ def test_forces_follow_a_law_that_changes():
     assert model.equilibrate(weight, bridge.davis_strength(loam(0.0))).converged
     assert associated.equilibrate(weight).converged
     assert np.allclose(model.displacement.x.array, associated.displacement.x.array, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("dilation_angle", [0.0, 34.0])
+@pytest.mark.parametrize("dim", [2, 3, "axisymmetric"])
+def test_stiffness_in_factors_is_the_matrix_that_is_multiplied_out(dim, dilation_angle, monkeypatch):
+    """The product of both with the same vector, also with a part of another tangent added; soil that yields."""
+    products = []
+    for limit in (10**6, 0):
+        monkeypatch.setattr(linear_solver, "ALONE_LIMIT", {2: limit, 3: limit})
+        monkeypatch.setattr(linear_solver, "DIRECT_LIMIT", {2: limit, 3: limit})
+        geometry = mpm.Geometry.AXISYMMETRIC if dim == "axisymmetric" else None
+        domain, facet_tags, supports, _ = column(2 if geometry else dim)
+        model = bridge.QuasiStatic(
+            domain, loam(dilation_angle, cohesion=1.0), facet_tags, supports, degree=1, nmd=True, geometry=geometry
+        )
+        assert model._body.solver.direct == (limit > 0)
+        strain = 1e-3 * np.random.default_rng(3).normal(size=model.points.stress.shape)
+        model.points.update(model.laws, 0.0 * strain)
+        elastic = model._kinematics.stiffness().copy()
+        model.points.update(model.laws, strain)
+        assert (model.points.trial_state[:, 0] > 0).any()
+        stiffness = model._kinematics.stiffness()
+        operator = stiffness if limit else stiffness.operator
+        x, b = elastic.createVecs()
+        x.array[:] = np.random.default_rng(4).normal(size=len(x.array))
+        operator.mult(x, b)
+        products.append(np.array(b.array))
+        stiffness.axpy(0.1, elastic)
+        operator = stiffness if limit else stiffness.operator
+        x.array[model._body.constraints.dofs] = 0.0
+        operator.mult(x, b)
+        products.append(np.array(b.array))
+    assert np.allclose(products[2], products[0], rtol=0, atol=1e-12 * np.abs(products[0]).max())
+    assert np.allclose(products[3], products[1], rtol=0, atol=1e-12 * np.abs(products[1]).max())
+    assert not np.allclose(products[1], products[0], rtol=0, atol=1e-3 * np.abs(products[0]).max())
 
 
 def test_newton_converges_quadratically():

@@ -1,0 +1,126 @@
+"""Stiffness of strains that are averaged over nodes: multiplied out for direct solvers, in factors for iterative ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fenics_bridge.fem.averaged_strain import AveragedStrain, compressed, matrix
+
+
+class AssembledStiffness:
+    """The stiffness as a matrix of PETSc.
+
+    Args:
+        strain: the averaged strain.
+        held: places of the supported dofs among this rank's own ones.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(self, strain: AveragedStrain, held: NDArray[np.integer]) -> None:
+        self._strain = strain
+        self._held = (strain.plain.getOwnershipRangeColumn()[0] + held).astype(np.int32)
+        self._comm = strain.plain.comm.tompi4py()
+        size, n = strain.size, len(strain.volumes)
+        first = self._comm.scan(n) - n
+        of_normal = np.tile(np.arange(size) < strain.normal, n)[:, None] / strain.normal
+        part = matrix(self._comm, (n * size, n), np.repeat(first + np.arange(n), size)[:, None], of_normal)
+        divergence = part.copy().transpose().matMult(strain.plain)
+        divergence.scale(strain.normal)
+        change = strain.means[0].matMult(strain.means[1].matMult(divergence))
+        change.axpy(-1.0, divergence)
+        self._change = part.matMult(change)
+        self._whole = strain.plain.copy()
+        self._whole.axpy(1.0, self._change)
+        components = size * (first + np.arange(n))[:, None] + np.arange(size)
+        self._columns = np.repeat(components, size, axis=0)
+        self._tangent = matrix(self._comm, (n * size, n * size), self._columns, 1.0)
+        self._stresses: PETSc.Mat | None = None
+        self._product: PETSc.Mat | None = None
+        self._averages: NDArray[np.bool_] | None = None
+
+    def with_tangent(self, tangent: NDArray[np.float64]) -> PETSc.Mat:
+        """The matrix of a tangent (n, S, S) [Pa]. Collective."""
+        self._follow()
+        weighted = self._strain.volumes[:, None, None] * tangent
+        self._tangent.setValuesCSR(*compressed(self._columns, weighted.reshape(-1, self._strain.size)))
+        self._tangent.assemble()
+        self._stresses = self._tangent.matMult(self._whole, self._stresses)
+        product = self._transposed.matMult(self._stresses, self._product)
+        self._product, found = product, product.copy()  # the places of the first are kept for the next product
+        found.zeroRowsColumns(self._held, 1.0)
+        return found
+
+    def _follow(self) -> None:
+        """The transpose for the cells whose forces are averaged now."""
+        now = self._strain.averages_forces
+        same = self._averages is not None and np.array_equal(now, self._averages)
+        if self._comm.allreduce(same, MPI.LAND):
+            return
+        self._averages = now
+        operator, rows = self._change.copy(), self._change.createVecLeft()
+        rows.array[:] = np.repeat(now, self._strain.size)
+        operator.diagonalScale(L=rows)
+        operator.axpy(1.0, self._strain.plain)
+        # PETSc's triple product would add up what ranks send in the order in which it arrives.
+        self._transposed = operator.transpose(PETSc.Mat())
+        self._product = None
+
+
+class FactoredStiffness:
+    """The stiffness as an operator that is not multiplied out, preconditioned by the stiffness of strains without averages.
+
+    The preconditioner is stiffer, and takes some two to three times as many iterations as that of the matrix itself would.
+
+    Args:
+        strain: the averaged strain.
+        held: places of the supported dofs among this rank's own ones.
+        plain: finite elements of the same space without averages, `Kinematics`.
+        tangent: tangent of the cells (n, S, S) [Pa].
+
+    Note:
+        Collective.
+    """
+
+    def __init__(
+        self, strain: AveragedStrain, held: NDArray[np.integer], plain: Any, tangent: NDArray[np.float64]
+    ) -> None:
+        self._strain, self._held, self._plain, self._tangent = strain, held, plain, tangent
+
+    @property
+    def operator(self) -> PETSc.Mat:
+        """Matrix of PETSc that can only multiply."""
+        sizes = self._strain.plain.getSizes()[1]
+        return PETSc.Mat().createPython((sizes, sizes), self, comm=self._strain.plain.comm)
+
+    @property
+    def preconditioner(self) -> PETSc.Mat:
+        """Matrix without averages of the same tangent."""
+        return self._plain.stiffness_of(self._tangent)
+
+    def mult(self, _: PETSc.Mat, displacement: PETSc.Vec, forces: PETSc.Vec) -> None:
+        """Forces of a displacement, called by PETSc. Collective."""
+        free = np.array(displacement.array_r)
+        held = free[self._held]
+        free[self._held] = 0.0
+        stress = np.einsum("nij,nj->ni", self._tangent, self._strain.of(free))
+        forces.array[:] = self._strain.forces(stress)
+        forces.array[self._held] = held
+
+    def createVecs(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """Vectors for it, as of a matrix of PETSc."""
+        return self._strain.plain.createVecRight(), self._strain.plain.createVecRight()
+
+    def copy(self) -> FactoredStiffness:
+        """The stiffness of a copy of the tangent. Collective."""
+        return FactoredStiffness(self._strain, self._held, self._plain, self._tangent.copy())
+
+    def axpy(self, factor: float, other: FactoredStiffness, *_: Any) -> None:
+        """Add a multiple of another one, as to a matrix of PETSc."""
+        self._tangent = self._tangent + factor * other._tangent

@@ -1,0 +1,122 @@
+"""Strain of linear simplices with its volumetric part averaged over nodes, and the forces that go with it, in sparse factors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+
+class AveragedStrain:
+    """The strain of `AveragedKinematics` as an operator on displacements, and forces by its transpose.
+
+    It is B + m (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components and the means M over nodes and back
+    over cells. Multiplied out, its rows reach over two rings of cells (60 times d entries in three dimensions); B and the
+    two factors of M have 3 to 12.
+
+    Args:
+        comm: ranks of the body.
+        n_nodes: number of this rank's own nodes.
+        nodes: global numbers of the nodes of this rank's cells, (n, D + 1).
+        gradients: gradients of the shape functions [1/m], (n, D + 1, D).
+        volumes: volumes of the cells, those of one radian in an axisymmetric body, (n,).
+        radii: radii of the centroids [m] in an axisymmetric body, (n,), else None.
+        present: whether a cell is there, (n,); others take no part in the means.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        n_nodes: int,
+        nodes: NDArray[np.integer],
+        gradients: NDArray[np.float64],
+        volumes: NDArray[np.float64],
+        radii: NDArray[np.float64] | None,
+        present: NDArray[np.bool_],
+    ) -> None:
+        n, corners, dim = gradients.shape
+        self.size = 4 if dim == 2 else 6
+        """Components of strain"""
+        self.normal = dim if radii is None else 3
+        """Components that are averaged, the first ones"""
+        self.volumes = volumes
+        """Volumes of the cells (n,)"""
+        self.averages_forces = np.ones(n, dtype=bool)
+        """Whether the forces of a cell are averaged, (n,)"""
+        dofs = (dim * nodes[:, :, None] + np.arange(dim)).reshape(n, -1)
+        rows = _strain_rows(gradients, radii)
+        self.plain = matrix(comm, (n * self.size, n_nodes * dim), np.repeat(dofs, self.size, axis=0), rows)
+        """The plain strain"""
+        to_nodes = matrix(comm, (n, n_nodes), nodes, (volumes * present)[:, None]).transpose()
+        around = to_nodes.getRowSum()
+        around.reciprocal()
+        to_nodes.diagonalScale(L=around)
+        self.means = matrix(comm, (n, n_nodes), nodes, 1 / corners), to_nodes
+        """The mean over a cell's nodes, and that over the cells around a node by volume, which is taken first"""
+        # Products with PETSc's own transposes would add up what ranks send in the order in which it arrives.
+        self._means_transposed = tuple(factor.transpose(PETSc.Mat()) for factor in self.means)
+        self._plain_transposed = self.plain.transpose(PETSc.Mat())
+
+    def of(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Averaged strain of a displacement of this rank's own dofs: (n, S). Collective."""
+        strain = _product(self.plain, displacement).reshape(-1, self.size)
+        volumetric = strain[:, : self.normal].sum(axis=1)
+        mean = _product(self.means[0], _product(self.means[1], volumetric))
+        strain[:, : self.normal] += (mean - volumetric)[:, None] / self.normal
+        return strain
+
+    def forces(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces on this rank's own dofs of a stress (n, S). Collective."""
+        forces = self.volumes[:, None] * stress
+        pressure = self.averages_forces * forces[:, : self.normal].sum(axis=1) / self.normal
+        mean = _product(self._means_transposed[0], pressure)
+        forces[:, : self.normal] += (_product(self._means_transposed[1], mean) - pressure)[:, None]
+        return _product(self._plain_transposed, forces.ravel())
+
+
+def _product(operator: PETSc.Mat, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix times vector, of this rank's own entries."""
+    right, left = operator.createVecs()
+    right.array[:] = values
+    operator.mult(right, left)
+    return np.array(left.array_r)
+
+
+def _strain_rows(gradients: NDArray[np.float64], radii: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Strain operator of each cell, (m * S, (D + 1) * D): components of strain by components of nodal displacement."""
+    m, corners, dim = gradients.shape
+    pairs = [(0, 0), (1, 1), None, (0, 1)] if dim == 2 else [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
+    rows = np.zeros((m, len(pairs), corners, dim))
+    for component, pair in enumerate(pairs):
+        if pair is None:
+            continue
+        a, b = pair
+        rows[:, component, :, a] += gradients[:, :, b]
+        if a != b:
+            rows[:, component, :, b] += gradients[:, :, a]
+    if radii is not None:
+        rows[:, 2, :, 0] = 1 / (3 * radii[:, None])
+    return rows.reshape(m * len(pairs), corners * dim)
+
+
+def matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values: Any) -> Any:
+    """Sparse matrix of this rank's rows, each with k entries: global columns and values, both (rows, k)."""
+    made = PETSc.Mat().create(comm)
+    made.setSizes([(n, None) for n in local_size])
+    made.setType("aij")
+    made.setPreallocationCSR(compressed(columns, values))
+    made.assemble()
+    return made
+
+
+def compressed(columns: NDArray[np.integer], values: NDArray[np.float64]) -> tuple[Any, ...]:
+    """Compressed rows of equal length."""
+    start = np.arange(0, columns.size + 1, columns.shape[1]) if columns.size else np.zeros(len(columns) + 1)
+    values = np.broadcast_to(values, columns.shape)
+    return start.astype(np.int32), columns.ravel().astype(np.int32), np.ascontiguousarray(values).ravel()
