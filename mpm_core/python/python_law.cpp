@@ -145,11 +145,11 @@ py::object with_attributes(const py::object& law, const py::dict& changed)
   return copy;
 }
 
-/// The function that divides the strength of a Python object which names its strength; empty where it does not
-std::function<ExternalLaw(double)> weakening(const py::object& law)
+/// What a Python object says of its strength, if it names it, in the law that is made of it
+void add_strength(const py::object& law, ExternalLaw& made)
 {
   if (!py::hasattr(law, "strength_parameters"))
-    return {};
+    return;
   std::vector<std::string> names;
   std::vector<StrengthKind> kinds;
   for (const auto& [name, kind] : law.attr("strength_parameters").cast<py::dict>())
@@ -161,13 +161,18 @@ std::function<ExternalLaw(double)> weakening(const py::object& law)
   }
   check(kinds);
   if (names.empty())
-    return {};
-  return [law, names, kinds](double factor)
+    return;
+  const auto values_now = [law, names]
   {
     std::vector<double> values;
     for (const std::string& name : names)
       values.push_back(law.attr(name.c_str()).cast<double>());
-    values = reduced_values(kinds, std::move(values), factor);
+    return values;
+  };
+  made.association = associated_fraction(kinds, values_now());
+  made.weaker = [law, names, kinds, values_now](double factor)
+  {
+    const std::vector<double> values = reduced_values(kinds, values_now(), factor);
     py::dict changed;
     for (std::size_t k = 0; k < names.size(); ++k)
       changed[names[k].c_str()] = values[k];
@@ -194,14 +199,15 @@ ExternalLaw python_law(const py::object& law)
   const bool takes_increment =
       py::module_::import("inspect").attr("signature")(law.attr("update")).attr("parameters").contains("increment");
   const PythonObject object{law, states, takes_increment};
-  return {"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(),
+  ExternalLaw made{"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(),
           std::move(names),
           law.attr("p_wave_modulus").cast<double>(),
           [object](const PointBatch<2>& points) { return called(object, points); },
           [object](const PointBatch<3>& points) { return called(object, points); },
           law.ptr(),
-          {takes_increment, takes_increment},
-          weakening(law)};
+          {takes_increment, takes_increment}};
+  add_strength(law, made);
+  return made;
 }
 } // namespace
 

@@ -1,19 +1,22 @@
 #include "materials/laws/association.h"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace mpm::materials
 {
 namespace
 {
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-
 double fraction(const LinearElastic&) { return 1; }
 double fraction(const CamClay&) { return 1; }
-double fraction(const ExternalLaw&) { return unknown; }
-double fraction(const Umat&) { return unknown; }
+double fraction(const ExternalLaw& law) { return law.association; }
+
+double fraction(const Umat& law)
+{
+  const auto [kinds, values] = named_strength(law);
+  return associated_fraction(kinds, values);
+}
+
 double fraction(const MohrCoulomb& law)
 {
   constexpr double degree = std::numbers::pi / 180;

@@ -7,12 +7,12 @@
 namespace mpm::materials
 {
 /// Dilation of a law over that of associated flow, tan(psi) / tan(phi): 1 where the strength does not depend on the
-/// mean stress that the law gives, as in elastic and undrained soil; NaN for laws written in Python and UMATs, of which
-/// nothing is known.
+/// mean stress that the law gives, as in elastic and undrained soil; NaN for laws written in Python and UMATs that do not
+/// name their dilation angle.
 double associated_fraction(const Law& law);
 
 /// Whether the strength of a law depends on the mean stress that it gives, while its flow dilates less than associated
-/// flow would. False for elastic and undrained soil; true for laws written in Python and UMATs, of which nothing is
-/// known.
+/// flow would. False for elastic and undrained soil; true for laws written in Python and UMATs that do not name their
+/// dilation angle.
 bool is_non_associated(const Law& law);
 } // namespace mpm::materials

@@ -4,6 +4,7 @@
 #include "materials/tools/parameter.h"
 
 #include <functional>
+#include <limits>
 
 namespace mpm::materials
 {
@@ -24,6 +25,8 @@ struct ExternalLaw
   Needs wants = {};
   /// The law with its strength divided by a factor; empty where its strength is not known
   std::function<ExternalLaw(double)> weaker = {};
+  /// tan(psi) / tan(phi), see `associated_fraction`; NaN where it is not known
+  double association = std::numeric_limits<double>::quiet_NaN();
 
   static constexpr std::array<Parameter<ExternalLaw>, 0> parameters() { return {}; }
   static constexpr std::array parts{Part{"law", "an object with the members listed below"}};

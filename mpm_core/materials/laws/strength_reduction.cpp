@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace mpm::materials
@@ -56,6 +57,20 @@ std::vector<double> reduced_values(const std::vector<StrengthKind>& kinds, std::
       values[k] = limited(values[k], before, friction);
     }
   return values;
+}
+
+double associated_fraction(const std::vector<StrengthKind>& kinds, const std::vector<double>& values)
+{
+  double friction = 0, least = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    if (kinds[k] == StrengthKind::friction_angle)
+      friction = values[k];
+    else if (kinds[k] == StrengthKind::dilation_angle)
+    {
+      const bool less = values[k] < friction;
+      least = std::fmin(least, less ? std::tan(values[k] * degree) / std::tan(friction * degree) : 1);
+    }
+  return least;
 }
 
 MohrCoulomb reduced_strength(const MohrCoulomb& law, double factor)
@@ -111,14 +126,8 @@ Umat reduced_strength(const Umat& law, double factor)
 {
   if (law.strength.empty())
     throw UnknownStrength(law_name(law));
-  std::vector<StrengthKind> kinds;
-  std::vector<double> values;
-  for (const auto& [number, kind] : law.strength)
-  {
-    kinds.push_back(kind);
-    values.push_back(law.properties[static_cast<std::size_t>(number - 1)]);
-  }
-  values = reduced_values(kinds, std::move(values), factor);
+  const auto [kinds, before] = named_strength(law);
+  const std::vector<double> values = reduced_values(kinds, before, factor);
   Umat reduced = law;
   for (std::size_t k = 0; k < values.size(); ++k)
     reduced.properties[static_cast<std::size_t>(law.strength[k].first - 1)] = values[k];

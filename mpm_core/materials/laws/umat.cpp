@@ -167,6 +167,17 @@ std::vector<std::string> state_names(const Umat& law)
   return names;
 }
 
+std::pair<std::vector<StrengthKind>, std::vector<double>> named_strength(const Umat& law)
+{
+  std::pair<std::vector<StrengthKind>, std::vector<double>> found;
+  for (const auto& [number, kind] : law.strength)
+  {
+    found.first.push_back(kind);
+    found.second.push_back(law.properties[static_cast<std::size_t>(number - 1)]);
+  }
+  return found;
+}
+
 void check(const Umat& law)
 {
   require(law.n_variables >= 0 && law.n_variables <= max_states - 18, "n_variables", law.n_variables, "from 0 to 55");

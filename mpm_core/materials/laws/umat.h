@@ -84,6 +84,9 @@ inline double p_wave_modulus(const Umat& law) { return law.wave_modulus; }
 /// That of a Poisson's ratio of 1/4
 inline double shear_modulus(const Umat& law) { return law.wave_modulus / 3; }
 
+/// Kinds and values of the PROPS that are its strength.
+std::pair<std::vector<StrengthKind>, std::vector<double>> named_strength(const Umat& law);
+
 /// Throws InputError when a number is out of its range.
 void check(const Umat& law);
 

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from mpm_core import _core
 
 ELASTIC = {"young": 10e6, "poisson": 0.3}
 
@@ -131,6 +132,17 @@ def test_a_law_in_python_that_names_its_strength(kind, factor):
     assert (law.law.c, law.law.phi, law.law.psi) == (10.0, 30.0, 20.0)  # the law itself stays as it is
     wet = bridge.reduced_strength(mpm.Undrained(mpm.Hencky(law), porosity=0.4), factor).skeleton.law.law
     assert (wet.c, wet.phi) == (weak.c, weak.phi)
+
+
+@pytest.mark.parametrize(("phi", "psi"), [(30.0, 0.0), (30.0, 5.0), (30.0, 30.0), (30.0, 40.0), (0.0, 0.0)])
+def test_dilation_of_a_law_in_python_that_names_it_is_that_of_the_core_law(phi, psi):
+    """Over that of associated flow: on it depends how strains are averaged."""
+    native = sand(friction_angle=phi, dilation_angle=min(psi, phi))
+    found = _core.associated_fraction(mpm.PythonLaw(Frictional(phi=phi, psi=psi)))
+    assert found == pytest.approx(_core.associated_fraction(native), abs=0)
+    unknown = Frictional(phi=phi)
+    unknown.strength_parameters = {"phi": "friction angle"}
+    assert np.isnan(_core.associated_fraction(mpm.PythonLaw(unknown)))
 
 
 def test_a_law_in_python_has_the_factor_of_safety_of_the_core_law():

@@ -12,6 +12,7 @@ from law_cases import Batch, assert_tangent, random_points
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from mpm_core import _core
 
 YOUNG, POISSON, STRENGTH = 20e6, 0.3, 30e3
 NATIVE = mpm.von_mises(young=YOUNG, poisson=POISSON, yield_stress=STRENGTH)
@@ -168,6 +169,9 @@ def test_a_umat_has_its_named_properties_reduced(library):
     weak = bridge.reduced_strength(law, 2.0)
     assert weak.properties == pytest.approx([angle, angle, STRENGTH / 2], rel=1e-14)
     assert weak.strength_parameters == named and law.properties == [30.0, 20.0, STRENGTH]
+    fraction = np.tan(np.radians(20.0)) / np.tan(np.radians(30.0))  # on which depends how strains are averaged
+    assert _core.associated_fraction(law) == pytest.approx(fraction, rel=1e-14)
+    assert _core.associated_fraction(weak) == 1 and np.isnan(_core.associated_fraction(umat(library)))
 
 
 def test_a_umat_yields_at_its_reduced_strength(library):
