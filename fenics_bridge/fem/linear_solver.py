@@ -31,6 +31,9 @@ PARTS = (0.01, 0.1)
 MOST_ITERATIONS = 100
 """Krylov iterations in an iteration of Newton's method; a tangent that needs more is close to singular"""
 
+AVERAGED_LIMIT = 100
+"""Nodes in three dimensions up to which a system with averaged strains is factorised by default: its rows have many entries"""
+
 FACTORISING = ("lu", "cholesky", "telescope", "redundant")
 """PETSc's preconditioners that factorise the matrix"""
 
@@ -39,8 +42,8 @@ class LinearSolver:
     """Solution of linear systems on a space by PETSc.
 
     The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
-    `ALONE_LIMIT` (for averaged strains in three dimensions up to that limit only), and GMRES with algebraic multigrid above;
-    PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    `ALONE_LIMIT`, and GMRES with algebraic multigrid above; averaged strains in three dimensions have their limit
+    at `AVERAGED_LIMIT`. PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
 
     Args:
         space: space of the unknowns.
@@ -56,7 +59,7 @@ class LinearSolver:
         self._n_owned = index_map.size_local * bs
         displacements = bs == dim
         alone = index_map.size_global <= ALONE_LIMIT[dim]
-        limit = (ALONE_LIMIT if averaged and dim == 3 else DIRECT_LIMIT)[dim]
+        limit = AVERAGED_LIMIT if averaged and dim == 3 else DIRECT_LIMIT[dim]
         direct = not displacements or index_map.size_global <= limit
         choice = direct_options(self._comm.size, alone, pivoting=not displacements)
         self._options = choice if direct else multigrid_options(dim, EXACT)

@@ -17,7 +17,8 @@ def test_equilibrium_is_that_of_one_rank(comm, limit, nmd, monkeypatch):
     alone = slope_in_space(MPI.COMM_SELF, 6, nmd=nmd)
     assert alone.equilibrate(LOAD, tolerance=1e-11).converged
     monkeypatch.setattr(linear_solver, "DIRECT_LIMIT", {3: limit})
-    monkeypatch.setattr(linear_solver, "ALONE_LIMIT", {3: limit if nmd else 0})
+    monkeypatch.setattr(linear_solver, "ALONE_LIMIT", {3: 0})
+    monkeypatch.setattr(linear_solver, "AVERAGED_LIMIT", limit)
     model = slope_in_space(comm, 6, nmd=nmd)
     assert model.equilibrate(LOAD, tolerance=1e-11).converged
     assert (max(model.linear_iterations) > 1) == (limit == 0)
