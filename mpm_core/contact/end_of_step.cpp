@@ -123,10 +123,11 @@ RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool a
 }
 
 template <class G>
-Spring spring_of(const Particles<G::dim>& particles, Index p, double modulus, double penalty)
+Spring spring_of(const Particles<G::dim>& particles, Index p, double compression, double shear, double penalty)
 {
   const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius);
-  return {radius, area, relative_stiffness * penalty * modulus * area / (2 * radius)};
+  const double per_modulus = relative_stiffness * penalty * area / (2 * radius);
+  return {radius, area, per_modulus * compression, per_modulus * shear};
 }
 
 template <int D>
@@ -146,18 +147,19 @@ bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Sp
     touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
   const bool rough = !contact.slip.empty();
-  const double longest = contact.friction * touch.depth + contact.adhesion * spring.area / spring.stiffness;
+  const double per_depth = contact.friction * spring.stiffness / spring.shear; // of the longest slip
+  const double longest = per_depth * touch.depth + contact.adhesion * spring.area / spring.shear;
   touch.slip = rough ? old : Vector<D>{};
   if (rough)
     touch.sticks = update_slip<D>(normal, relative.motion, longest, touch.slip);
   for (int i = 0; i < D; ++i)
-    touch.force[i] = spring.stiffness * (touch.depth * normal[i] - touch.slip[i]);
+    touch.force[i] = spring.stiffness * touch.depth * normal[i] - spring.shear * touch.slip[i];
   if (!tangent)
     return true;
 
   const Matrix<D> h = curvature<D>(contact, end, place, difference_length * spring.radius);
   const double rises = 1 / (1 + std::exp(-overlap)); // d depth / d overlap
-  Matrix<D> by = combined<D>(rises, outer<D>(normal, normal), -touch.depth, h);
+  touch.stiffness = combined<D>(spring.stiffness * rises, outer<D>(normal, normal), -spring.stiffness * touch.depth, h);
   if (rough)
   {
     Vector<D> a;
@@ -172,11 +174,10 @@ bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Sp
       for (int i = 0; i < D; ++i)
         t[i] = trial[i] / length;
       const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
-      slip = combined<D>(longest / length, product<D>(across, slip), -contact.friction * rises, outer<D>(t, normal));
+      slip = combined<D>(longest / length, product<D>(across, slip), -per_depth * rises, outer<D>(t, normal));
     }
-    by = combined<D>(1, by, 1, slip);
+    touch.stiffness = combined<D>(1, touch.stiffness, spring.shear, slip);
   }
-  touch.stiffness = combined<D>(spring.stiffness, by, 0, by);
   return true;
 }
 
@@ -209,7 +210,7 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
 INSTANTIATE(2)
 INSTANTIATE(3)
 #undef INSTANTIATE
-#define INSTANTIATE(G) template Spring spring_of<G>(const Particles<G::dim>&, Index, double, double);
+#define INSTANTIATE(G) template Spring spring_of<G>(const Particles<G::dim>&, Index, double, double, double);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

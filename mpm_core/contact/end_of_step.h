@@ -28,12 +28,14 @@ struct Spring
   double radius;    ///< of the particle [m]
   double area;      ///< that it covers [m2]
   double stiffness; ///< kappa [N/m]
+  double shear;     ///< kappa_t, along the surface [N/m]
 };
 
 /// The spring of a particle.
-/// @param modulus  of its soil, compressed without lateral strain [Pa]
+/// @param compression  modulus of its soil without lateral strain [Pa]
+/// @param shear        modulus [Pa]
 template <class G>
-Spring spring_of(const Particles<G::dim>& particles, Index p, double modulus, double penalty);
+Spring spring_of(const Particles<G::dim>& particles, Index p, double compression, double shear, double penalty);
 
 /// A particle that touches a surface at the end of a step.
 template <int D>

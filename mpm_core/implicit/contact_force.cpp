@@ -35,7 +35,8 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   const AffineField<D> field = affine_field<D>(model.mesh, run.cell, nodal);
-  const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
+  const Law& law = model.laws[static_cast<std::size_t>(run.material)];
+  const double compression = p_wave_modulus(law), shear = shear_modulus(law);
   for (Index p = run.first; p < run.last; ++p)
   {
     if (bonds && !is_tied(*bonds, p))
@@ -45,7 +46,7 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
     Vector<D> u;
     for (int i = 0; i < D; ++i)
       u[i] = dt * (field.value[i] + dot<D>(field.gradient[i], xi));
-    TouchingParticle<D> found{p, {}, spring_of<G>(model.particles, p, modulus, contact.penalty)};
+    TouchingParticle<D> found{p, {}, spring_of<G>(model.particles, p, compression, shear, contact.penalty)};
     bool touches = bonds;
     if (bonds)
       found.touch = tied_at_end<D>(contact, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
@@ -173,7 +174,8 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
       reaction.area += spring.area;
       reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? spring.area : 0;
       reaction.mass += model.particles.mass[p];
-      reaction.energy += 0.5 * spring.stiffness * (touch.depth * touch.depth + dot<D>(touch.slip, touch.slip));
+      const double slips_by = contact.bond.empty() ? spring.shear : spring.stiffness;
+      reaction.energy += 0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));
     }
   }
 }
