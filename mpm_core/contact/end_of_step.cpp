@@ -108,6 +108,26 @@ Matrix<D> trial_slip_derivative(const Vector<D>& normal, const Vector<D>& a, con
   const Matrix<D> tilted = combined<D>(dot<D>(normal, a), h, 1, outer<D>(normal, product<D>(h, a))); // H is symmetric
   return combined<D>(1, moved, -1, tilted);
 }
+
+/// The derivatives of a slip that is returned to the cone, s = L t with the direction t of the trial.
+/// @param a          elastic slip at the step's start and the motion of the step
+/// @param longest    L [m]
+/// @param by_radius  dL/dr
+/// @param slip       in: derivative of the trial by the displacement; out: that of the slip
+template <int D>
+void slide(const Vector<D>& a, double longest, double by_radius, const Spring& spring, Matrix<D>& slip,
+           EndTouch<D>& touch)
+{
+  Vector<D> t = tangential<D>(a, touch.normal);
+  const double length = norm<D>(t);
+  for (int i = 0; i < D; ++i)
+  {
+    t[i] /= length;
+    touch.by_radius[i] -= spring.shear * by_radius * t[i];
+  }
+  const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
+  slip = combined<D>(longest / length, product<D>(across, slip), -by_radius, outer<D>(t, touch.normal));
+}
 } // namespace
 
 template <int D>
@@ -123,26 +143,36 @@ RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool a
 }
 
 template <class G>
-Spring spring_of(const Particles<G::dim>& particles, Index p, double compression, double shear, double penalty)
+Spring spring_of(const Particles<G::dim>& particles, Index p, const ContactModuli& moduli, double penalty)
 {
   const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius);
   const double per_modulus = relative_stiffness * penalty * area / (2 * radius);
-  return {radius, area, per_modulus * compression, per_modulus * shear};
+  return {smoothing * radius, area, per_modulus * moduli.compression, per_modulus * moduli.shear};
+}
+
+template <class G>
+EndRadius radius_at_end(const Particles<G::dim>& particles, Index p, double volumetric, const Vector<G::dim>& u)
+{
+  const double stretch = G::has_hoop ? 1 + u[0] / particles.position[0][p] : 1; // of the ring, which is volume, too
+  const double growth = (1 + volumetric) / stretch;
+  const double radius = particle_radius<G>(particles, p) * (G::dim == 3 ? std::cbrt(growth) : std::sqrt(growth));
+  return {radius, radius / (G::dim * (1 + volumetric)),
+          G::has_hoop ? -radius / (G::dim * stretch * particles.position[0][p]) : 0};
 }
 
 template <int D>
-bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
-                    const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch)
+bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, double radius,
+                    const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch)
 {
   Vector<D> place;
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
   const auto [apart, normal] = distance_at<D>(contact, end, place);
   touch.normal = normal;
-  const double onset = smoothing * spring.radius, overlap = (spring.radius - apart) / onset;
+  const double overlap = (radius - apart) / spring.onset;
   if (overlap < -farthest)
     return false;
-  touch.depth = onset * (std::max(overlap, 0.0) + std::log1p(std::exp(-std::abs(overlap))));
+  touch.depth = spring.onset * (std::max(overlap, 0.0) + std::log1p(std::exp(-std::abs(overlap))));
   for (int i = 0; i < D; ++i)
     touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
@@ -157,27 +187,20 @@ bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Sp
   if (!tangent)
     return true;
 
-  const Matrix<D> h = curvature<D>(contact, end, place, difference_length * spring.radius);
+  const Matrix<D> h = curvature<D>(contact, end, place, difference_length * radius);
   const double rises = 1 / (1 + std::exp(-overlap)); // d depth / d overlap
   touch.stiffness = combined<D>(spring.stiffness * rises, outer<D>(normal, normal), -spring.stiffness * touch.depth, h);
-  if (rough)
-  {
-    Vector<D> a;
-    for (int i = 0; i < D; ++i)
-      a[i] = old[i] + relative.motion[i];
-    Matrix<D> slip = trial_slip_derivative<D>(normal, a, relative.turn, apart, h);
-    if (!touch.sticks) // s = longest t, t the direction of the trial
-    {
-      const Vector<D> trial = tangential<D>(a, normal);
-      const double length = norm<D>(trial);
-      Vector<D> t;
-      for (int i = 0; i < D; ++i)
-        t[i] = trial[i] / length;
-      const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
-      slip = combined<D>(longest / length, product<D>(across, slip), -per_depth * rises, outer<D>(t, normal));
-    }
-    touch.stiffness = combined<D>(1, touch.stiffness, spring.shear, slip);
-  }
+  for (int i = 0; i < D; ++i)
+    touch.by_radius[i] = spring.stiffness * rises * normal[i];
+  if (!rough)
+    return true;
+  Vector<D> a;
+  for (int i = 0; i < D; ++i)
+    a[i] = old[i] + relative.motion[i];
+  Matrix<D> slip = trial_slip_derivative<D>(normal, a, relative.turn, apart, h);
+  if (!touch.sticks)
+    slide<D>(a, longest, per_depth * rises, spring, slip, touch);
+  touch.stiffness = combined<D>(1, touch.stiffness, spring.shear, slip);
   return true;
 }
 
@@ -205,12 +228,14 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
   template EndTouch<D> tied_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,         \
                                       const Vector<D>&, const Vector<D>&);                                             \
   template RigidBody<D> body_at_end(const Contact<D>&, const TimeStep&, bool);                                         \
-  template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,             \
+  template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,     \
                                   const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
 #undef INSTANTIATE
-#define INSTANTIATE(G) template Spring spring_of<G>(const Particles<G::dim>&, Index, double, double, double);
+#define INSTANTIATE(G)                                                                                                 \
+  template Spring spring_of<G>(const Particles<G::dim>&, Index, const ContactModuli&, double);                         \
+  template EndRadius radius_at_end<G>(const Particles<G::dim>&, Index, double, const Vector<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -13,8 +13,11 @@ void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, 
   {
     for (int k = 0; k <= D; ++k)
     {
-      Vector<D> force = product<D>(projector(system, mesh.cells[c][k]),
-                                   internal_force<G>(step.tangents[c].by_volumetric, mesh.shapes[c], k));
+      Vector<D> force = internal_force<G>(step.tangents[c].by_volumetric, mesh.shapes[c], k);
+      if (const CellContact<D>* at_surface = step.contact.in(c))
+        for (int i = 0; i < D; ++i)
+          force[i] += at_surface->by_volumetric[k][i];
+      force = product<D>(projector(system, mesh.cells[c][k]), force);
       for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
       {
         double* block = sum.next(mesh.cells[c][k], mesh.cells[c][l]);

@@ -30,13 +30,13 @@ Vector<D> slip_of(const std::vector<Column>* slips, Index p)
 /// The particles of a run that touch a surface when the nodes move with a velocity over a time.
 template <class G, int D = G::dim>
 void find_touching(const Model<G>& model, const Contact<D>& contact, const std::vector<Column>* slips, const Run& run,
-                   const std::vector<Column>* bonds, std::span<const Vector<D>> velocity, double dt, bool tangents,
-                   TrialContact<D>& trial)
+                   const std::vector<Column>* bonds, std::span<const Vector<D>> velocity, double dt, double volumetric,
+                   bool tangents, TrialContact<D>& trial)
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   const AffineField<D> field = affine_field<D>(model.mesh, run.cell, nodal);
   const Law& law = model.laws[static_cast<std::size_t>(run.material)];
-  const double compression = p_wave_modulus(law), shear = shear_modulus(law);
+  const ContactModuli moduli{p_wave_modulus(law), shear_modulus(law)};
   for (Index p = run.first; p < run.last; ++p)
   {
     if (bonds && !is_tied(*bonds, p))
@@ -46,15 +46,38 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
     Vector<D> u;
     for (int i = 0; i < D; ++i)
       u[i] = dt * (field.value[i] + dot<D>(field.gradient[i], xi));
-    TouchingParticle<D> found{p, {}, spring_of<G>(model.particles, p, compression, shear, contact.penalty)};
+    TouchingParticle<D> found{p,
+                              {},
+                              spring_of<G>(model.particles, p, moduli, contact.penalty),
+                              radius_at_end<G>(model.particles, p, volumetric, u)};
     bool touches = bonds;
     if (bonds)
       found.touch = tied_at_end<D>(contact, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
     else
-      touches = touches_at_end<D>(contact, trial.end, found.spring, x, u, slip_of<D>(slips, p), tangents, found.touch);
+      touches = touches_at_end<D>(contact, trial.end, found.spring, found.radius.value, x, u, slip_of<D>(slips, p),
+                                  tangents, found.touch);
     if (touches)
       trial.touching.push_back(found);
   }
+}
+
+/// Adds the stiffness of a particle to what touches in its cell.
+template <class G, int D = G::dim>
+void add_stiffness(const TouchingParticle<D>& at_surface, const std::array<double, D + 1>& weights,
+                   CellContact<D>& in_cell)
+{
+  const EndTouch<D>& touch = at_surface.touch;
+  Matrix<D> stiffness = touch.stiffness;
+  for (int i = 0; i < D; ++i)
+    stiffness[i][0] -= touch.by_radius[i] * at_surface.radius.by_motion;
+  for (std::size_t k = 0; k <= D; ++k)
+    for (int i = 0; i < D; ++i)
+    {
+      in_cell.by_volumetric[k][i] -= weights[k] * touch.by_radius[i] * at_surface.radius.by_volumetric;
+      for (std::size_t l = 0; l <= D; ++l)
+        for (int j = 0; j < D; ++j)
+          in_cell.blocks[k][l][i][j] += weights[k] * weights[l] * stiffness[i][j];
+    }
 }
 
 /// Adds the particles' forces, and their blocks, to the nodes of a cell.
@@ -70,29 +93,25 @@ void scatter(const Model<G>& model, Index cell, std::span<const TouchingParticle
         step.forces[static_cast<std::size_t>(model.mesh.cells[cell][k])][i] += weights[k] * at_surface.touch.force[i];
     if (!tangents)
       continue;
-    if (step.block_of_cell[cell] == none)
+    if (step.number_of_cell[cell] == none)
     {
-      step.block_of_cell[cell] = static_cast<Index>(step.blocks.size());
-      step.blocks.push_back({});
+      step.number_of_cell[cell] = static_cast<Index>(step.cells.size());
+      step.cells.push_back({});
     }
-    CellBlocks<D>& blocks = step.blocks[static_cast<std::size_t>(step.block_of_cell[cell])];
-    for (std::size_t k = 0; k <= D; ++k)
-      for (std::size_t l = 0; l <= D; ++l)
-        for (int i = 0; i < D; ++i)
-          for (int j = 0; j < D; ++j)
-            blocks[k][l][i][j] += weights[k] * weights[l] * at_surface.touch.stiffness[i][j];
+    add_stiffness<G>(at_surface, weights, step.cells[static_cast<std::size_t>(step.number_of_cell[cell])]);
   }
 }
 
 /// Finds what touches all surfaces when the nodes move with a velocity, and the forces at nodes.
+/// @param strains  of the cells
 template <class G, int D = G::dim>
-void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const TimeStep& time, bool at_rest,
-                   bool tangents, ContactStep<D>& step)
+void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const std::vector<CellStrain<D>>& strains,
+                   const TimeStep& time, bool at_rest, bool tangents, ContactStep<D>& step)
 {
   step.surfaces.resize(model.contacts.size());
   step.forces.assign(model.mesh.points.size(), {});
-  step.blocks.clear();
-  step.block_of_cell.assign(static_cast<std::size_t>(model.mesh.owned_cells), none);
+  step.cells.clear();
+  step.number_of_cell.assign(static_cast<std::size_t>(model.mesh.owned_cells), none);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
   {
     Contact<D>& contact = model.contacts[k];
@@ -110,7 +129,8 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const T
       if (!may_be_near<G, D>(model.mesh, run, velocity, time.dt, gap, model.particles))
         continue;
       const std::size_t before = trial.touching.size();
-      find_touching<G, D>(model, contact, slips, run, tied, velocity, time.dt, tangents, trial);
+      find_touching<G, D>(model, contact, slips, run, tied, velocity, time.dt, strains[cell].volumetric, tangents,
+                          trial);
       scatter<G, D>(model, run.cell, std::span<const TouchingParticle<D>>(trial.touching).subspan(before), tangents,
                     step);
     }
@@ -124,8 +144,8 @@ void try_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
   if (model.contacts.empty())
     step.contact = {};
   else
-    find_contacts<G, G::dim>(model, model.fields.front().velocity, {step.time, step.dt}, step.options.at_rest, tangents,
-                             step.contact);
+    find_contacts<G, G::dim>(model, model.fields.front().velocity, step.strains, {step.time, step.dt},
+                             step.options.at_rest, tangents, step.contact);
 }
 
 template <class G, int D>
@@ -141,14 +161,24 @@ void add_contact_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Tange
 {
   if (step.contact.surfaces.empty())
     return;
-  static constexpr CellBlocks<D> nothing{};
+  static constexpr CellContact<D> nothing{};
   for (Index c : step.cells) // also those where nothing touches, so that the order of entries is always the same
   {
-    const Index number = step.contact.block_of_cell[static_cast<std::size_t>(c)];
-    const CellBlocks<D>& blocks = number == none ? nothing : step.contact.blocks[static_cast<std::size_t>(number)];
-    for (std::size_t k = 0; k <= D; ++k)
-      for (std::size_t l = 0; l <= D; ++l)
-        tangent.add(mesh.cells[c][k], mesh.cells[c][l], blocks[k][l]);
+    const CellContact<D>* in_cell = step.contact.in(c);
+    const auto& [blocks, by_volumetric] = in_cell ? *in_cell : nothing;
+    for (std::size_t l = 0; l <= D; ++l)
+    {
+      const Vector<D> dilates =
+          step.options.nmd ? Vector<D>{} : dilation_gradient<G>(mesh.shapes[c], static_cast<int>(l));
+      for (std::size_t k = 0; k <= D; ++k)
+      {
+        Matrix<D> block = blocks[k][l];
+        for (int i = 0; i < D; ++i)
+          for (int j = 0; j < D; ++j)
+            block[i][j] += by_volumetric[k][i] * dilates[j];
+        tangent.add(mesh.cells[c][k], mesh.cells[c][l], block);
+      }
+    }
   }
 }
 
@@ -163,7 +193,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     auto* slips = columns_of(model.particles, contact.slip);
     for (std::size_t i = 0; slips && i < D; ++i)
       std::ranges::fill((*slips)[i], 0.0);
-    for (const auto& [p, touch, spring] : step.contact.surfaces[k].touching)
+    for (const auto& [p, touch, spring, radius] : step.contact.surfaces[k].touching)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];
@@ -175,7 +205,8 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
       reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? spring.area : 0;
       reaction.mass += model.particles.mass[p];
       const double slips_by = contact.bond.empty() ? spring.shear : spring.stiffness;
-      reaction.energy += 0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));
+      reaction.energy +=
+          0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));
     }
   }
 }

@@ -73,7 +73,12 @@ def history(name: str, value: Velocity, size: int, unit: str) -> tuple[list[floa
         if size == 1 and values.ndim == 1:
             values = values[:, None]
         return times.tolist(), floats(f"values of the {name} [{unit}]", values, (len(times), size)).tolist()
-    constant = np.asarray(value)
+    try:
+        constant = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{name} is {value!r}, expected {size} numbers [{unit}], or a pair of times [s] and as many rows of them"
+        ) from error
     return [0.0], [floats(name, constant[None] if size == 1 and constant.ndim == 0 else constant, (size,)).tolist()]
 
 

@@ -47,7 +47,8 @@ SURFACES = {
 
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("dim, geometry", [(2, None), (3, None), (2, mpm.Geometry.AXISYMMETRIC)])
-def test_the_tangent_is_the_derivative_of_the_residual(name, dim, geometry):
+@pytest.mark.parametrize("nmd", [False, True])
+def test_the_tangent_is_the_derivative_of_the_residual(name, dim, geometry, nmd):
     model, dt = soil(dim, geometry=geometry), 0.02
     surface, options = SURFACES[name][0](dim), dict(SURFACES[name][1])
     if "spin" in options and geometry:
@@ -58,7 +59,7 @@ def test_the_tangent_is_the_derivative_of_the_residual(name, dim, geometry):
         options["velocity"] = [0.0 if geometry else 0.2] * (dim - 1) + [0.5]
     model.add_contact(surface, **options)
     rng = np.random.default_rng(3)
-    step = started(model, dt)
+    step = started(model, dt, nmd=nmd)
     v = rng.normal(0.0, 0.1, step.iterate.shape).reshape(-1, dim)
     v += [0.3] * (dim - 1) + [-0.6]  # along the surface and into it
     v = v.ravel()
@@ -115,10 +116,12 @@ def compressed(bonded, n, shift):
 
 @pytest.mark.parametrize("bonded", [False, True])
 def test_plates_compress_or_pull_a_layer(bonded):
-    # They act on the middles of the particles beside them: the layer is up to a particle shorter, of which there are 10 or 20.
+    # Of 10 or 20 particles those at the plates have a spring a tenth as long as they are; tied ones lack their outer half, those
+    # that touch a quarter, as their radius is half the root of an area: 0.8 or 0.3 of a particle in all, where nothing spreads.
     errors = [compressed(bonded, n, 0.0) - 1 for n in (1, 2)]
-    assert 0 < errors[1] < 0.6 * errors[0] < 0.6 * 0.1
-    assert 0 < compressed(bonded, 2, 0.0371) - 1 < 0.05  # the layer cuts cells
+    missing = 0.8 if bonded else 0.3
+    assert 0 < errors[1] < 0.65 * errors[0] < 0.65 * missing / (10 - missing)
+    assert abs(compressed(bonded, 2, 0.0371) - 1) < missing / (20 - missing)  # the layer cuts cells
 
 
 def test_newtons_method_converges_quadratically():
@@ -131,6 +134,52 @@ def test_newtons_method_converges_quadratically():
     assert solution.converged
     last = [r for r in solution.residuals if r > 1e-12][-3:]  # until round-off
     assert last[-1] < 10 * last[-2] ** 2 < 1e3 * last[-3] ** 4
+
+
+def footing_on(law, weight, push, nmd=True):
+    """A rough footing on a bed between smooth walls and on a rough base; all of them are rigid surfaces."""
+    model = mpm.Model(box((24, 16), (3.0, 2.0)), law)
+    x = 0.0625 * (np.indices((48, 24)).reshape(2, -1).T + 0.5)
+    model.seed_points(x, np.full(len(x), 0.0625**2), density=1800.0)
+    model.add_contact(mpm.Plane((0, 0), (0, 1)), friction=0.5)
+    for place, normal in ((0.0, (1, 0)), (3.0, (-1, 0))):
+        model.add_contact(mpm.Plane((place, 0), normal))
+    model.set_gravity((0.0, -weight / 1800.0), ramp=0.5)
+    model.add_contact(
+        mpm.Box((1.0, 1.5), (2.0, 1.7)), friction=0.5, velocity=([0.0, 0.5, 0.6], [(0, 0), (0, 0), (0, -push)])
+    )
+    return list(
+        model.implicit(1.0, dt=0.1, every_steps=1, quasi_static=True, nmd=nmd, integration=mpm.Integration.MIXED)
+    )
+
+
+CLAY = mpm.tresca(young=5e6, poisson=0.49, shear_strength=10e3)
+SAND = mpm.MohrCoulomb(young=5e6, poisson=0.3, cohesion=1e3, friction_angle=30.0, dilation_angle=0.0)
+
+
+@pytest.mark.parametrize("law, weight", [(CLAY, 18e3), (CLAY, 0.0), (SAND, 18e3)])
+def test_rough_footings_on_soil_that_yields_take_few_iterations(law, weight):
+    steps = footing_on(law, weight, push=0.02)
+    pushed = [report for report in steps if report.time > 0.55]
+    assert sum(report.cuts for report in pushed) == 0 and len(pushed) == 5
+    assert all(report.iterations <= 9 for report in pushed)
+    assert steps[-1].plastic_fraction > 0.02
+
+
+def test_a_step_begins_with_the_forces_with_which_the_last_one_ended():
+    # The soil has shrunk by more than it sinks into the ground: with the radius of the last step's start it would hang there.
+    model = soil(2, size=(3, 10))
+    ground = model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)))
+    model.set_gravity((0.0, -G))
+    *_, report = model.implicit(1.0, dt=1.0, quasi_static=True)
+    weight = report.mass * G
+    assert ground.force[1] == pytest.approx(-weight, rel=1e-6)
+    step = started(model, 1.0, quasi_static=True)
+    step.iterate = np.zeros_like(step.iterate)
+    step.trial(tangents=False)
+    assert (
+        abs(np.asarray(step.residual).reshape(-1, 2).sum(axis=0)[1]) < 5e-3 * weight
+    )  # its stiffness is that of the new size
 
 
 def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
