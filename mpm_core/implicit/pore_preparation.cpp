@@ -22,6 +22,7 @@ struct PoreSums
   double volume = 0;     ///< 1
   double mobility = 0;   ///< k / gamma_w
   double compliance = 0; ///< 1 / M + n / K_w + n dS/dp, the compliance of the soil without drainage
+  double swung = 0;      ///< likewise, of soil whose mass resists too: what the pressure projection goes by
 };
 
 double longest_edge_squared(const auto& points, const auto& cell)
@@ -56,8 +57,8 @@ RuleMoments<D> shape_products(const Particles<D>& particles, Index p, const std:
 /// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
-                  double modulus, double factor, const StandingWater<D>& standing, Rules<D>& rules, PoreCell<D>& cell,
-                  PoreSums<D>& sums, std::vector<NodalWater>& nodes)
+                  double modulus, double inertia, double factor, const StandingWater<D>& standing, Rules<D>& rules,
+                  PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
 {
   const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
@@ -66,15 +67,17 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight;
-  double compliance = 1 / modulus + storage;
+  double stored = storage;
   if (dries)
-    compliance += particles.porosity[0][p] *
-                  wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
+    stored += particles.porosity[0][p] *
+              wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
+  const double compliance = 1 / modulus + stored;
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
   add_pore_load(mesh.shapes[run.cell], particles, water, standing, run.material, p, volume, cell.load);
   sums.volume += volume;
   sums.mobility += volume * mobility;
   sums.compliance += volume * compliance;
+  sums.swung += volume * (1 / (modulus + inertia * particles.mass[p] / particles.volume[p]) + stored);
   for (int k = 0; k <= D; ++k)
   {
     const Index node = mesh.cells[run.cell][k];
@@ -97,11 +100,19 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
 template <int D>
 void add_projection(const PoreSums<D>& sums, double edge_squared, double dt, PoreCell<D>& cell)
 {
-  const double margin = 1.5 * sums.compliance - 6 * dt * sums.mobility / edge_squared;
+  const double margin = 1.5 * sums.swung - 6 * dt * sums.mobility / edge_squared;
   const double factor = projection_margin * std::max(0.0, margin) / (D + 2);
   for (int k = 0; k <= D; ++k)
     for (int l = 0; l <= D; ++l)
       cell.capacity[k][l] += factor * ((k == l ? 1.0 : 0.0) - 1.0 / (D + 1));
+}
+
+/// Stiffness by which a mass resists to displacements that alternate from node to node, over its density [m2/s2]: a
+/// step of backward Euler has h^2 / (12 dt^2), h the edge of the cubes of which the cells are cut.
+template <class G, int D = G::dim>
+double inertia_per_density(double edge_squared, const ImplicitStep<G>& step)
+{
+  return step.options.quasi_static ? 0 : edge_squared / (12 * D * step.dt * step.dt);
 }
 
 /// Sums over the particles of all cells, this rank's part of those over nodes too.
@@ -119,8 +130,9 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, *model.water, run.cell);
+    const double inertia = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, factor, standing, rules,
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing, rules,
                       step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)], nodes);
   }
   for (Index c : step.cells)
