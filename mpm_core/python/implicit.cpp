@@ -131,6 +131,9 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
       .def(
           "assemble", [](I& i) { find_tangent(i.model.mesh, i.model.fields.front(), i.step, i.system, i.tangent); },
           Release())
+      .def_property_readonly(
+          "has_surface",
+          [](const I& i) { return i.step.pore.drained && i.model.water && i.model.water->may_dry(); })
       .def(
           "revise_surface", [](I& i) { return revise_surface(i.model.mesh, i.model.exchange.comm, i.step); }, Release())
       .def(

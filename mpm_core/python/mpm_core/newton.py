@@ -46,6 +46,9 @@ class System(Protocol):
 MOST_SURFACES = 30
 """Guesses of where water leaves the surface of soil that may dry, in a step"""
 
+ROUGH = 1e-2
+"""Residual at which such a guess can be judged; a solution is only wanted of the last one"""
+
 
 class NewtonReport(NamedTuple):
     """Course of an iteration.
@@ -152,13 +155,15 @@ class NewtonSolver:
         """
         if changed:
             self._tangent = None
-        o, system = self._options, _StepSystem(self, step, dt)
+        system = _StepSystem(self, step, dt)
+        tolerances = [self._options.tolerance]
+        if step.has_surface:
+            tolerances.insert(0, max(ROUGH, self._options.tolerance))
         iterations = 0
-        for _ in range(MOST_SURFACES):
-            report = newton(system, o.tolerance, o.max_iterations, o.max_halvings, min_iterations=0)
-            iterations += report.iterations
-            revised = report.converged and step.revise_surface()
-            if not revised:
+        for tolerance in tolerances:
+            report, revised, more = self._with_surface(system, step, tolerance)
+            iterations += more
+            if revised or not report.converged:
                 break
         return Solution(
             report.residuals,
@@ -168,6 +173,17 @@ class NewtonSolver:
             reason=f"where water leaves was not found in {MOST_SURFACES} guesses" if revised else report.reason,
             linear_iterations=system.linear_iterations,
         )
+
+    def _with_surface(self, system: _StepSystem, step: Any, tolerance: float) -> tuple[NewtonReport, bool, int]:
+        """Solve, with guesses of where water leaves; returns the last course, whether the guess is still wrong, and iterations."""
+        o, iterations = self._options, 0
+        for _ in range(MOST_SURFACES):
+            report = newton(system, tolerance, o.max_iterations, o.max_halvings, min_iterations=0)
+            iterations += report.iterations
+            revised = report.converged and step.has_surface and step.revise_surface()
+            if not revised:
+                break
+        return report, revised, iterations
 
     @property
     def tolerance(self) -> float:
