@@ -72,3 +72,7 @@ class ParticleBody:
     def at(self, point):
         """Displacement [m] (1, D), and pore pressure [Pa] (1,), at a point."""
         return self._steps.at([point])
+
+    def pressures(self, points):
+        """Pore pressures at points [Pa], shape (n,)."""
+        return self._steps.at(points)[1]

@@ -13,7 +13,7 @@ projection, and implicit particles with the latter's nodes, three per cell; back
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Kind, Result, run_alone
 from _particle_body import ParticleBody
 from _plots import save_comparison
 from common.consolidation_theory import (
@@ -25,6 +25,7 @@ from common.consolidation_theory import (
     strip_pressure,
 )
 from common.results import ROOT
+from dolfinx.mesh import locate_entities_boundary, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -35,7 +36,7 @@ comm = MPI.COMM_WORLD
 YOUNG, MOBILITY, LOAD = 10e6, 1e-12, 10e3  # Pa, k / gamma_w [m2/(Pa s)], Pa
 WEIGHT = 1e-3
 """Of the pore water [N/m3]: next to nothing, as in the closed forms"""
-LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+LEFT, RIGHT, BASE, TOP, STRIP = 1, 2, 3, 4, 5
 PARTICLES = "particles"
 NAMES = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1", PARTICLES: "particles"}
 
@@ -71,6 +72,11 @@ class Body:
     def plate_force(self):
         """Force on a plate on top that supports move [N/m]."""
         return self.model.reaction(TOP)[1]
+
+    def pressures(self, points):
+        """Pore pressures at points [Pa], shape (n,)."""
+        own = points if comm.rank == 0 else points[:0]
+        return comm.bcast(self.model.evaluate_at(own)["pressure"][:, 0])
 
     def drain(self, tags):
         """Let water leave at these parts of the surface, and nowhere else."""
@@ -193,6 +199,36 @@ def strip_checks(element, size, tolerance):
     return checks
 
 
+def alternation(element, cells_high):
+    """How much the pressure at once below a strip alternates from node to node of a mesh of squares cut in two.
+
+    Root mean square of p less its mean over the four neighbours, over that of p, within the width and a depth of the strip.
+    """
+    domain, _, sides = bridge.box_mesh(comm, (4.0, 4.0), (cells_high, cells_high))
+    under = locate_entities_boundary(domain, 1, lambda x: np.isclose(x[1], 4.0) & (x[0] < 1.0 + 1e-9))
+    facets = np.concatenate([sides.indices[sides.values != TOP], under]).astype(np.int32)
+    tags = np.concatenate([sides.values[sides.values != TOP], np.full(len(under), STRIP)]).astype(np.int32)
+    order = np.argsort(facets)
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    body = body_of((domain, None, meshtags(domain, 1, facets[order], tags[order])), supports, (),
+                   bridge.Load(pressure={STRIP: LOAD}), element, 0.2, 1.0)  # fmt: skip
+    body.advance(1e-7 * body.period)
+    size = 4.0 / cells_high
+    x, y = np.meshgrid(np.arange(size, 2.0, size), np.arange(4.0 - size, 2.0, -size), indexing="ij")
+    p = body.pressures(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+    around = (p[2:, 1:-1] + p[:-2, 1:-1] + p[1:-1, 2:] + p[1:-1, :-2]) / 4
+    return np.sqrt(np.mean((p[1:-1, 1:-1] - around) ** 2) / np.mean(p**2))
+
+
+def alternation_checks(cells_high):
+    found = {name: alternation(element, cells_high) for element, name in NAMES.items()}
+    return [
+        Check("strip, alternation of the pressure at once from node to node", found["P2-P1"], "the field of P2-P1", value, 0.1,
+              kind=Kind.AT_MOST, method=name)
+        for name, value in found.items() if name != "P2-P1"
+    ]  # fmt: skip
+
+
 def dip(body):
     """Settlement of the middle of the strip over that 4 m away [m], which the depth of the layer hardly changes."""
     return body.at((4.0, 0.0))[0][0, 1] - body.at((0.0, 0.0))[0][0, 1]
@@ -208,6 +244,7 @@ def run(quick: bool, folder) -> Result:
         found, balls[f"ball, ν = 0.2, {name}"] = ball_checks(element, 10 if quick else 20, 0.03 if quick else 0.02)
         checks += found
         checks += strip_checks(element, 0.1 if quick else 0.04, 0.03 if quick else 0.015)
+    checks += alternation_checks(32 if quick else 64)
     if comm.rank == 0:
         times = np.linspace(0.005, 1.0, 300)
         exact = {f"exact, slab, ν = {nu:g}": (times, np.array([mandel_pressure([0.0], t, nu)[0] for t in times]))

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from _wet_bodies import GRAVITY, PARTICLES, WATER, wet
+from _wet_bodies import GRAVITY, PARTICLES, POROSITY, WATER, wet
 from dolfinx import mesh
 from mpi4py import MPI
 from scipy.special import ellipk
@@ -25,6 +25,9 @@ from fenics_bridge import water
 comm = MPI.COMM_WORLD
 METHODS = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1", PARTICLES: "particles"}
 LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+IMPLICIT, EXPLICIT = "particles, implicit", "particles, explicit"
+RATIO = 0.5
+"""Pore pressure over the weight above it, of the slope that slides"""
 HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
 
 
@@ -106,6 +109,50 @@ def slope_checks(quick):
     return checks
 
 
+def sliding_layer(method, length, cells_high):
+    """Acceleration of a layer 1 m deep with pressures r_u γ d, in axes along and across it, in the middle of a length [m/s2].
+
+    The waves from the ends do not come there. Without dilation soil shears along the layer at τ = σ' sin φ.
+    """
+    angle = np.radians(20.0)
+    weight = WATER * np.cos(angle) ** 2 / RATIO
+    friction = np.degrees(np.arcsin(np.tan(np.radians(30.0))))
+    law = mpm.MohrCoulomb(
+        young=10e6, poisson=0.3, cohesion=0.0, friction_angle=friction, dilation_angle=0.0
+    )
+    mesh = bridge.box_mesh(comm, (length, 1.0), (int(length) * cells_high, cells_high))
+    model = mpm.Model(bridge.background_mesh(*mesh), law)
+    model.seed(density=weight / GRAVITY, per_cell=3)
+    bridge.apply_supports(model, HELD)
+    model.set_gravity((GRAVITY * np.sin(angle), -GRAVITY * np.cos(angle)))
+    model.add_water(porosity=POROSITY, conductivity=1e-4, modulus=2.2e7)
+    across = WATER * np.cos(angle)
+    model.set_pore_pressure(lambda x: across * (1 - x[:, 1]))
+    model.hold_pore_pressure(TOP, 0.0)
+    effective = (across - weight * np.cos(angle)) * (1 - model.particles.position[:, 1])
+    model.particles.set("stress", effective[:, None] * np.array([1.0, 1.0, 1.0, 0.0]))
+    end, rows = 0.003 * length, []
+    how = {"nmd": True, "every": end / 24}
+    for report in model.implicit(end, dt=end / 30, **how) if method == IMPLICIT else model.explicit(end, **how):
+        x, v = model.particles.position, model.particles.velocity
+        middle = (np.abs(x[:, 0] - 0.5 * length) < 1) & (x[:, 1] > 0.5)
+        sums = comm.allreduce(np.array([middle.sum(), v[middle, 0].sum()]))
+        rows.append((report.time, sums[1] / sums[0]))
+    times, speeds = np.array(rows)[12:].T
+    return np.polyfit(times, speeds, 1)[0]
+
+
+def acceleration_checks(quick):
+    angle, checks = np.radians(20.0), []
+    resisting = (1 - RATIO / np.cos(angle) ** 2) * np.cos(angle) * np.tan(np.radians(30.0))
+    exact = GRAVITY * (np.sin(angle) - resisting)
+    for method, cells in ((IMPLICIT, 4), (EXPLICIT, 8 if quick else 12)):
+        checks.append(Check(f"acceleration of an infinite slope of 20° that fails, r_u = {RATIO:g}", exact,
+                            "g [sin β - (1 - r_u / cos²β) cos β tan φ]", sliding_layer(method, 40.0, cells), 0.01, "m/s²",
+                            method=method))  # fmt: skip
+    return checks
+
+
 # --- 3. Water that falls over level ground -------------------------------------------------------------------------
 
 
@@ -139,6 +186,7 @@ def level_ground_checks(method, conductivity):
 def run(quick: bool, folder) -> Result:
     checks, piles = flow_checks(quick)
     checks += slope_checks(quick)
+    checks += acceleration_checks(quick)
     for method in METHODS:
         for conductivity in (1e-3, 1e-7, 1e-11):
             checks += level_ground_checks(method, conductivity)
