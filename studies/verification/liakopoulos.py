@@ -189,7 +189,8 @@ def rain_on_particles(cells):
     found = alpha * line_at(model, model.particles.pore_pressure, heights) / WATER
     exact = np.log(part + (1 - part) * np.exp(-alpha * heights))
     return [
-        Check(f"steady rain, α times the pressure head at α z = {alpha * z:g}", e, "ln(r + (1 - r) exp(-α z))", f, 0.005, method="particles")
+        Check(f"steady rain, α times the pressure head at α z = {alpha * z:g}", e, "ln(r + (1 - r) exp(-α z))", f, 0.005,
+              method="particles")
         for z, e, f in zip(heights, exact, found)
     ]  # fmt: skip
 

@@ -225,8 +225,8 @@ def test_a_bank_that_consolidates_gains_strength():
     soil = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=4e3, friction_angle=28.0)
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
     model = water.Consolidation(
-        domain, mpm.LinearElastic(young=20e6, poisson=0.3), water.PorousSoil(1e-8), facet_tags, supports, [water.SeepageFace(bridge.SLOPE)],
-        load=bridge.Load(unit_weight=20e3), element=water.Element.STABILISED,
+        domain, mpm.LinearElastic(young=20e6, poisson=0.3), water.PorousSoil(1e-8), facet_tags, supports,
+        [water.SeepageFace(bridge.SLOPE)], load=bridge.Load(unit_weight=20e3), element=water.Element.STABILISED,
     )  # fmt: skip
     factors = []
     for dt in (1.0, 1e9):

@@ -204,8 +204,8 @@ class Tight(water.Gardner):
 @pytest.mark.parametrize(
     "call, message",
     [
-        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=Rising()), "saturation goes from .*expected values that fall"),
-        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=Tight(1e-4)), "permeability goes from 1 to 0, .*more than 0"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=Rising()), "saturation goes.*expected values that"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=Tight(1e-4)), "permeability goes.*more than 0"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=[CURVE, CURVE]), "2 curves, expected one"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=3.0), r"retention is 3.0, which has no saturation\(\)"),
         (lambda m: m.rain(1e-6), "no retention curve"),
