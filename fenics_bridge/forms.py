@@ -1,4 +1,4 @@
-"""What FFCx and its C compiler say while forms are compiled: one line for the user, the rest to a logger."""
+"""What FFCx and its C compiler write while forms are compiled: one line for the user, the rest to a logger."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ class _CompilerLines(logging.Filter):
 
 
 def redirect_compiler_lines() -> None:
-    """From now on the compiler's lines go to `LOGGER`. Calls after the first change nothing."""
+    """From now on the compiler's lines go to `LOGGER`, and Python shows warnings. Calls after the first change nothing."""
     root = logging.getLogger()
     if not any(isinstance(each, _CompilerLines) for each in root.filters):
         root.addFilter(_CompilerLines())
+        logging.captureWarnings(
+            False
+        )  # FFCx, when it is imported, turns the warnings of all modules into lines of its log

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 COMPILE = """
-import logging, sys
+import logging, sys, warnings
 import fenics_bridge as bridge
 from fenics_bridge import compat
 from mpi4py import MPI
@@ -15,6 +15,7 @@ domain, _, _ = bridge.slope_mesh(MPI.COMM_SELF, height=1.0, angle=45.0, crest=1.
 compat.function_space(domain, "DG", 0)
 logging.getLogger().setLevel(logging.INFO)
 logging.info("a line of the user")
+warnings.warn("a warning of the user")
 """
 
 
@@ -27,6 +28,7 @@ def test_one_line_stands_for_the_compilers(tmp_path):
     ]  # fmt: skip
     first, second = (run.stderr.splitlines() for run in runs)
     said = f"compiling forms of finite elements; later runs find them in {tmp_path / 'cache' / 'fenics'}"
-    assert [line for line in first if "a line of the user" not in line] == [said]
-    assert said not in second and len(second) == 1 and "a line of the user" in second[0]
+    assert [line for line in first if "of the user" not in line] == [said]
+    assert said not in second and len(second) == 2 and "a line of the user" in second[0]
+    assert second[1] == "<string>:12: UserWarning: a warning of the user"  # not as a line of FFCx's log
     assert "gcc" in (tmp_path / "forms.log").read_text()
