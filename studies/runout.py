@@ -183,6 +183,7 @@ def run(
             folder / "particles",
             particle_fields=("velocity", "displacement", "volume", "id"),
             bodies=folder / "bodies",
+            background=True,
         ) as output,
         Progress("slide", a.time, comm) as progress,
     ):
@@ -196,6 +197,7 @@ def run(
                 if interrupt.requested():
                     stopped = f"interrupted at {report.time:g} s"
                     break
+            output.close()  # waits for the last frame
         except mpm.RunError as error:
             stopped = str(error)
     return history, stopped

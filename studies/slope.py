@@ -143,7 +143,13 @@ class Files:
         particles, background = (comm.bcast(numbered(folder, name, restarted)) for name in ("particles", "mesh"))
         a = case.args
         self.frames = ModelOutput(
-            self.model, particles, background, a.fields.split(","), float32=not a.float64, compression=a.compression
+            self.model,
+            particles,
+            background,
+            a.fields.split(","),
+            float32=not a.float64,
+            compression=a.compression,
+            background=True,
         )
         probes = {
             "crest": ParticleProbe(self.model, [(a.crest, a.height)]), "totals": TotalsProbe(self.model),

@@ -99,7 +99,7 @@ def follow(
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", columns, comm, keep_before=model.time if again else None) as history,
         ModelOutput(model, particles, mesh, a.fields.split(","), float32=not a.float64, compression=a.compression,
-                    bodies=bodies if model.contacts else None) as files,
+                    bodies=bodies if model.contacts else None, background=True) as files,
         Progress(a.study, until, comm) as progress,
     ):  # fmt: skip
         result = BodyRun(history)
@@ -137,6 +137,7 @@ def follow(
                         f"interrupted at {report.time:g} s; --restart {checkpoints.path} continues from there"
                     )
                     break
+            files.close()  # waits for the last frame
         except mpm.RunError as error:
             result.stopped = str(error)
         result.particle_steps_per_second = (model.report().particle_steps - steps) / (perf_counter() - start)

@@ -46,8 +46,8 @@ def test_whole_numbers_are_as_wide_as_those_of_any_rank_need(comm, shared_path):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("float32", [True, False])
-def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path, dim, float32):
+@pytest.mark.parametrize("float32, background", [(True, True), (False, False)])
+def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path, dim, float32, background):
     owners = scattered if dim == 2 else one_does_all
     counts, sizes = ((6, 4), (3.0, 2.0)) if dim == 2 else ((3, 2, 2), (3.0, 2.0, 2.0))
     mesh = spread_box(counts, sizes, comm, owners)
@@ -70,7 +70,7 @@ def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path,
         particles.write(report.time, {name: getattr(p, name) for name in ("position", *names)} | more)
         nodes.write(report.time, {name: model.nodal(name) for name in nodal})
     with ModelOutput(
-        model, shared_path / "model/particles", shared_path / "model/mesh", names, nodal, float32
+        model, shared_path / "model/particles", shared_path / "model/mesh", names, nodal, float32, background=background
     ) as output:
         output.write(more)
     for series in ("particles", "mesh"):
@@ -149,6 +149,24 @@ def test_a_model_is_written_on_after_one_of_its_files_could_not_be(comm, shared_
         np.testing.assert_allclose(times, expected)
         for time, data, _ in read:  # free fall
             assert data["velocity"][:, 1].min() == pytest.approx(-9.81 * time, rel=1e-5)
+
+
+def test_a_frame_that_fails_in_the_background_is_an_error_on_all_ranks(comm, shared_path):
+    model = small_model(comm)
+    output = ModelOutput(model, shared_path / "particles", background=True)
+    if comm.rank == 0:
+        (shared_path / "particles/000000.h5").mkdir()
+    comm.barrier()
+    output.write()
+    with pytest.raises(RunError, match="cannot write .*/particles/000000.h5: Is a directory"):
+        output.write()
+    if comm.rank == 0:
+        (shared_path / "particles/000000.h5").rmdir()
+    comm.barrier()
+    for _ in range(2):
+        output.write()
+    output.close()
+    assert (shared_path / "particles.xdmf").read_text().count("<Time ") == 2
 
 
 @pytest.mark.parametrize("compression", [1, 9])

@@ -57,7 +57,6 @@ class BodyOutput(Output):
             self._body.append(np.full(len(of_surface), number, np.int32))
             first += len(points)
         self._cells = np.concatenate(cells).astype(np.int32)
-        self._stored = (b"", "", "")  # points of the last frame, and where they and the cells are
 
     def write(self) -> None:
         """Write a frame of the surfaces as they are now, which is on disk when this returns.
@@ -74,14 +73,16 @@ class BodyOutput(Output):
             ("force", "Cell", np.array([contact.force for contact in contacts])[body]),
         )  # fmt: skip
         with self._series.frame(contacts[0].model.time) as frame:
-            before, place, topology = self._stored
+            before, place, topology = self._series.shared.get(
+                "stored", (b"", "", "")
+            )  # points; where they and the cells are
             if points.tobytes() != before:  # surfaces that rest are stored once
                 place = frame.add_data("points", *self._rows(padded(points, self._series.real)))
                 topology = topology or frame.add_data("cells", *self._rows(self._cells))
             frame.add_grid("Polyline" if dim == 2 else "Triangle", topology, len(self._cells), dim, place)
             for name, center, values in fields:
                 frame.add_field(name, center, *self._rows(values))
-        self._stored = (points.tobytes(), place, topology)
+        self._series.shared["stored"] = (points.tobytes(), place, topology)
 
     def _rows(self, values: NDArray) -> tuple[NDArray, list[int]]:
         """Those that this rank writes, and how many each does: the first one all of them."""

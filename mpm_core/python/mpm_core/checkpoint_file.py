@@ -53,11 +53,16 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
         file.add(f"cells/{name}", rows, [count[name] for count in counts])
     for name, rows in {**groups["ranks"], **{f"rows_of_{k}": np.array([n]) for k, n in own.items()}}.items():
         file.add(f"ranks/{name}", rows, [1] * comm.size)
-    file.close(durable=True)
-    on_first_rank(comm, path, lambda: _put_in_place(aside, path))
+
+    def put_in_place() -> None:
+        file.close(durable=True)
+        _rename(aside, path)
+
+    on_first_rank(comm, path, put_in_place)
 
 
-def _put_in_place(aside: str, path: str) -> None:
+def _rename(aside: str, path: str) -> None:
+    """Rename a file that is on the disk, and wait until its new name is, too."""
     try:
         os.replace(aside, path)
     except OSError:

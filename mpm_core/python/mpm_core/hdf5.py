@@ -12,13 +12,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from .collective import on_first_rank
-
 
 class RowsFile:
     """A new HDF5 file to which each rank adds its rows of arrays.
 
-    What the system refuses to write is an error of `close` only, so that no rank waits for another; the file is removed then.
+    What the system refuses to write is an error of `close` only, which the first rank calls, so that no rank waits for another;
+    the file is removed then.
 
     Args:
         path: of the file; an older one is replaced.
@@ -27,7 +26,7 @@ class RowsFile:
         checksums: protect data by checksums (Fletcher 32), and HDF5's own tables by those of its format 1.10.
 
     Note:
-        Collective, as all methods are.
+        Collective, as all methods but `close` are.
     """
 
     def __init__(self, path: str, comm: MPI.Comm, *, compression: int = 0, checksums: bool = False) -> None:
@@ -75,17 +74,14 @@ class RowsFile:
         self._h5py.h5d.create(self._file.id, name.encode(), kind, space, creation).write(all_rows, all_rows, whole)
 
     def close(self, durable: bool = False) -> None:
-        """Close the file.
+        """Close the file, on the first rank.
 
         Args:
             durable: wait until its data are on the disk.
 
         Raises:
-            RunError: on all ranks, with path and reason: the file could not be written.
+            OSError: with path and reason: the file could not be written.
         """
-        on_first_rank(self._comm, self._path, lambda: self._close(durable))
-
-    def _close(self, durable: bool) -> None:
         if self._file is not None:
             self._file.close()
             if durable:
@@ -96,7 +92,32 @@ class RowsFile:
                 with suppress(OSError):
                     os.unlink(self._path)
         if self._refusal is not None:
-            raise self._refusal
+            raise OSError(self._refusal.errno, self._refusal.strerror, self._path)
+
+
+class HeldRows:
+    """What `RowsFile` takes, gathered to the first rank, which can write it later and by another thread."""
+
+    def __init__(self, path: str, comm: MPI.Comm, compression: int) -> None:
+        self._path, self._comm, self._compression = path, comm, compression
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def add(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> None:
+        """Add an array as `RowsFile.add` does; its values must not change any more. Collective."""
+        whole = _gathered(self._comm, rows, counts)
+        if whole is not None:
+            self._arrays[name] = whole
+
+    def close(self) -> None:
+        """Write the file, on the first rank.
+
+        Raises:
+            OSError: with path and reason: the file could not be written.
+        """
+        file = RowsFile(self._path, MPI.COMM_SELF, compression=self._compression)
+        for name, whole in self._arrays.items():
+            file.add(name, whole, [len(whole)])
+        file.close()
 
 
 class _Sink(io.FileIO):

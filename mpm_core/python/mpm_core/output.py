@@ -61,7 +61,6 @@ class ParticleOutput(Output):
         self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
     ) -> None:
         super().__init__(Series(path, comm, "particles", float32, compression))
-        self._vertices: tuple[int, str] = (-1, "")  # as many as there are, and where they are stored
         self._out_of_plane = "zz"
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
@@ -83,7 +82,7 @@ class ParticleOutput(Output):
         n, before = sum(counts), sum(counts[: self._series.comm.rank])
         position = padded(arrays.pop("position"), self._series.real)
         with self._series.frame(time) as frame:
-            stored, vertices = self._vertices
+            stored, vertices = self._series.shared.get("vertices", (-1, ""))  # how many, and where they are
             if stored != n:  # they are stored again only when their number changes
                 numbers = np.arange(before, before + len(position), dtype=narrowest(n))
                 vertices = frame.add_data("vertices", numbers, counts)
@@ -93,7 +92,7 @@ class ParticleOutput(Output):
             frame.describe_field("position", "Node", 3, points)
             for name, values in arrays.items():
                 frame.add_field(name, "Node", values, counts, self._out_of_plane)
-        self._vertices = (n, vertices)
+        self._series.shared["vertices"] = (n, vertices)
 
 
 class MeshOutput(Output):
@@ -193,6 +192,8 @@ class ModelOutput:
         nodal_fields: as ``Model.nodal`` gives them.
         float32: store real numbers in single precision; in double precision if false.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
+        background: a thread of the first rank writes a frame while the next steps go on. `write` returns at once, and `close` and
+            the next `write` wait for the frame and raise its error. Until then no other thread may use HDF5, but by h5py.
 
     Raises:
         InputError: neither path is given, or a field does not exist or is not the same on all ranks.
@@ -212,6 +213,7 @@ class ModelOutput:
         float32: bool = True,
         compression: int = 0,
         bodies: str | os.PathLike[str] | None = None,
+        background: bool = False,
     ) -> None:
         if particles is None and mesh is None and bodies is None:
             raise InputError("particles, mesh and bodies are None, expected a path for one of them at least")
@@ -234,6 +236,12 @@ class ModelOutput:
             )
         if bodies is not None:
             self._outputs.append(BodyOutput(model, bodies, float32, compression))
+        if background:
+            for output in self._outputs:
+                output._series.write_in_background()
+
+    def __repr__(self) -> str:
+        return "\n  ".join(["<ModelOutput:", *map(repr, self._outputs)]) + ">"
 
     def _checked_names(self) -> dict[str, np.ndarray]:
         """The names of all fields, if these exist."""
@@ -241,7 +249,7 @@ class ModelOutput:
         return dict.fromkeys([*self._fields, *(f"nodal {name}" for name in self._nodal)], np.empty(0))
 
     def write(self, more: Mapping[str, np.ndarray] | None = None) -> None:
-        """Write a frame of the model as it is now, which is on disk when this returns.
+        """Write a frame of the model as it is now; it is on the disk when this returns, except with ``background``.
 
         Args:
             more: further fields of the particles by name, a row for each.
@@ -249,14 +257,15 @@ class ModelOutput:
         Raises:
             InputError: a further field is of another length or not numeric; or there was neither a step nor a ``Model.report``
                 since the particles were set, without which nodes have no values.
-            RunError: the frame cannot be written.
+            RunError: the frame cannot be written; with ``background``, or the one before it.
         """
+        more = {name: np.array(values) for name, values in (more or {}).items()}  # the caller may change his own
         failures = []
         for output in self._outputs:
             try:
                 if isinstance(output, ParticleOutput):
                     fields = self._model._core.copied_fields(self._fields, self._float32)
-                    output.write(self._model.time, {**fields, **(more or {})})
+                    output.write(self._model.time, {**fields, **more})
                 elif isinstance(output, BodyOutput):
                     output.write()
                 else:
@@ -272,13 +281,26 @@ class ModelOutput:
         return {name: self._start.nodal_of(model.mesh, model.nodal(name)) for name in self._nodal}
 
     def close(self) -> None:
-        """Close the files; nothing can be written after that."""
+        """Complete the files; nothing can be written after that.
+
+        Raises:
+            RunError: with path and reason: the last frame cannot be written, or the last ones not be named.
+        """
+        failures = []
         for output in self._outputs:
-            output.close()
+            try:
+                output.close()
+            except RunError as failure:
+                failures.append(failure)
+        if failures:
+            raise failures[0]
 
     def __enter__(self) -> ModelOutput:
         return self
 
     def __exit__(self, *error: Any) -> None:
-        for output in self._outputs:
-            output.__exit__(*error)
+        if error[0] is None:
+            self.close()
+        else:
+            for output in self._outputs:
+                output.__exit__(*error)

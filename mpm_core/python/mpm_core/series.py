@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError, RunError
 from .collective import check_same_path, on_first_rank
-from .hdf5 import RowsFile
+from .hdf5 import HeldRows, RowsFile
 
 _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 _TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}
@@ -34,6 +35,9 @@ class Series:
 
     The XDMF file is written aside and renamed for each frame, so that it is whole and names whole files only, whenever it is
     read or the run is killed. When it is long, several frames may share a rewriting; `close` names the last ones.
+
+    After `write_in_background` a thread of the first rank writes each frame, while the steps after it go on. The frame counts
+    when it is on the disk; before the next one is begun, all ranks wait for it.
 
     Args:
         path: without suffix, or with .h5 or .xdmf. What an earlier series left there is removed.
@@ -61,8 +65,21 @@ class Series:
         self._xdmf, self._grid, self._compression = f"{text}.xdmf", grid, int(compression)
         self._closed, self._frames = False, [""]
         self._length, self._next_rewriting, self._unnamed = 0, 0.0, 0
+        self._thread: ThreadPoolExecutor | None = None
+        self._unfinished: tuple[
+            Callable[[], object], str
+        ] | None = None  # what writes or waits for a frame, and its text
+        self.shared: dict[str, Any] = {}
+        """What frames that are on the disk have for later ones to refer to; a frame that failed had perhaps stored it"""
         check_same_path(comm, text)
         on_first_rank(comm, text, self._begin)
+
+    def __str__(self) -> str:
+        return f"{self._xdmf}, {self.n_frames} frames on the disk{', closed' if self._closed else ''}"
+
+    def write_in_background(self) -> None:
+        """Write later frames by a thread; the arrays that it is given must not change any more."""
+        self._thread = ThreadPoolExecutor(1)
 
     def _begin(self) -> None:
         self.folder.mkdir(exist_ok=True)
@@ -97,14 +114,15 @@ class Series:
 
         Raises:
             InputError: the time is not finite.
-            RunError: on all ranks, with path and reason; the series is then as before, and may go on.
+            RunError: on all ranks, with path and reason; the series is then as before, and may go on. In the background, that
+                the frame before could not be written; this one is not begun then.
         """
+        self.finish()
         if not np.isfinite(time):
             raise InputError(f"time is {time}, expected a finite number of seconds")
         head = f'<Grid Name="frame" GridType="Uniform">\n<Time Value="{float(time)!r}"/>\n{start}'
         with self._written(f"{self.n_frames:06d}", head, "</Grid>\n") as frame:
             yield frame
-        self.n_frames += 1
 
     @contextmanager
     def single(self) -> Iterator[Frame]:
@@ -119,13 +137,14 @@ class Series:
         path = self.folder / f"{name}.h5"
         if self._closed:
             raise RunError(f"cannot write {self.folder}: it is closed")
-        file = RowsFile(str(path), self.comm, compression=self._compression)
+        kind = RowsFile if self._thread is None else HeldRows
+        file = kind(str(path), self.comm, compression=self._compression)
         frame = Frame(file, f"{self.folder.name}/{name}.h5", self.real)
         yield frame
-        file.close()
         text = f"{head}{''.join(frame.text)}"
 
-        def describe() -> None:
+        def write() -> None:
+            file.close()
             start = monotonic()
             if self._length > SHORT and start < self._next_rewriting:
                 self._unnamed += 1
@@ -138,24 +157,61 @@ class Series:
                 raise
             self._next_rewriting, self._unnamed = start + (monotonic() - start) / REWRITING, 0
 
-        on_first_rank(self.comm, self._xdmf, describe)
-        if end is not None:
-            self._frames.append(text + end)
-            self._length += len(text)
+        work: Callable[[], object] = write
+        if self._thread is not None and self.comm.rank == 0:
+            work = self._thread.submit(write).result
+        self._unfinished = work, "" if end is None else text + end
+        if self._thread is None:
+            self.finish()
 
-    def close(self) -> None:
-        """Name the last frames in the XDMF file; nothing can be written after that. Without communication between ranks.
+    def finish(self) -> None:
+        """Wait until the last frame is on the disk.
 
         Raises:
-            RunError: on the first rank, with path and reason: they cannot be named. The frames themselves are on the disk.
+            RunError: on all ranks, with path and reason: it could not be written.
+        """
+        if self._unfinished is None:
+            return
+        (work, text), self._unfinished = self._unfinished, None
+        try:
+            on_first_rank(self.comm, self._xdmf, work)
+        except RunError:
+            self.shared.clear()
+            raise
+        if text:
+            self._frames.append(text)
+            self._length += len(text)
+            self.n_frames += 1
+
+    def close(self) -> None:
+        """Complete the files; nothing can be written after that. Ranks communicate only where frames are written in background.
+
+        Raises:
+            RunError: with path and reason: the last frame cannot be written, or the last ones not be named; in background on all
+                ranks, else on the first one.
         """
         self._closed = True
-        if self._unnamed:
-            self._unnamed = 0
-            try:
+        comm = MPI.COMM_SELF if self._thread is None else self.comm
+        on_first_rank(comm, self._xdmf, self._complete)
+
+    def abandon(self) -> None:
+        """Complete the files as far as possible, without communication: this rank ends with an error."""
+        self._closed = True
+        if self.comm.rank == 0:
+            with suppress(OSError):
+                self._complete()
+
+    def _complete(self) -> None:
+        """Wait for the last frame, and name those that are not named yet."""
+        (work, text), self._unfinished = self._unfinished or (None, ""), None
+        try:
+            if work is not None:
+                work()
+                self._frames.append(text)
+        finally:
+            if self._unnamed:
+                self._unnamed = 0
                 self._replace_xdmf(self._collection())
-            except OSError as error:
-                raise RunError(f"cannot write {self._xdmf}: {error.strerror}") from None
 
 
 T = TypeVar("T", bound="Output")
@@ -167,6 +223,9 @@ class Output:
     def __init__(self, series: Series) -> None:
         self._series = series
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._series}>"
+
     def close(self) -> None:
         """Complete the XDMF file; nothing can be written after that."""
         self._series.close()
@@ -177,13 +236,16 @@ class Output:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None:
+            self.close()
+        else:
+            self._series.abandon()
 
 
 class Frame:
     """A file of a series that is being written."""
 
-    def __init__(self, file: RowsFile, address: str, real: np.dtype[Any]) -> None:
+    def __init__(self, file: RowsFile | HeldRows, address: str, real: np.dtype[Any]) -> None:
         self._file, self._address, self._real = file, address, real
         self.text: list[str] = []
         """What the XDMF file says of it"""

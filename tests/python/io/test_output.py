@@ -204,6 +204,9 @@ from mpi4py import MPI
 from mpm_core.output import MeshOutput, ParticleOutput
 particles = ParticleOutput(sys.argv[1] + "/particles", MPI.COMM_WORLD)
 mesh = MeshOutput(sys.argv[1] + "/mesh", MPI.COMM_WORLD, np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
+if sys.argv[2] == "background":  # as ModelOutput does
+    particles._series.write_in_background()
+    mesh._series.write_in_background()
 for step in itertools.count():
     particles.write(step, {"position": np.full((1000, 2), step), "mass": np.full(1000, step)})
     mesh.write(step, {"mass": np.full(3, step)})
@@ -228,14 +231,15 @@ def read_all(folder):
     return counts
 
 
-def test_series_are_read_while_the_run_goes_on_and_after_a_kill(tmp_path):
-    for seed in range(4):
+@pytest.mark.parametrize("how", ["at once", "background"])
+def test_series_are_read_while_the_run_goes_on_and_after_a_kill(tmp_path, how):
+    for seed in range(4 if how == "at once" else 3):
         random = np.random.default_rng(seed)
         with subprocess.Popen(
-            [sys.executable, "-c", WRITES_FOR_EVER, tmp_path], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", WRITES_FOR_EVER, tmp_path, how], stdout=subprocess.PIPE, text=True
         ) as run:
             for line in run.stdout:
-                if line == "1\n":
+                if line == ("1\n" if how == "at once" else "2\n"):
                     break
             first, _ = read_all(tmp_path)
             time.sleep(0.3 * random.random())
