@@ -75,6 +75,9 @@ class PointSearch:
             )
         agree(self._comm, message)
 
+    def __repr__(self) -> str:
+        return f"<PointSearch: {len(self.points)} points of this rank, {len(self._cells)} points found in its cells>"
+
     def values(self, function: fem.Function) -> NDArray[np.float64]:
         """Values of a function at the points.
 

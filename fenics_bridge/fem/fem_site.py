@@ -60,6 +60,9 @@ class FemSite:
         switch_off(fem)
         self._every = set(known_tags(comm, fem.cell_tags))
 
+    def __repr__(self) -> str:
+        return f"<FemSite: after stage {self.number}; {self.fem!r}>"
+
     def carry_out(self, stage: Stage) -> StageReport:
         """Bring the body to equilibrium after a stage's changes.
 

@@ -23,6 +23,7 @@ from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
 from fenics_bridge.transfer.border import Facets, facets_of_mesh, facets_of_space, measure, sides_of
 from fenics_bridge.transfer.mortar import interpolated, overlap, projection
 from fenics_bridge.types import MeshTags
+from fenics_bridge.views import body_text
 
 
 class Border(NamedTuple):
@@ -86,7 +87,13 @@ class FarField:
         domain.topology.create_connectivity(domain.topology.dim - 1, domain.topology.dim)
         blocks = fem.locate_dofs_topological(self._space, domain.topology.dim - 1, on_border)
         held = Constraints(self._space, facet_tags, supports)
+        self._ground = f"linear elastic, E = {young:g} Pa, nu = {poisson:g}, density {density:g} kg/m3"
+        self._degree = degree
         self._condense(blocks, held, float(young), float(poisson), float(density), options_prefix)
+
+    def __repr__(self) -> str:
+        border = f"border of {len(self.nodes)} nodes with {len(self.stiffness)} degrees of freedom"
+        return body_text("FarField", self._domain, f"displacement of degree {self._degree}", self._ground, border)
 
     def _condense(
         self,

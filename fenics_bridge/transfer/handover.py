@@ -23,7 +23,7 @@ _BALANCED, _MOST_STEPS = 5e-4, 60
 """Out-of-balance ratio to reach, and largest number of steps: near collapse each one leaves a fraction of it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Handover:
     """Result of a hand-over; sums are over all ranks."""
 
@@ -35,6 +35,13 @@ class Handover:
     """Fraction of the particles whose stress had to be returned to the yield surface [-]"""
     yielded_fraction: float
     """Fraction of the particles that yielded in the equilibration where the finite elements did not [-]"""
+
+    def __repr__(self) -> str:
+        after = "" if self.equilibrated_ratio is None else f", {self.equilibrated_ratio:.2g} after the equilibration"
+        return (
+            f"<Handover: out-of-balance ratio {self.unbalanced_ratio:.2g}{after}; {self.returned_fraction:.2%} of the particles "
+            f"returned to the yield surface, {self.yielded_fraction:.2%} newly yielded>"
+        )
 
     settled_ratio = renamed("settled_ratio", "equilibrated_ratio")
     returned_share = renamed("returned_share", "returned_fraction")

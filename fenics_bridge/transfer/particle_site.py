@@ -71,6 +71,9 @@ class ParticleSite:
         model.set_gravity([0.0] * (mesh.dim - 1) + [-gravity])
         apply_supports(model, self.state.supports)
 
+    def __repr__(self) -> str:
+        return f"<ParticleSite: after stage {self.number}; {self.model!r}>"
+
     def carry_out(self, stage: Stage) -> StageReport:
         """Bring the particles to equilibrium after a stage's changes.
 

@@ -202,6 +202,12 @@ one counts as a failure.)",
 void bind_declaration(py::module_& m)
 {
   py::class_<Declaration>(m, "LawParameter", "A parameter of a law, as the law declares it.")
+      .def("__repr__",
+           [](py::object p)
+           {
+             return py::str("<LawParameter: {} [{}], {}, {}>")
+                 .format(p.attr("name"), p.attr("unit"), p.attr("meaning"), p.attr("range"));
+           })
       .def_readonly("name", &Declaration::name)
       .def_readonly("unit", &Declaration::unit, "\"-\" without unit; None for a part that is no real number")
       .def_readonly("meaning", &Declaration::meaning)

@@ -35,6 +35,11 @@ class RigidContact:
         self._number = number
         self._outline: Outline | None = None  # at the start
 
+    def __repr__(self) -> str:
+        entry = self.model._contacts[self._number]
+        how = "tied" if entry["bonded"] else f"friction {entry['friction']:g}, adhesion {entry['adhesion']:g} Pa"
+        return f"<RigidContact {self._number}: {surface_of(self.model, entry['surface'])!r}, {how}>"
+
     def _state(self) -> dict[str, Any]:
         return _core.contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
 

@@ -47,6 +47,9 @@ class ElementTest:
         """Strain since the start, engineering shear, shape (S,)"""
         self._last = np.zeros_like(self.stress)
 
+    def __repr__(self) -> str:
+        return f"<ElementTest: t = {self.time:g} s, stress {self.stress} Pa, strain {self.strain}\n  {self.law!r}>"
+
     def step(self, strain_increment: ArrayLike, stress: ArrayLike | None = None, dt: float = np.inf) -> None:
         """Drive the point by one increment, by Newton's method with the law's tangent.
 

@@ -30,6 +30,13 @@ class FieldContact:
         self.model = model
         self._number = number
 
+    def __repr__(self) -> str:
+        entry = self.model._field_contacts[self._number]
+        return (
+            f"<FieldContact {self._number}: of velocity fields {entry['first']} and {entry['second']}, friction "
+            f"{entry['friction']:g}, adhesion {entry['adhesion']:g} Pa>"
+        )
+
     def _state(self) -> dict[str, Any]:
         return _core.field_contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
 

@@ -143,6 +143,11 @@ class RandomField:
         self._wave = draw((waves, len(scale))) * (np.sqrt(2) if correlation == "gaussian" else 1.0) / scale
         self._phase = random.uniform(0.0, 2 * np.pi, waves)
 
+    def __repr__(self) -> str:
+        kind = "lognormal" if self.lognormal else "normal"
+        spread = f"mean {self.mean:g}, standard deviation {self.deviation:g}"
+        return f"<RandomField: {kind}, {spread}, sum of {len(self._phase)} waves>"
+
     def __call__(self, position: ArrayLike) -> NDArray[np.float64]:
         """Values at positions [m], shape (n, D): shape (n,)."""
         x = floats("position", position, (None, self._wave.shape[1]))

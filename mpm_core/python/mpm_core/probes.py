@@ -106,6 +106,9 @@ class ParticleProbe:
         self._columns = _vectors(dim, ("position", "m"), ("displacement", "m"), ("velocity", "m/s"))
         self._columns += _components("stress", "Pa", STRESSES[dim])
 
+    def __repr__(self) -> str:
+        return f"<ParticleProbe: particles {', '.join(map(str, self.ids))}; {', '.join(self._columns)}>"
+
     def values(self) -> dict[str, float]:
         """Numbers by name; NaN for a particle that left through an outflow boundary."""
         p = self.model.particles
@@ -145,6 +148,9 @@ class PointProbe:
             *_vectors(dim, ("velocity", "m/s")),
             *_components("stress", "Pa", STRESSES[dim]),
         ]
+
+    def __repr__(self) -> str:
+        return f"<PointProbe: at {', '.join(map(str, self._points))} m; {', '.join(self._columns)}>"
 
     def _own_cells(self) -> NDArray[np.int32]:
         mesh = self.model.mesh
@@ -198,6 +204,10 @@ class SectionProbe:
         self._box = None if box is None else np.sort(floats("box", box, (2, dim)), axis=0)
         self._mesh: Mesh | None = None  # whose cells are known to be cut or not
 
+    def __repr__(self) -> str:
+        box = "" if self._box is None else f", within {self._box[0]} to {self._box[1]} m"
+        return f"<SectionProbe: plane through {self._point} m with the normal {self._normal}{box}>"
+
     def _cut(self, mesh: Mesh) -> None:
         """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition."""
         corners = mesh.points[mesh.cells[: mesh.owned_cells]]
@@ -239,6 +249,9 @@ class TotalsProbe:
     def __init__(self, model: Model) -> None:
         self.model = model
 
+    def __repr__(self) -> str:
+        return f"<TotalsProbe: sums over all particles, t = {self.model.time:g} s>"
+
     def values(self) -> dict[str, float]:
         """Numbers by name; see `Report`."""
         report, dim = self.model.report(), self.model.mesh.dim
@@ -272,6 +285,9 @@ class ProbeFile:
         self._probe = probe
         before = probe.model.time if keep else None
         self._file = RowFile(path, list(probe.values()), probe.model.comm, keep_before=before)
+
+    def __repr__(self) -> str:
+        return f"<ProbeFile: {self._file.path}, of {self._probe!r}>"
 
     def record(self) -> None:
         """Read the probe, and add a row. Collective.

@@ -46,6 +46,9 @@ class RowFile:
         """Rows that were kept, as texts; on the first rank"""
         collectively(comm, self._on_first(lambda: self._begin(list(columns), keep_before)))
 
+    def __repr__(self) -> str:
+        return f"<RowFile: {self.path}>"
+
     def _on_first(self, work: Callable[[], None]) -> Callable[[], None]:
         return work if self._comm.rank == 0 else lambda: None
 

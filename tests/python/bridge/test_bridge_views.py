@@ -1,5 +1,9 @@
 """How a notebook shows finite elements and their results: in a line or two, with sizes and units."""
 
+import inspect
+
+import mpm_core.output
+import mpm_core.probes
 import numpy as np
 from mpi4py import MPI
 
@@ -54,3 +58,33 @@ def test_seepage_and_consolidation_show_their_time():
     report = consolidation.advance(60.0)
     assert repr(report) == f"<ConsolidationReport: t = 60 s, step of 60 s, {report.iterations} iterations>"
     assert np.isfinite(report.residuals).all()
+
+
+def test_a_hand_over_and_far_ground_show_ratios_and_sizes():
+    body, cells, facets = slope()
+    fem = bridge.QuasiStatic(body, SOIL, facets, SUPPORTS, degree=1)
+    fem.solve(bridge.Load(unit_weight=20e3))
+    model = mpm.Model(bridge.background_mesh(body, cells, facets), SOIL)
+    model.seed(density=20e3 / 9.81, per_cell=3)
+    model.roller(bridge.LEFT, normal=(1, 0))
+    model.fix(bridge.BASE)
+    model.set_gravity((0.0, -9.81))
+    found = bridge.initialise(model, fem)
+    assert repr(found).startswith(f"<Handover: out-of-balance ratio {found.unbalanced_ratio:.2g}, ")
+    assert f"{found.yielded_fraction:.2%} newly yielded>" in repr(found)
+    far = bridge.FarField(
+        body, facets, border=bridge.LEFT, supports=[bridge.fixed(bridge.BASE)], young=1e9, poisson=0.3
+    )
+    assert "triangles, displacement of degree 2, linear elastic, E = 1e+09 Pa" in repr(far)
+    assert f"border of {len(far.nodes)} nodes with {len(far.stiffness)} degrees of freedom" in repr(far)
+
+
+def test_every_public_class_says_what_it_is():
+    default = []
+    for module in (mpm, mpm_core.output, mpm_core.probes, bridge, water):
+        for name, one in inspect.getmembers(module, inspect.isclass):
+            shown = getattr(one.__repr__, "__qualname__", "")
+            own = one.__module__.startswith(("mpm_core", "fenics_bridge")) and not issubclass(one, BaseException)
+            if own and not name.startswith("_") and shown.startswith(("object.", "pybind11_object.")):
+                default.append(name)
+    assert sorted(set(default) - {"Series", "Probe"}) == []  # the inside of an output, and a protocol
