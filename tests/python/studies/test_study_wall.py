@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
+sys.path[:0] = [str(STUDIES), str(STUDIES / "verification")]
 
+from _log_spiral import log_spiral  # noqa: E402
 from common.earth_pressure import coulomb, stress_field, wall_acceleration  # noqa: E402
 
 ANGLES = [np.radians(angles) for angles in ((25.0, 0.0), (30.0, 20.0), (35.0, 10.0))]
@@ -41,6 +42,16 @@ def test_stresses_and_wedge_bound_the_pressure(phi, delta, passive):
         assert (field, wedge) == pytest.approx((rankine, rankine), rel=1e-12)
     else:
         assert field < wedge if passive else wedge < field < rankine
+
+
+@pytest.mark.parametrize("phi, delta", ANGLES)
+def test_a_log_spiral_is_the_closer_upper_bound(phi, delta):
+    field, wedge = (bound(phi, delta, passive=True) for bound in (stress_field, coulomb))
+    spiral = log_spiral(phi, delta)
+    if delta == 0:  # a plane is a spiral about a pole far away, which a search does not quite reach
+        assert field * (1 - 1e-4) < spiral < 1.005 * field
+    else:
+        assert field < spiral < wedge
 
 
 @pytest.mark.parametrize("phi, delta", ANGLES)
