@@ -1,13 +1,16 @@
-"""A rigid sphere pressed on an elastic half space: force and contact radius of Hertz (1882).
+"""A rigid sphere pressed on an elastic half space: force, contact radius and pressure of Hertz (1882).
 
 The sphere of radius R is a contact body, the half space a half section of 40 contact radii that is finest where they touch.
 For an indentation d the contact radius is a = sqrt(R d), and the force F = 4/3 E* sqrt(R) d^1.5 with E* = E / (1 - nu^2).
 The ground that is missing beyond 40 a takes 1 to 2 % more force; the springs of contact, which let particles sink in by
 a part of the pressure over the stiffness of a cell, take about as much less.
+
+The pressure p_0 sqrt(1 - (r / a)^2), p_0 = 2 E* a / (pi R), is that of implicit steps with a hundredth of the indentation,
+since Hertz' strains are small. Particles that share nodes share the force on these, so that the pressure is a mean over rings.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Kind, Result, run_alone
 from _plots import save_comparison
 from mpi4py import MPI
 from mpm_core.surfaces import distances
@@ -16,6 +19,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 RADIUS, INDENTATION, YOUNG, POISSON, DENSITY = 1.0, 0.01, 1e7, 0.3, 1000.0  # m, m, Pa, -, kg/m3
+SLIGHT, PENALTY, RINGS = 1e-4, 0.2, 6
+"""Indentation [m], beta and rings of the implicit steps"""
 HERTZ = "Hertz 1882"
 AXIS, FAR, BASE = 1, 2, 3
 
@@ -29,9 +34,8 @@ def force(indentation):
     return 4 / 3 * YOUNG / (1 - POISSON**2) * np.sqrt(RADIUS) * indentation**1.5
 
 
-def graded(cells):
+def graded(cells, a):
     """Coordinates from 0 outwards: even over two contact radii, then growing up to 40 of them."""
-    a = contact_radius(INDENTATION)
     size = a / cells
     steps = [size] * (2 * cells)
     while sum(steps) < 40 * a:
@@ -39,9 +43,9 @@ def graded(cells):
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def half_space(cells):
+def half_space(cells, indentation):
     """The ground under two rows of empty cells, with four particles in a square; each rank has all of it."""
-    x = graded(cells)
+    x = graded(cells, contact_radius(indentation))
     y = np.concatenate([-x[:0:-1], x[:3]])
     counts = [len(x) - 1, len(y) - 1]
     box = bridge.background_mesh(*bridge.box_mesh(MPI.COMM_SELF, np.array(counts, dtype=float), counts))
@@ -70,7 +74,7 @@ def halves(nodes):
 
 def pressed(cells):
     """Indentations, forces [N], and the contact radius in the end."""
-    model = half_space(cells)
+    model = half_space(cells, INDENTATION)
     wave = np.sqrt(model.laws[0].p_wave_modulus / DENSITY)
     until = 20 * 40 * contact_radius(INDENTATION) / wave
     speed = INDENTATION / (0.9 * until)  # it begins slowly, and rests in the end
@@ -91,6 +95,27 @@ def pressed(cells):
     return way[1:], 2 * np.pi * np.diff(impulse) / np.diff(time), radius
 
 
+def pressure(cells):
+    """Radii of rings over that of the contact, mean pressures over p_0, those of Hertz, and the force over his."""
+    model = half_space(cells, SLIGHT)
+    ball = model.add_contact(mpm.Disc((0.0, RADIUS + 1e-9), RADIUS), velocity=(0.0, -SLIGHT), penalty=PENALTY)
+    model.implicit(1.0, dt=0.1, quasi_static=True, integration=mpm.Integration.MIXED).last()
+    particles, a = model.particles, contact_radius(SLIGHT)
+    r = particles.position[:, 0]
+    size = np.sqrt(particles.volume / r)
+    sphere = mpm.Disc((0.0, RADIUS + 1e-9 - SLIGHT), RADIUS)
+    depth = np.maximum(0.5 * size - distances(sphere, particles.position), 0.0)
+    load = 2 * np.pi * r * 50 * PENALTY * model.laws[0].p_wave_modulus * depth  # of a particle's spring, all around
+    touching = np.flatnonzero(depth)
+    order = touching[np.argsort(r[touching])]
+    rings = np.linspace(0, 1, RINGS + 1)
+    within = np.interp(rings * a, np.r_[0.0, (r + 0.5 * size)[order]], np.r_[0.0, np.cumsum(load[order])])
+    area = np.pi * a**2 * np.diff(rings**2)
+    greatest = 2 * YOUNG / (1 - POISSON**2) * a / (np.pi * RADIUS)
+    hertz = -np.diff((1 - rings**2) ** 1.5) * force(SLIGHT) / (area * greatest)
+    return rings, np.diff(within) / area / greatest, hertz, 2 * np.pi * ball.force[1] / force(SLIGHT)
+
+
 def run(quick: bool, folder) -> Result:
     # --- 1. The sphere -----------------------------------------------------------------------------------------------
     cells = 6 if quick else 12  # in a contact radius
@@ -104,13 +129,29 @@ def run(quick: bool, folder) -> Result:
     slope = np.log(load[-1] / load[half]) / np.log(way[-1] / way[half])
     checks.append(Check("exponent of the indentation in the force", 1.5, HERTZ, slope, tolerance))
 
-    # --- 2. Picture --------------------------------------------------------------------------------------------------
+    rings, found, hertz, load_ratio = pressure(max(cells, 8))
+    spread = float(np.sqrt(np.mean((found - hertz) ** 2)))
+    checks.append(Check("force, implicit steps", force(SLIGHT), HERTZ, load_ratio * force(SLIGHT), tolerance, unit="N"))
+    checks.append(
+        Check("pressure at the centre over p_0, mean within a/6", hertz[0], HERTZ, found[0], 0.2 if quick else 0.05)
+    )
+    checks.append(Check("root mean square error of the pressure in six rings, over p_0", 0.0, HERTZ, spread,
+                        0.15 if quick else 0.05, scale=1.0, kind=Kind.AT_MOST))  # fmt: skip
+
+    # --- 2. Pictures --------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
         depth = np.linspace(0, way[-1], 60)
         exact = {HERTZ: (1e3 * depth, 1e-3 * force(depth))}
         save_comparison(folder / "force.png", {"particles": (1e3 * way, 1e-3 * load)}, exact,
                         ("Indentation [mm]", "Force [kN]"), limits=((0.0, None), (0.0, None)))  # fmt: skip
-    return Result(checks, {"force.png": "Force on a sphere of 1 m that is pressed on an elastic half space"})
+        middle, r = 0.5 * (rings[1:] + rings[:-1]), np.linspace(0, 1, 100)
+        save_comparison(folder / "pressure.png", {"particles, mean over rings": (middle, found)},
+                        {HERTZ: (r, np.sqrt(1 - r**2))}, ("Distance from the axis over a [-]", "Pressure over $p_0$ [-]"),
+                        limits=((0.0, 1.0), (0.0, None)))  # fmt: skip
+    return Result(checks, {
+        "force.png": "Force on a sphere of 1 m that is pressed on an elastic half space",
+        "pressure.png": "Pressure between sphere and half space",
+    })  # fmt: skip
 
 
 if __name__ == "__main__":
