@@ -89,3 +89,21 @@ def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["largest_water_error_m2"] < 1e-10 * load * height / oedometer
     assert summary["largest_excess_pressure_Pa"] == pytest.approx(load, rel=0.01 if elements == "P1-P1" else 0.1)
+
+
+def test_the_pressure_between_smooth_plates_rises_as_mandel_says():
+    """The pressure in the middle over half the load reaches 1.1555 at a time factor of 0.084 (Poisson ratio 0)."""
+    from common.consolidation_site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    site = read_consolidation_site(STUDIES.parent / "meshes" / "slab.toml", MPI.COMM_WORLD, 0.1)
+    model = site.at_rest(water.Element.TAYLOR_HOOD)
+    middle = np.array([[0.0, 0.0]]) if MPI.COMM_WORLD.rank == 0 else np.empty((0, 2))
+    pressure = lambda: MPI.COMM_WORLD.bcast(model.evaluate_at(middle)["pressure"])[0, 0]
+    start, period = pressure(), 9810.0 / (1e-9 * 1e6)
+    rise = []
+    for factor in (0.01, 0.084):
+        assert model.run(factor * period, 1e-3 * period, 1.2)[-1].converged
+        rise.append((pressure() - start) / 5e3)
+    assert rise[1] == pytest.approx(1.1555, rel=0.02) and rise[0] < 1.08

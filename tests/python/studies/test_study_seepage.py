@@ -64,6 +64,16 @@ def test_the_flow_of_a_homogeneous_block_is_darcys(tmp_path, capsys):
     assert f"left: {1000 * darcy:.4g} litres" in capsys.readouterr().out
 
 
+def test_half_of_k_h_flows_under_a_pile_down_to_the_middle_of_a_layer():
+    """K' / 2K of the modulus sin(pi / 4) (Polubarinova-Kochina 1962); the pile has a width here."""
+    from common.water_site import read_water_site
+
+    flow = read_water_site(STUDIES.parent / "meshes" / "sheet_pile.toml", MPI.COMM_WORLD).seepage(2)
+    flow.solve()
+    assert flow.inflow("upstream") / (1e-5 * 2.0) == pytest.approx(0.5, rel=0.015)
+    assert flow.inflow("downstream") == pytest.approx(-flow.inflow("upstream"), rel=1e-9)
+
+
 def test_the_history_of_a_drawdown_balances(tmp_path):
     import seepage
 
