@@ -217,10 +217,10 @@ Diagnostics diagnostics(const Model<G>& model)
   d.particles = particles.size();
   for (Index p = 0; p < particles.size(); ++p)
   {
-    const Vector<D> v = at<D>(particles.velocity, p);
+    const Vector<D> momentum = particle_momentum(model, p);
     d.mass += particles.mass[p];
     for (int i = 0; i < D; ++i)
-      d.momentum[i] += particles.mass[p] * v[i];
+      d.momentum[i] += momentum[i];
   }
   if (!model.failure)
     check_conservation(model, d);

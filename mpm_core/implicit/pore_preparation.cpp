@@ -39,31 +39,41 @@ double longest_edge_squared(const auto& points, const auto& cell)
   return longest;
 }
 
-/// Products N_k N_l of the shape functions at a particle; of a resting cell, their means over the particles that it
-/// stands for.
+/// Shape functions N_k at a particle and their products N_k N_l; of a resting cell, their means over the particles that
+/// it stands for.
 template <int D>
-RuleMoments<D> shape_products(const Particles<D>& particles, Index p, const std::array<double, D + 1>& n,
-                              Rules<D>& rules)
+struct MeanShapes
 {
-  if (is_resting(particles, p))
-    return rule_moments<D>(static_cast<int>(particles.resting[0][p]), rules);
-  RuleMoments<D> products;
+  std::array<double, D + 1> n;
+  std::array<std::array<double, D + 1>, D + 1> products;
+};
+
+template <class G, int D = G::dim>
+MeanShapes<D> mean_shapes(const CellShape<D>& shape, const CellMoments<G>& moments, const Particles<D>& particles,
+                          Index p)
+{
+  MeanShapes<D> means;
+  means.n = shape_functions<D>(shape, at<D>(particles.position, p));
+  const bool rests = is_resting(particles, p);
+  const auto function = [&](int k) { return AffineScalar<D>{1.0 / (D + 1), shape.gradient[k]}; };
   for (int k = 0; k <= D; ++k)
     for (int l = 0; l <= D; ++l)
-      products[k][l] = n[k] * n[l];
-  return products;
+      means.products[k][l] =
+          rests ? sum_of_products<G>(function(k), function(l), moments) / moments.mass : means.n[k] * means.n[l];
+  for (int k = 0; rests && k <= D; ++k)
+    means.n[k] = at_vertex<D>(moments.mass, moments.mass_xi, shape.gradient[k]) / moments.mass;
+  return means;
 }
 
 /// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
-                  double modulus, double inertia, double factor, const StandingWater<D>& standing, Rules<D>& rules,
-                  PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
+                  double modulus, double inertia, double factor, const StandingWater<D>& standing,
+                  const CellMoments<G>& moments, PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
 {
   const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
-  const auto n = shape_functions<D>(mesh.shapes[run.cell], x);
-  const RuleMoments<D> products = shape_products(particles, p, n, rules);
+  const auto [n, products] = mean_shapes(mesh.shapes[run.cell], moments, particles, p);
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight;
@@ -73,7 +83,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
               wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
   const double compliance = 1 / modulus + stored;
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
-  add_pore_load(mesh.shapes[run.cell], particles, water, standing, run.material, p, volume, cell.load);
+  add_pore_load(mesh.shapes[run.cell], particles, water, standing, moments, run.material, p, volume, cell.load);
   sums.volume += volume;
   sums.mobility += volume * mobility;
   sums.compliance += volume * compliance;
@@ -124,7 +134,6 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   std::vector<NodalWater> nodes(mesh.points.size(), NodalWater{});
   step.pore.cells.assign(static_cast<std::size_t>(mesh.owned_cells), PoreCell<D>{});
   std::vector<PoreSums<D>> sums(step.pore.cells.size());
-  Rules<D> rules;
   for (const Run& run : step.runs)
   {
     const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
@@ -132,8 +141,9 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const auto standing = standing_water(mesh, *model.water, run.cell);
     const double inertia = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing, rules,
-                      step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)], nodes);
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing,
+                      field.moments[run.cell], step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)],
+                      nodes);
   }
   for (Index c : step.cells)
   {

@@ -80,16 +80,16 @@ void grow_pores(Particles<D>& particles, Index first, Index last, double growth,
   }
 }
 
-/// Mean over the particles of a resting cell of the product of pressure, as it is half way, and increment, beyond
-/// that at the centre.
+/// Mean over the particles of a resting cell of the product of pressure, as it is half way, and increment.
 template <class G, int D = G::dim>
-double relative_work(const Particles<G::dim>& particles, Index row, const CellMoments<G>& moments,
-                     const CellPressure<G::dim>& pressure)
+double mean_product(const Particles<D>& particles, Index row, const CellMoments<G>& moments,
+                    const CellPressure<D>& pressure)
 {
-  Vector<D> mean = at<D>(particles.pressure_gradient.columns, row);
+  AffineScalar<D> half{particles.pore_pressure[0][row] + 0.5 * pressure.increment,
+                       at<D>(particles.pressure_gradient.columns, row)};
   for (int a = 0; a < D; ++a)
-    mean[a] = 0.5 * (mean[a] + pressure.at_end[a]);
-  return relative_product<D>(mean, pressure.of_increment, moments.mass_xixi) / moments.mass;
+    half.gradient[a] = 0.5 * (half.gradient[a] + pressure.at_end[a]);
+  return sum_of_products<G>(half, {pressure.increment, pressure.of_increment}, moments) / moments.mass;
 }
 
 /// @returns work that compresses the water, by the trapezoidal rule
@@ -103,9 +103,8 @@ double add_increments(Particles<G::dim>& particles, double modulus, const Run& r
     double increment = pressure.increment;
     for (int a = 0; a < D; ++a)
       increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
-    double product = (particles.pore_pressure[0][p] + 0.5 * increment) * increment;
-    if (run.resting)
-      product += relative_work<G>(particles, p, moments, pressure);
+    const double product = run.resting ? mean_product<G>(particles, p, moments, pressure)
+                                       : (particles.pore_pressure[0][p] + 0.5 * increment) * increment;
     work += particles.volume[p] * particles.porosity[0][p] / modulus * product;
     particles.pore_pressure[0][p] += increment;
     for (int a = 0; a < D; ++a)

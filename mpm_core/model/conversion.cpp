@@ -9,9 +9,8 @@ namespace mpm::model
 namespace
 {
 /// Puts the particles of a resting cell in its place: the first into its row, the others behind `end`.
-template <int D>
-void divide_row(const Mesh<D>& mesh, std::span<const std::array<double, D + 1>> points, Index row, Index end,
-                Particles<D>& particles)
+template <class G, int D = G::dim>
+void divide_row(const Mesh<D>& mesh, const Rule<D>& points, Index row, Index end, Particles<D>& particles)
 {
   const Index cell = particles.cell[row];
   const GlobalIndex id = particles.id[row];
@@ -19,9 +18,8 @@ void divide_row(const Mesh<D>& mesh, std::span<const std::array<double, D + 1>> 
                   start = at<D>(particles.initial_position, row);
   const Matrix<D> spin = gradient_at<D>(particles.velocity_gradient, row),
                   strain = gradient_at<D>(particles.displacement_gradient, row);
-  const auto count = static_cast<double>(points.size());
-  particles.mass[row] /= count;
-  particles.volume[row] /= count;
+  const std::vector<double> weights = rule_weights<G>(mesh, cell, points);
+  const double mass = particles.mass[row], volume = particles.volume[row];
   particles.resting[0][row] = 0;
   for (int k = 0; k < D * D; ++k)
     particles.velocity_gradient[k][row] = particles.displacement_gradient[k][row] = 0;
@@ -42,6 +40,8 @@ void divide_row(const Mesh<D>& mesh, std::span<const std::array<double, D + 1>> 
   {
     const Index p = k == 0 ? row : end + k - 1;
     particles.id[p] = id + k;
+    particles.mass[p] = weights[static_cast<std::size_t>(k)] * mass;
+    particles.volume[p] = weights[static_cast<std::size_t>(k)] * volume;
     const Vector<D> x = point_in_cell<D>(mesh, cell, points[static_cast<std::size_t>(k)]);
     for (int i = 0; i < D; ++i)
     {
@@ -103,14 +103,14 @@ void convert_cells(Model<G>& model, std::span<const unsigned char> chosen)
 {
   constexpr int D = G::dim;
   Particles<D>& particles = model.particles;
-  std::map<int, std::vector<std::array<double, D + 1>>> rules;
+  Rules<D> rules;
   std::vector<Index> rows;
   Index more = 0;
   for (Index p = 0; p < particles.size(); ++p)
     if (is_resting(particles, p) && chosen[static_cast<std::size_t>(particles.cell[p])])
     {
       const int count = static_cast<int>(particles.resting[0][p]);
-      rules.try_emplace(count, even_points<D>(count));
+      rule_of<D>(count, rules); // fails before anything has changed
       rows.push_back(p);
       more += count - 1;
     }
@@ -121,8 +121,8 @@ void convert_cells(Model<G>& model, std::span<const unsigned char> chosen)
   resize(particles, end + more);
   for (Index row : rows)
   {
-    const auto& points = rules.at(static_cast<int>(particles.resting[0][row]));
-    divide_row<D>(model.mesh, points, row, end, particles);
+    const Rule<D>& points = rules.at(static_cast<int>(particles.resting[0][row]));
+    divide_row<G>(model.mesh, points, row, end, particles);
     end += static_cast<Index>(points.size()) - 1;
   }
   model.totals.converted_cells += static_cast<std::int64_t>(rows.size());

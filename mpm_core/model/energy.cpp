@@ -8,24 +8,52 @@
 
 namespace mpm::model
 {
+namespace
+{
+/// That of a particle, or of all particles that a resting cell stands for.
+template <class G, int D = G::dim>
+double kinetic_energy(const Model<G>& model, Index p)
+{
+  const Particles<D>& particles = model.particles;
+  const Vector<D> v = at<D>(particles.velocity, p);
+  if (!is_resting(particles, p))
+    return 0.5 * particles.mass[p] * dot<D>(v, v);
+  const CellMoments<G>& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+  const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, p);
+  double twice = 0;
+  for (int a = 0; a < D; ++a)
+    twice += sum_of_products<G>({v[a], gradient[a]}, {v[a], gradient[a]}, moments);
+  return 0.5 * twice;
+}
+} // namespace
+
+template <class G, int D>
+Vector<G::dim> particle_momentum(const Model<G, D>& model, Index p)
+{
+  const Particles<D>& particles = model.particles;
+  Vector<D> momentum = at<D>(particles.velocity, p);
+  for (double& component : momentum)
+    component *= particles.mass[p];
+  if (!is_resting(particles, p))
+    return momentum;
+  const CellMoments<G>& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+  const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, p);
+  for (int a = 0; a < D; ++a)
+    momentum[a] += dot<D>(gradient[a], moments.mass_xi);
+  return momentum;
+}
+
 template <class G, int D>
 ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
 {
   const Particles<D>& particles = model.particles;
-  const Vector<D> v = at<D>(particles.velocity, p);
   SymTensor<D> stress;
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     stress[k] = particles.stress[k][p];
   std::array<double, max_states> state{};
   for (std::size_t k = 0; k < particles.state.size(); ++k)
     state[k] = particles.state[k][p];
-  double kinetic = 0.5 * particles.mass[p] * dot<D>(v, v);
-  if (is_resting(particles, p))
-  {
-    const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, p);
-    const auto& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
-    kinetic += 0.5 * relative_product<D>(gradient, gradient, moments.mass_xixi);
-  }
+  double kinetic = kinetic_energy(model, p);
   double of_water = 0;
   if (particles.water_velocity.present)
   {
@@ -37,9 +65,9 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
     double squared = std::pow(particles.pore_pressure[0][p], 2);
     if (is_resting(particles, p) && particles.pressure_gradient.present)
     {
-      const Vector<D> gradient = at<D>(particles.pressure_gradient.columns, p);
-      const auto& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
-      squared += relative_product<D>(gradient, gradient, moments.mass_xixi) / moments.mass;
+      const AffineScalar<D> pressure{particles.pore_pressure[0][p], at<D>(particles.pressure_gradient.columns, p)};
+      const CellMoments<G>& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+      squared = sum_of_products<G>(pressure, pressure, moments) / moments.mass;
     }
     of_water = 0.5 * particles.volume[p] * particles.porosity[0][p] * squared / model.water->modulus;
   }
@@ -84,6 +112,7 @@ void start_energy_balance(Model<G, D>& model)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template Vector<G::dim> particle_momentum(const Model<G>&, Index);                                                   \
   template ParticleEnergy particle_energy(const Model<G>&, Index);                                                     \
   template ParticleEnergy particle_energy(const Model<G>&);                                                            \
   template double energy_balance(const Model<G>&, double);                                                             \

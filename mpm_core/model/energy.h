@@ -47,6 +47,10 @@ ParticleEnergy particle_energy(const Model<G, D>& model);
 template <class G, int D>
 ParticleEnergy particle_energy(const Model<G, D>& model, Index p);
 
+/// Momentum of one particle, or of all particles that a resting cell stands for [N s].
+template <class G, int D>
+Vector<G::dim> particle_momentum(const Model<G, D>& model, Index p);
+
 /// Works that came in less those that went out or are stored, at the particles; constant in an exact motion [J].
 template <class G, int D>
 double energy_balance(const Model<G, D>& model, double kinetic);

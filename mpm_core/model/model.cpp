@@ -198,8 +198,8 @@ void sum_moments(Model<G>& model)
   for (const Run& run : field.resting.runs)
   {
     CellMoments<G>& moments = field.moments[run.cell];
-    const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
-    moments.mass_xixi = second_moment<D>(model.mesh, run.cell, particles.mass[run.first], rule);
+    const Rule<D>& rule = rule_of<D>(static_cast<int>(particles.resting[0][run.first]), rules);
+    take_mass(model.mesh, run.cell, particles.mass[run.first], rule, moments);
     take_row<G>(particles, run.first, moments);
   }
 }

@@ -16,8 +16,8 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
     const auto standing = standing_water(mesh, water, run.cell);
     PoreLoad<D> load{};
     for (Index p = run.first; p < run.last; ++p)
-      add_pore_load(mesh.shapes[run.cell], particles, water, standing, run.material, p, factor * particles.volume[p],
-                    load);
+      add_pore_load(mesh.shapes[run.cell], particles, water, standing, field.moments[run.cell], run.material, p,
+                    factor * particles.volume[p], load);
     Working<G> stress{};
     for (int k : normal_component<G>)
       stress[k] = -load.pressure;

@@ -49,17 +49,35 @@ struct PoreLoad
   Vector<D> gradient;               ///< of p_s [Pa/m]
 };
 
-/// Adds a particle of a law to its cell's.
-template <int D>
-inline void add_pore_load(const CellShape<D>& shape, const Particles<D>& particles, const PoreWater& water,
-                          const StandingWater<D>& standing, Index material, Index p, double volume, PoreLoad<D>& load)
+/// Where a particle is from the place of its row: of a resting cell, the centre of mass of its particles.
+template <class G, int D = G::dim>
+inline Vector<D> offset_of_mass(const Particles<D>& particles, Index p, const CellMoments<G>& moments)
 {
+  Vector<D> offset{};
+  if (is_resting(particles, p))
+    for (int a = 0; a < D; ++a)
+      offset[a] = moments.mass_xi[a] / moments.mass;
+  return offset;
+}
+
+/// Adds a particle of a law to its cell's.
+template <class G, int D = G::dim>
+inline void add_pore_load(const CellShape<D>& shape, const Particles<D>& particles, const PoreWater& water,
+                          const StandingWater<D>& standing, const CellMoments<G>& moments, Index material, Index p,
+                          double volume, PoreLoad<D>& load)
+{
+  const Vector<D> offset = offset_of_mass(particles, p, moments);
   double pressure = particles.pore_pressure[0][p];
+  if (is_resting(particles, p))
+    pressure += dot<D>(at<D>(particles.pressure_gradient.columns, p), offset);
   if (water.may_dry())
     pressure = acting_pressure(water.retention[static_cast<std::size_t>(material)], pressure);
   if (!water.standing.empty())
   {
-    const auto n = shape_functions<D>(shape, at<D>(particles.position, p));
+    Vector<D> place = at<D>(particles.position, p);
+    for (int a = 0; a < D; ++a)
+      place[a] += offset[a];
+    const auto n = shape_functions<D>(shape, place);
     const double above = pressure_at<D>(standing, n);
     pressure -= above;
     load.standing += volume * above;

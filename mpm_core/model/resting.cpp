@@ -20,6 +20,7 @@ struct CellRows
   Index cell;
   std::vector<Index> rows;
   std::vector<std::array<double, D + 1>> points;
+  std::vector<double> weights; ///< of the points
 };
 
 template <int D>
@@ -43,12 +44,14 @@ void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRo
   for (std::size_t k = 0; k < cell.rows.size(); ++k)
   {
     const Index p = cell.rows[k];
-    const auto differs = [&](const Column& column) { return std::abs(column[p] - column[first]) > 1e-9 * column[p]; };
+    const double ratio = cell.weights[k] / cell.weights[0];
+    const auto differs = [&](const Column& column)
+    { return std::abs(column[p] - ratio * column[first]) > 1e-9 * column[p]; };
     if (particles.id[p] != particles.id[first] + static_cast<GlobalIndex>(k) ||
         particles.material[p] != particles.material[first])
       refuse(particles, p, "shares its cell with particles of another seeding or law");
     if (differs(particles.mass) || differs(particles.volume))
-      refuse(particles, p, "has another mass or volume than others in its cell");
+      refuse(particles, p, "has another mass or volume than its place in the cell gives it beside the others");
     if (particles.traction.present && norm<D>(at<D>(particles.traction.columns, p)) > 0)
       refuse(particles, p, "carries a traction");
     Vector<D> off = at<D>(particles.position, p);
@@ -62,7 +65,7 @@ void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRo
 
 /// The cells that are to rest, with their rows.
 /// @throws InputError see `rest_cells`
-template <int D>
+template <class G, int D = G::dim>
 std::vector<CellRows<D>> rows_of_cells(const Mesh<D>& mesh, const Particles<D>& particles,
                                        std::span<const unsigned char> chosen)
 {
@@ -71,38 +74,40 @@ std::vector<CellRows<D>> rows_of_cells(const Mesh<D>& mesh, const Particles<D>& 
     if (chosen[static_cast<std::size_t>(particles.cell[p])] && !is_resting(particles, p))
       rows[static_cast<std::size_t>(particles.cell[p])].push_back(p);
   std::vector<CellRows<D>> cells;
-  std::map<std::size_t, std::vector<std::array<double, D + 1>>> rules;
+  Rules<D> rules;
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
     auto& mine = rows[static_cast<std::size_t>(c)];
     if (mine.empty())
       continue;
     std::ranges::sort(mine, {}, [&](Index p) { return particles.id[p]; });
-    auto& points = rules[mine.size()];
     try
     {
-      if (points.empty())
-        points = even_points<D>(static_cast<int>(mine.size()));
+      const Rule<D>& points = rule_of<D>(static_cast<int>(mine.size()), rules);
+      cells.push_back({c, std::move(mine), points, rule_weights<G>(mesh, c, points)});
     }
     catch (const InputError&)
     {
       refuse(particles, mine.front(), "is one of " + std::to_string(mine.size()) + " in its cell");
     }
-    cells.push_back({c, std::move(mine), points});
     check_rows(mesh, particles, cells.back());
   }
   return cells;
 }
 
-/// The gradient of the velocities of a cell's particles, by their momentum about its centre.
+/// The gradient of the velocities of a cell's particles, by their momentum about the centre of mass.
 template <class G, int D = G::dim>
 Matrix<D> velocity_gradient(const CellMoments<G>& moments)
 {
-  Matrix<D> second, gradient;
+  Matrix<D> second, about, gradient;
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
-      second[i][j] = moments.mass_xixi[symmetric_index<D>(i, j)];
-  const Eigen::Matrix<double, D, D> found = as_eigen<D>(moments.momentum_xi) * as_eigen<D>(second).inverse();
+    {
+      const double from_centre = moments.mass_xi[j] / moments.mass;
+      second[i][j] = moments.mass_xixi[symmetric_index<D>(i, j)] - moments.mass_xi[i] * from_centre;
+      about[i][j] = moments.momentum_xi[i][j] - moments.momentum[i] * from_centre;
+    }
+  const Eigen::Matrix<double, D, D> found = as_eigen<D>(about) * as_eigen<D>(second).inverse();
   for (int i = 0; i < D; ++i)
     for (int j = 0; j < D; ++j)
       gradient[i][j] = found(i, j);
@@ -114,7 +119,6 @@ template <class G, int D = G::dim>
 void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& particles)
 {
   const Index row = cell.rows.front();
-  const auto count = static_cast<double>(cell.rows.size());
   CellMoments<G> moments{};
   for (Index p : cell.rows)
     add_moments<G>(particles, p, p + 1, mesh.shapes[cell.cell], moments);
@@ -123,23 +127,30 @@ void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& part
                   {
                     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(column)>, Column>)
                     {
-                      double sum = 0;
-                      for (Index p : cell.rows)
-                        sum += column.empty() ? 0 : column[p];
-                      if (!column.empty())
-                        column[row] = sum / count;
+                      if (column.empty())
+                        return;
+                      double mean = 0;
+                      for (std::size_t k = 0; k < cell.rows.size(); ++k)
+                        mean += cell.weights[k] * column[cell.rows[k]];
+                      column[row] = mean;
                     }
                   });
   particles.mass[row] = moments.mass;
   particles.volume[row] = moments.volume;
-  particles.resting[0][row] = count;
-  const Matrix<D> gradient = count > 1 ? velocity_gradient<G>(moments) : Matrix<D>{};
+  particles.resting[0][row] = static_cast<double>(cell.rows.size());
+  const Matrix<D> gradient = cell.rows.size() > 1 ? velocity_gradient<G>(moments) : Matrix<D>{};
+  Vector<D> to_centre; // from the centre of mass, where the means are
+  for (int i = 0; i < D; ++i)
+    to_centre[i] = -moments.mass_xi[i] / moments.mass;
+  if (particles.pore_pressure.present && particles.pressure_gradient.present)
+    particles.pore_pressure[0][row] += dot<D>(at<D>(particles.pressure_gradient.columns, row), to_centre);
   for (int i = 0; i < D; ++i)
   {
     const double displacement = particles.position[i][row] - particles.initial_position[i][row];
     particles.position[i][row] = mesh.shapes[cell.cell].centre[i];
     particles.initial_position[i][row] = mesh.shapes[cell.cell].centre[i] - displacement;
     particles.resting_displacement[i][row] = 0;
+    particles.velocity[i][row] += dot<D>(gradient[i], to_centre);
     for (int j = 0; j < D; ++j)
     {
       particles.velocity_gradient[i * D + j][row] = gradient[i][j];
@@ -158,12 +169,10 @@ void rest_cells(Model<G>& model, std::span<const unsigned char> chosen)
   collectively(model.exchange.comm,
                [&]
                {
-                 if (G::has_hoop)
-                   throw InputError("cells are to rest in axial symmetry, expected plane strain or three dimensions");
                  if (model.fields.size() > 1)
                    throw InputError("cells are to rest in a model of " + std::to_string(model.fields.size()) +
                                     " velocity fields, expected one");
-                 cells = rows_of_cells(model.mesh, particles, chosen);
+                 cells = rows_of_cells<G>(model.mesh, particles, chosen);
                });
   require(particles.resting, particles.id.size());
   require(particles.velocity_gradient, particles.id.size());

@@ -23,8 +23,8 @@ struct Conversion
 /// Lets chosen cells rest: their particles become one row each, with the means of their values. Cells without particles
 /// and those that rest already stay as they are.
 /// @param chosen  per owned cell
-/// @throws InputError on all ranks: axial symmetry, several velocity fields; particles that are not as they were
-/// seeded, or that carry tractions
+/// @throws InputError on all ranks: several velocity fields; particles that are not as they were seeded, or that carry
+/// tractions
 /// @note Collective
 template <class G>
 void rest_cells(Model<G>& model, std::span<const unsigned char> chosen);

@@ -22,18 +22,26 @@ void take_resting_runs(const Mesh<D>& mesh, std::vector<Run>& runs, VelocityFiel
 
 namespace
 {
-/// Shape functions and masses of the cells. By symmetry of the rule the mass matrix of a cell has one number on its
-/// diagonal and one elsewhere, and its rows sum up to m / (D + 1).
-template <int D>
-void make_elements(const Mesh<D>& mesh, const Particles<D>& particles, RestingCells<D>& resting)
+/// sum m_p N_k N_l over the particles of a cell.
+template <class G, int D = G::dim>
+double mass_of(const CellMoments<G>& moments, const CellShape<D>& shape, int k, int l)
 {
+  const AffineScalar<D> n_k{1.0 / (D + 1), shape.gradient[k]}, n_l{1.0 / (D + 1), shape.gradient[l]};
+  return sum_of_products<G>(n_k, n_l, moments);
+}
+
+/// Shape functions and masses of the cells. By symmetry of the rule the mass matrix of a cell has one number on its
+/// diagonal and one elsewhere, and its rows sum up to m / (D + 1); not in axial symmetry, where the moments are used.
+template <class G, int D = G::dim>
+void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
+{
+  RestingCells<D>& resting = field.resting;
   const std::size_t n = resting.runs.size() + lanes;
   resting.vertices.assign(n, {});
   for (auto& column : resting.gradient)
     column.assign(n, 0.0);
-  resting.mass.assign(n, 0.0);
-  resting.own_mass.assign(n, 0.0);
-  Rules<D> rules;
+  for (auto* column : {&resting.hoop, &resting.mass, &resting.own_mass})
+    column->assign(n, 0.0);
   for (std::size_t r = 0; r < resting.runs.size(); ++r)
   {
     const Run& run = resting.runs[r];
@@ -41,9 +49,9 @@ void make_elements(const Mesh<D>& mesh, const Particles<D>& particles, RestingCe
     for (int k = 0; k < D; ++k)
       for (int b = 0; b < D; ++b)
         resting.gradient[k * D + b][r] = mesh.shapes[run.cell].gradient[k + 1][b];
-    const auto& rule = rule_moments<D>(static_cast<int>(particles.resting[0][run.first]), rules);
-    resting.mass[r] = particles.mass[run.first] * rule[0][1];
-    resting.own_mass[r] = particles.mass[run.first] * (rule[0][0] - rule[0][1]);
+    resting.hoop[r] = hoop_gradient<G>(mesh.shapes[run.cell]);
+    resting.mass[r] = mass_of(field.moments[run.cell], mesh.shapes[run.cell], 0, 1);
+    resting.own_mass[r] = mass_of(field.moments[run.cell], mesh.shapes[run.cell], 0, 0) - resting.mass[r];
   }
 }
 
@@ -63,7 +71,7 @@ void sum_nodes(const Mesh<D>& mesh, VelocityField<G>& field)
       NodeSums<D>& sums = resting.sums[node];
       if (sums.mass == 0)
         resting.nodes.push_back(node);
-      sums.mass += moments.mass / (D + 1);
+      sums.mass += at_vertex<D>(moments.mass, moments.mass_xi, shape.gradient[k]);
       const Vector<D> force = internal_force<G>(moments.stress, shape, k);
       for (int a = 0; a < D; ++a)
       {
@@ -82,7 +90,7 @@ void make_resting_cells(const Mesh<D>& mesh, const Particles<D>& particles, Velo
   RestingCells<D>& resting = field.resting;
   if (!particles.resting.present)
     return;
-  make_elements(mesh, particles, resting);
+  make_elements(mesh, field);
   sum_nodes(mesh, field);
   for (auto* values : {&resting.mapped, &resting.change, &resting.displacement})
     values->assign(mesh.points.size(), {});
@@ -130,13 +138,14 @@ const MeshPart& part_of_particles(VelocityField<G>& field)
   return others;
 }
 
+namespace
+{
+/// Mass matrix times `velocity_change`, in `mapped`.
 template <class G>
-void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
+void map_change(VelocityField<G>& field)
 {
   constexpr int D = G::dim;
   RestingCells<D>& resting = field.resting;
-  for (Index i : resting.nodes)
-    resting.mapped[i] = {};
   for (std::size_t r = 0; r < resting.runs.size(); ++r)
   {
     const auto& vertices = resting.vertices[r];
@@ -154,6 +163,37 @@ void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momen
         resting.mapped[vertices[k]][a] += gained[a];
     }
   }
+}
+
+/// Likewise by the moments of the cells, where masses differ from vertex to vertex.
+template <class G>
+void map_change_by_moments(const Mesh<G::dim>& mesh, VelocityField<G>& field)
+{
+  constexpr int D = G::dim;
+  const auto change_of = [&](Index i) -> const Vector<D>& { return field.velocity_change[i]; };
+  for (const Run& run : field.resting.runs)
+  {
+    const AffineField<D> change = affine_field<D>(mesh, run.cell, change_of);
+    for (int k = 0; k <= D; ++k)
+      for (int a = 0; a < D; ++a)
+        field.resting.mapped[mesh.cells[run.cell][k]][a] +=
+            sum_of_products<G>({1.0 / (D + 1), mesh.shapes[run.cell].gradient[k]},
+                               {change.value[a], change.gradient[a]}, field.moments[run.cell]);
+  }
+}
+} // namespace
+
+template <class G>
+void map_resting_change(const Mesh<G::dim>& mesh, VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
+{
+  constexpr int D = G::dim;
+  RestingCells<D>& resting = field.resting;
+  for (Index i : resting.nodes)
+    resting.mapped[i] = {};
+  if constexpr (G::has_hoop)
+    map_change_by_moments(mesh, field);
+  else
+    map_change(field);
   resting.is_mapped = true;
   if (momentum.empty())
     return;
@@ -172,19 +212,21 @@ double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& f
 {
   const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
   const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
-  Matrix<D> half = gradient_at<D>(particles.velocity_gradient, run.first), change;
+  const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, run.first);
   double sum = 0;
   for (int a = 0; a < D; ++a)
   {
-    const double v = particles.velocity[a][run.first], of_centre = pic_fraction * (v - nodal.value[a]);
-    sum += particles.mass[run.first] * of_centre * (v - 0.5 * of_centre);
+    AffineScalar<D> half{particles.velocity[a][run.first], gradient[a]}, change;
+    change.value = pic_fraction * (half.value - nodal.value[a]);
+    half.value -= 0.5 * change.value;
     for (int b = 0; b < D; ++b)
     {
-      change[a][b] = pic_fraction * (half[a][b] - nodal.gradient[a][b]);
-      half[a][b] -= 0.5 * change[a][b];
+      change.gradient[b] = pic_fraction * (half.gradient[b] - nodal.gradient[a][b]);
+      half.gradient[b] -= 0.5 * change.gradient[b];
     }
+    sum += sum_of_products<G>(change, half, field.moments[run.cell]);
   }
-  return sum + relative_product<D>(change, half, field.moments[run.cell].mass_xixi);
+  return sum;
 }
 
 template <class G>
@@ -199,15 +241,15 @@ void add_pic_loss(Model<G>& model, const PassOptions& options)
 }
 
 /// The gains of the nodes in a step: momentum, and velocities and displacements that the rows do not know yet.
-template <class G>
-void move_nodes(const PassOptions& options, VelocityField<G>& field)
+template <class G, int D = G::dim>
+void move_nodes(const Mesh<D>& mesh, const PassOptions& options, VelocityField<G>& field)
 {
-  RestingCells<G::dim>& resting = field.resting;
+  RestingCells<D>& resting = field.resting;
   if (!resting.is_mapped)
-    map_resting_change<G>(field, {});
+    map_resting_change<G>(mesh, field, {});
   const double flip = 1 - options.pic_fraction;
   for (Index i : resting.nodes)
-    for (int a = 0; a < G::dim; ++a)
+    for (int a = 0; a < D; ++a)
     {
       resting.sums[i].momentum[a] = flip * resting.sums[i].momentum[a] + resting.mapped[i][a];
       resting.change[i][a] = flip * resting.change[i][a] + field.velocity_change[i][a];
@@ -223,7 +265,7 @@ template <class G>
 void move_resting_nodes(Model<G>& model, const PassOptions& options)
 {
   add_pic_loss(model, options);
-  move_nodes(options, model.fields.front());
+  move_nodes(model.mesh, options, model.fields.front());
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -231,7 +273,7 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   template void make_resting_cells(const Mesh<G::dim>&, const Particles<G::dim>&, VelocityField<G>&);                  \
   template void update_resting_rows(Model<G>&);                                                                        \
   template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
-  template void map_resting_change(VelocityField<G>&, std::span<Vector<G::dim>>);                                      \
+  template void map_resting_change(const Mesh<G::dim>&, VelocityField<G>&, std::span<Vector<G::dim>>);                 \
   template void move_resting_nodes(Model<G>&, const PassOptions&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

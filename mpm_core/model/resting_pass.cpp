@@ -46,6 +46,40 @@ std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>
   return gradient;
 }
 
+/// Hoop strain over dt of `lanes` cells.
+template <class G, int D = G::dim>
+Lanes hoop_strain(const VelocityField<G>& field, double dt, std::size_t first)
+{
+  Lanes sum{};
+  for (std::size_t l = 0; l < lanes; ++l)
+    for (Index node : field.resting.vertices[first + l])
+      sum[l] += field.velocity[node][0];
+  return dt * sum * load(&field.resting.hoop[first]);
+}
+
+/// Columns that a strain changes, and the hoop stress in axial symmetry, which it does not rotate.
+template <class G, int D = G::dim>
+auto columns_to_strain(Particles<D>& particles)
+{
+  constexpr int n = n_symmetric<D> + 2;
+  std::array<double*, n + (G::has_hoop ? 1 : 0)> columns;
+  std::ranges::copy(strain_columns(particles), columns.begin());
+  if constexpr (G::has_hoop)
+    columns[n] = particles.stress[working_component<G>[n_symmetric<D>]].data();
+  return columns;
+}
+
+/// The stresses among them that do work.
+template <class G, std::size_t N>
+std::array<Lanes, G::n_working> working_stress(const Piece<N>& piece)
+{
+  std::array<Lanes, G::n_working> stress;
+  std::copy_n(piece.begin(), n_symmetric<G::dim>, stress.begin());
+  if constexpr (G::has_hoop)
+    stress.back() = piece.back();
+  return stress;
+}
+
 /// Calls `change(piece, group)` on consecutive rows of columns, `lanes` of them together, and writes them back.
 template <std::size_t N, class Change>
 void change_rows(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
@@ -75,8 +109,9 @@ Lanes averaged_strains(const Mesh<D>& mesh, const VelocityField<G>& field, std::
 }
 
 /// Work of stress times volume on the strain of cells side by side, without those beyond the last.
-template <class G, std::size_t N>
-Lanes work(const Piece<N>& stress, const Lanes& volume, const std::array<Lanes, G::n_working>& strain, Index cells)
+template <class G>
+Lanes work(const std::array<Lanes, G::n_working>& stress, const Lanes& volume,
+           const std::array<Lanes, G::n_working>& strain, Index cells)
 {
   Lanes sum{};
   for (int k = 0; k < G::n_working; ++k)
@@ -94,35 +129,38 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
 {
   constexpr int S = n_symmetric<D>;
   Lanes work_before{};
-  const auto strain_piece = [&](Piece<S + 2>& piece, std::size_t i)
+  const auto strain_piece = [&]<std::size_t N>(Piece<N>& piece, std::size_t i)
   {
     const auto gradient = displacement_gradient(field, options.dt, batch.first_run + i);
     CellStrain<D, Lanes> strain = strain_increment<D>(gradient, 1);
+    if constexpr (G::has_hoop)
+      add_hoop(strain, hoop_strain(field, options.dt, batch.first_run + i));
     if (options.nmd)
       set_volumetric<G>(strain, averaged_strains(mesh, field, batch.first_run + i, strain.volumetric));
     if (options.small)
       make_small<D>(strain);
-    std::array<Lanes, S> increment;
-    for (int k = 0; k < S; ++k)
+    std::array<Lanes, G::n_working> increment;
+    for (int k = 0; k < G::n_working; ++k)
     {
-      increment[k] = strain.increment[stress_component<D>[k]];
-      store(increment[k], scratch.strain[stress_component<D>[k]] + i);
+      increment[k] = strain.increment[working_component<G>[k]];
+      store(increment[k], scratch.strain[working_component<G>[k]] + i);
     }
     store(strain.volumetric, scratch.volumetric + i);
     for (int k = 0; k < D * D; ++k)
       store(gradient[k / D][k % D], scratch.gradient[k] + i);
-    work_before += work<G>(piece, piece[S], increment, batch.last - batch.first - static_cast<Index>(i));
+    work_before +=
+        work<G>(working_stress<G>(piece), piece[S], increment, batch.last - batch.first - static_cast<Index>(i));
     turn<D>(piece, strain.rotation);
     piece[S] *= 1 + strain.volumetric;
     piece[S + 1] += strain.deviatoric;
   };
-  change_rows(strain_columns(particles), batch.first, batch.last, strain_piece);
+  change_rows(columns_to_strain<G>(particles), batch.first, batch.last, strain_piece);
   return sum(work_before);
 }
 
 /// Adds the forces of the stresses of `n` cells, at most `lanes`, to their nodes.
-template <int D>
-void add_forces(const std::array<Lanes, n_symmetric<D>>& stress, std::size_t first, std::size_t n,
+template <class G, int D = G::dim>
+void add_forces(const std::array<Lanes, G::n_working>& stress, std::size_t first, std::size_t n,
                 RestingCells<D>& resting)
 {
   std::array<std::array<Lanes, D>, D + 1> force{};
@@ -136,6 +174,9 @@ void add_forces(const std::array<Lanes, n_symmetric<D>>& stress, std::size_t fir
   for (int k = 1; k <= D; ++k)
     for (int a = 0; a < D; ++a)
       force[0][a] -= force[k][a];
+  if constexpr (G::has_hoop)
+    for (int k = 0; k <= D; ++k)
+      force[k][0] += stress.back() * load(&resting.hoop[first]);
   for (std::size_t l = 0; l < n; ++l)
     for (int k = 0; k <= D; ++k)
     {
@@ -151,10 +192,10 @@ template <class G, int D = G::dim>
 double integrate_batch(const Particles<D>& particles, const Batch& batch, const RestingScratch<D>& scratch,
                        RestingCells<D>& resting)
 {
-  constexpr int S = n_symmetric<D>;
+  constexpr int S = G::n_working;
   std::array<const double*, S + 1> columns;
   for (int k = 0; k < S; ++k)
-    columns[k] = particles.stress[stress_component<D>[k]].data();
+    columns[k] = particles.stress[working_component<G>[k]].data();
   columns[S] = particles.volume.data();
   Lanes work_after{};
   for (Index row = batch.first; row < batch.last; row += lanes)
@@ -162,14 +203,15 @@ double integrate_batch(const Particles<D>& particles, const Batch& batch, const 
     const auto i = static_cast<std::size_t>(row - batch.first);
     const Index count = std::min<Index>(lanes, batch.last - row);
     const Piece<S + 1> piece = count == lanes ? load(columns, row) : load_few(columns, row, batch.last);
-    std::array<Lanes, S> increment, stress;
+    std::array<Lanes, S> increment, stress, force;
     for (int k = 0; k < S; ++k)
     {
-      increment[k] = load(scratch.strain[stress_component<D>[k]] + i);
-      stress[k] = piece[k] * piece[S];
+      increment[k] = load(scratch.strain[working_component<G>[k]] + i);
+      stress[k] = piece[k];
+      force[k] = piece[k] * piece[S];
     }
-    work_after += work<G>(piece, piece[S], increment, count);
-    add_forces<D>(stress, batch.first_run + i, static_cast<std::size_t>(count), resting);
+    work_after += work<G>(stress, piece[S], increment, count);
+    add_forces<G>(force, batch.first_run + i, static_cast<std::size_t>(count), resting);
   }
   return sum(work_after);
 }
@@ -217,28 +259,25 @@ void update_moments(const Particles<D>& particles, VelocityField<G>& field)
 template <class G>
 void resting_pass(Model<G>& model, const PassOptions& options)
 {
-  if constexpr (!G::has_hoop)
+  VelocityField<G>& field = model.fields.front();
+  RestingCells<G::dim>& resting = field.resting;
+  if (resting.runs.empty())
+    return;
+  if (options.move)
+    move_resting_nodes(model, options);
+  if (!options.stress)
+    return;
+  for (Index i : resting.nodes)
+    resting.sums[i].internal = {};
+  RestingScratch<G::dim> scratch{};
+  for (std::size_t r = 0; r < resting.runs.size();)
   {
-    VelocityField<G>& field = model.fields.front();
-    RestingCells<G::dim>& resting = field.resting;
-    if (resting.runs.empty())
-      return;
-    if (options.move)
-      move_resting_nodes(model, options);
-    if (!options.stress)
-      return;
-    for (Index i : resting.nodes)
-      resting.sums[i].internal = {};
-    RestingScratch<G::dim> scratch{};
-    for (std::size_t r = 0; r < resting.runs.size();)
-    {
-      const Batch batch = next_batch(resting.runs, r);
-      pass_batch(model, options, batch, scratch);
-      r = batch.last_run;
-    }
-    if (options.nmd || options.small || field.integration.kind != Integration::particles)
-      update_moments(model.particles, field);
+    const Batch batch = next_batch(resting.runs, r);
+    pass_batch(model, options, batch, scratch);
+    r = batch.last_run;
   }
+  if (options.nmd || options.small || field.integration.kind != Integration::particles)
+    update_moments(model.particles, field);
 }
 
 #define INSTANTIATE(G) template void resting_pass(Model<G>&, const PassOptions&);

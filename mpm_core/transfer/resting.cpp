@@ -5,54 +5,61 @@
 namespace mpm::transfer
 {
 template <int D>
-const RuleMoments<D>& rule_moments(int points, Rules<D>& rules)
+const Rule<D>& rule_of(int points, Rules<D>& rules)
 {
   const auto known = rules.find(points);
-  if (known != rules.end())
-    return known->second;
-  RuleMoments<D> moments{};
-  for (const auto& point : even_points<D>(points))
-    for (int k = 0; k <= D; ++k)
-      for (int l = 0; l <= D; ++l)
-        moments[k][l] += point[k] * point[l] / points;
-  return rules[points] = moments;
+  return known != rules.end() ? known->second : rules.emplace(points, even_points<D>(points)).first->second;
 }
 
-template <int D>
-std::array<double, n_symmetric<D>> second_moment(const Mesh<D>& mesh, Index cell, double mass,
-                                                 const RuleMoments<D>& rule)
+template <class G, int D>
+std::vector<double> rule_weights(const Mesh<D>& mesh, Index cell, const Rule<D>& rule)
 {
-  std::array<Vector<D>, D + 1> arm;
-  for (int k = 0; k <= D; ++k)
-    for (int i = 0; i < D; ++i)
-      arm[k][i] = mesh.points[mesh.cells[cell][k]][i] - mesh.shapes[cell].centre[i];
-  std::array<double, n_symmetric<D>> sum{};
-  for (int s = 0; s < n_symmetric<D>; ++s)
+  std::vector<double> weights;
+  double sum = 0;
+  for (const auto& point : rule)
+    sum += weights.emplace_back(thickness<G>(point_in_cell<D>(mesh, cell, point)));
+  for (double& weight : weights)
+    weight /= sum;
+  return weights;
+}
+
+template <class G, int D>
+void take_mass(const Mesh<D>& mesh, Index cell, double mass, const Rule<D>& rule, CellMoments<G>& moments)
+{
+  const std::vector<double> weights = rule_weights<G>(mesh, cell, rule);
+  moments.mass = mass;
+  moments.mass_xi = {};
+  moments.mass_xixi = {};
+  for (std::size_t p = 0; p < rule.size(); ++p)
   {
-    const auto [i, j] = symmetric_pairs<D>[s];
-    for (int k = 0; k <= D; ++k)
-      for (int l = 0; l <= D; ++l)
-        sum[s] += mass * rule[k][l] * arm[k][i] * arm[l][j];
+    Vector<D> xi = point_in_cell<D>(mesh, cell, rule[p]);
+    for (int i = 0; i < D; ++i)
+    {
+      xi[i] -= mesh.shapes[cell].centre[i];
+      if constexpr (G::has_hoop) // zero elsewhere, but for round-off
+        moments.mass_xi[i] += mass * weights[p] * xi[i];
+    }
+    for (int s = 0; s < n_symmetric<D>; ++s)
+      moments.mass_xixi[s] += mass * weights[p] * xi[symmetric_pairs<D>[s][0]] * xi[symmetric_pairs<D>[s][1]];
   }
-  return sum;
 }
 
 template <class G, int D>
 void take_row(const Particles<D>& particles, Index row, CellMoments<G>& moments)
 {
-  const double mass = particles.mass[row], volume = particles.volume[row];
+  const double volume = particles.volume[row];
   moments.volume = volume;
-  moments.mass = mass;
-  moments.mass_xi = {};
+  moments.mass = particles.mass[row];
   for (int k = 0; k < G::n_working; ++k)
     moments.stress[k] = volume * particles.stress[working_component<G>[k]][row];
   const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, row);
   for (int a = 0; a < D; ++a)
   {
-    moments.momentum[a] = mass * particles.velocity[a][row];
+    const double velocity = particles.velocity[a][row];
+    moments.momentum[a] = moments.mass * velocity + dot<D>(gradient[a], moments.mass_xi);
     for (int b = 0; b < D; ++b)
     {
-      double sum = 0;
+      double sum = velocity * moments.mass_xi[b];
       for (int c = 0; c < D; ++c)
         sum += gradient[a][c] * moments.mass_xixi[symmetric_index<D>(c, b)];
       moments.momentum_xi[a][b] = sum;
@@ -79,12 +86,16 @@ void move_row(Particles<D>& particles, Index row, const CellMotion<D>& motion)
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template const RuleMoments<D>& rule_moments<D>(int, Rules<D>&);                                                      \
-  template std::array<double, n_symmetric<D>> second_moment(const Mesh<D>&, Index, double, const RuleMoments<D>&);     \
+  template const Rule<D>& rule_of<D>(int, Rules<D>&);                                                                  \
   template void move_row(Particles<D>&, Index, const CellMotion<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
-template void take_row(const Particles<2>&, Index, CellMoments<PlaneStrain>&);
-template void take_row(const Particles<2>&, Index, CellMoments<Axisymmetric>&);
-template void take_row(const Particles<3>&, Index, CellMoments<Solid>&);
+#undef INSTANTIATE
+#define INSTANTIATE(G)                                                                                                 \
+  template std::vector<double> rule_weights<G>(const Mesh<G::dim>&, Index, const Rule<G::dim>&);                       \
+  template void take_mass(const Mesh<G::dim>&, Index, double, const Rule<G::dim>&, CellMoments<G>&);                   \
+  template void take_row(const Particles<G::dim>&, Index, CellMoments<G>&);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
 } // namespace mpm::transfer

@@ -2,10 +2,11 @@
 /// @file
 /// What the nodes need to know of resting cells, each with its one row.
 ///
-/// A resting cell stands for n particles of equal mass at the points of a rule (`even_points`), which do not move
-/// relative to the cell. Its moments are those of these particles: volume and mass of the row, no first moment of mass,
-/// the second moment of the rule, and the velocities v + grad v . xi. So nodes cannot tell a resting cell from its
-/// particles, and nothing changes for them when one takes the place of the other.
+/// A resting cell stands for n particles at the points of a rule (`even_points`) and of equal density, which do not
+/// move relative to the cell. Its moments are those of these particles: volume and mass of the row, first and second
+/// moment of mass of the rule, and the velocities v + grad v . xi. So nodes cannot tell a resting cell from its
+/// particles, and nothing changes for them when one takes the place of the other. In axial symmetry the mass of a
+/// particle is in proportion to its radius; elsewhere the first moment is zero.
 ///
 /// As these particles stay where they are, neither the mass of nodes nor the mass matrix changes. So a step is that of
 /// linear finite elements: nodes keep the momentum of resting cells, and what has been added to velocities and
@@ -18,22 +19,25 @@
 
 namespace mpm::transfer
 {
-/// Mean of N_k N_l over the points of a rule.
+/// The places of particles in a cell, in barycentric coordinates.
 template <int D>
-using RuleMoments = std::array<std::array<double, D + 1>, D + 1>;
+using Rule = std::vector<std::array<double, D + 1>>;
 
 /// By the number of points.
 template <int D>
-using Rules = std::map<int, RuleMoments<D>>;
+using Rules = std::map<int, Rule<D>>;
 
 /// @throws InputError a number of points that no rule has
 template <int D>
-const RuleMoments<D>& rule_moments(int points, Rules<D>& rules);
+const Rule<D>& rule_of(int points, Rules<D>& rules);
 
-/// sum m_p xi (x) xi of a cell's particles at the points of a rule.
-template <int D>
-std::array<double, n_symmetric<D>> second_moment(const Mesh<D>& mesh, Index cell, double mass,
-                                                 const RuleMoments<D>& rule);
+/// Fractions of the mass and volume of a cell that its particles at the points of a rule have.
+template <class G, int D = G::dim>
+std::vector<double> rule_weights(const Mesh<D>& mesh, Index cell, const Rule<D>& rule);
+
+/// Gives moments the mass of a cell's particles at the points of a rule, and its moments.
+template <class G, int D = G::dim>
+void take_mass(const Mesh<D>& mesh, Index cell, double mass, const Rule<D>& rule, CellMoments<G>& moments);
 
 /// The resting cells of a velocity field, in rising order. Entries per cell are followed by some of zero, so that the
 /// last ones fill a vector.
@@ -48,8 +52,9 @@ struct RestingCells
   // Per cell
   std::vector<std::array<Index, D + 1>> vertices;
   std::array<std::vector<double>, D * D> gradient; ///< of the shape functions of all vertices but the first
-  std::vector<double> mass;                        ///< of a vertex by the sum over all of them: m_kl without k = l
-  std::vector<double> own_mass;                    ///< the rest of m_kk
+  std::vector<double> hoop;                        ///< strain by a radial velocity of a vertex, in axial symmetry
+  std::vector<double> mass;     ///< of a vertex by the sum over all of them: m_kl without k = l; not in axial symmetry
+  std::vector<double> own_mass; ///< the rest of m_kk
 
   // Per node
   std::vector<Index> nodes;            ///< of these cells
@@ -63,7 +68,7 @@ struct RestingCells
   bool is_behind = false;   ///< rows are behind their nodes
 };
 
-/// Gives moments what the row of a resting cell says; the second moment of mass stays.
+/// Gives moments what the row of a resting cell says; those of mass stay.
 template <class G, int D = G::dim>
 void take_row(const Particles<D>& particles, Index row, CellMoments<G>& moments);
 
@@ -81,7 +86,7 @@ inline Matrix<D> gradient_at(const OptionalColumns<D * D>& columns, Index row)
   return gradient;
 }
 
-/// sum m_p (a . xi) (b . xi) over a cell's particles.
+/// Product of the gradients of two scalars, a . S b of the second moment S = sum m_p xi (x) xi.
 template <int D>
 inline double relative_product(const Vector<D>& a, const Vector<D>& b,
                                const std::array<double, n_symmetric<D>>& second_moment)
@@ -93,15 +98,19 @@ inline double relative_product(const Vector<D>& a, const Vector<D>& b,
   return sum;
 }
 
-/// sum m_p a_p . b_p of two velocities a + A . xi and b + B . xi of a cell's particles, beyond what those of the centre
-/// give: A : B (x) second moment. Twice the kinetic energy of motion relative to the centre where they are the same.
+/// An affine scalar in a cell: value + gradient . xi
 template <int D>
-inline double relative_product(const Matrix<D>& a, const Matrix<D>& b,
-                               const std::array<double, n_symmetric<D>>& second_moment)
+struct AffineScalar
 {
-  double sum = 0;
-  for (int i = 0; i < D; ++i)
-    sum += relative_product<D>(a[i], b[i], second_moment);
-  return sum;
+  double value;
+  Vector<D> gradient;
+};
+
+/// sum m_p a_p b_p of two affine scalars over a cell's particles.
+template <class G, int D = G::dim>
+inline double sum_of_products(const AffineScalar<D>& a, const AffineScalar<D>& b, const CellMoments<G>& moments)
+{
+  return moments.mass * a.value * b.value + a.value * dot<D>(b.gradient, moments.mass_xi) +
+         b.value * dot<D>(a.gradient, moments.mass_xi) + relative_product<D>(a.gradient, b.gradient, moments.mass_xixi);
 }
 } // namespace mpm::transfer

@@ -13,10 +13,10 @@ from fenics_bridge import water
 ELASTIC = mpm.LinearElastic(young=10e6, poisson=0.3)
 
 
-def on_box(lengths, cells, law, comm=MPI.COMM_WORLD, **seeds):
+def on_box(lengths, cells, law, comm=MPI.COMM_WORLD, geometry=None, **seeds):
     """Particles that fill a box on rollers at its vertical sides and a fixed base; returns the model and the facet tags."""
     domain, _, facet_tags = bridge.box_mesh(comm, lengths, cells)
-    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law)
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law, geometry=geometry)
     model.seed(**{"density": 2000.0, "per_cell": 3, **seeds})
     dim = len(lengths)
     for axis in range(dim - 1):

@@ -76,7 +76,8 @@ class RestingCells:
         fails (`Conversion`), which changes neither mass, momentum and force of the nodes nor the energy.
 
         Stress, state and all other values of a cell are the means of those of its particles. `particles` has one row for each
-        resting cell, at its centre, with the mass and volume of the cell; `particles.is_resting` marks these rows.
+        resting cell, at its centre, with the mass and volume of the cell; `particles.is_resting` marks these rows. In axial
+        symmetry stresses and states are means by volume, and its velocity is that at the centre, not at the centre of mass.
 
         Args:
             cell_tag: cells with this tag, or these tags, by number or name; all cells by default.
@@ -87,8 +88,8 @@ class RestingCells:
             Number of resting cells over all ranks.
 
         Raises:
-            InputError: on all ranks: cells whose particles are not where `seed` placed them, or carry tractions; axial
-                symmetry, several velocity fields.
+            InputError: on all ranks: cells whose particles are not where `seed` placed them, or carry tractions; several
+                velocity fields.
 
         Example:
             >>> model.seed(density=2000.0, per_cell=10)

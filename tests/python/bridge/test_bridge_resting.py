@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from axisymmetric_cases import cylinder_fem, cylinder_particles
 from bridge_cases import slope_model, slope_particles
 
 import fenics_bridge as bridge
@@ -48,6 +49,23 @@ def test_resting_cells_start_to_slide_as_particles_do():
     means = [mean / size for mean, size in zip(means, scale)]
     assert 0.002 < moved < 0.01
     np.testing.assert_allclose(means[1], means[0], atol=2 * moved)
+
+
+def test_a_body_of_revolution_goes_on_at_rest_until_its_foot_fails():
+    """Linear elements and resting cells are the same in axial symmetry; under twice the weight the foot yields first."""
+    fem = cylinder_fem(degree=1)
+    model = cylinder_particles(headroom=0.25)
+    assert bridge.initialise(model, fem, count_displacement=False, resting=True).unbalanced_ratio < 1e-9
+    report = model.explicit(0.02, damping=0.5).last()
+    assert report.converted_cells == 0 and report.unbalanced_ratio < 1e-8
+    model.set_gravity((0.0, -2 * 9.81))
+    start = report.mass
+    report = model.explicit(0.09, conversion=mpm.Conversion(plastic_strain=0.01, displacement=1.0, layers=1)).last()
+    assert report.mass == pytest.approx(start, rel=1e-12)
+    assert report.converted_cells > 0 and report.resting_cells > 0
+    p = model.particles
+    foot, top = p.position @ (1.0, -1.0) > 0.6, p.position @ (1.0, -1.0) < -0.6  # outside below, on the axis above
+    assert foot.any() and not p.is_resting[foot].any() and top.any() and p.is_resting[top].all()
 
 
 def test_resting_cells_are_not_moved_by_the_hand_over():
