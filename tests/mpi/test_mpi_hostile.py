@@ -70,6 +70,8 @@ HOSTILE = {
     "gravity": (described(gravity=[1e400, 0]), "gravity in its description"),
     "supports": (described(supports=[[1, True]]), "supports in its description"),
     "prescribed": (described(prescribed={"2": 99}), "prescribed in its description"),
+    "geometry": (described(geometry=["PLANE_STRAIN"]), "geometry in its description"),
+    "contacts": (described(contacts=[{"surface": {"kind": ["Box"]}}]), "contacts in its description"),
     "implicit": (described(implicit={"pace": 1}), "implicit in its description"),
     "huge number of particles": (replaced("particles/id", (2**40,)), "/particles/id"),
     "particles that are not stored": (replaced("particles/id", (2**30,)), "/particles/id"),

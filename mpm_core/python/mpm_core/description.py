@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from typing import Any
 
 from ._core import Geometry, RunError
@@ -23,10 +22,10 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
         raise RunError(f"cannot read checkpoint {path}: its description is damaged ({error})") from None
     if not isinstance(there, dict):
         raise RunError(f"cannot read checkpoint {path}: its description is no table of entries")
-    for name, (is_right, expected) in _EXPECTED.items():
+    for name, (shape, expected) in _ENTRIES.items():
         if name not in there and name in _OPTIONAL:
             continue
-        if not is_right(there.get(name)):
+        if not _has_shape(there.get(name), shape):
             raise RunError(
                 f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, "
                 f"expected {expected}"
@@ -39,10 +38,50 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
     return there
 
 
+# --- shapes of entries -----------------------------------------------------------------------------------------------
+
+
+def _has_shape(value: Any, shape: Any) -> bool:
+    """Whether a value of JSON has a shape.
+
+    Args:
+        value: a value as `json.loads` returns it.
+        shape: a type; a set of what the value may be; a function that checks it; a list with the shape of all items; a tuple with
+            the shapes of a list of fixed length; a table with the shape of each key, where a question mark after a key says that
+            older files lack it; or several of these, `AnyOf`.
+    """
+    if isinstance(shape, AnyOf):
+        return any(_has_shape(value, one) for one in shape)
+    if isinstance(shape, dict):
+        known = {key.rstrip("?"): key for key in shape}
+        return (
+            isinstance(value, dict)
+            and set(value) <= set(known)
+            and all(key in value or known[key].endswith("?") for key in known)
+            and all(_has_shape(one, shape[known[key]]) for key, one in value.items())
+        )
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(_has_shape(one, shape[0]) for one in value)
+    if isinstance(shape, tuple):
+        return isinstance(value, list) and len(value) == len(shape) and all(map(_has_shape, value, shape))
+    if isinstance(shape, set):
+        return isinstance(value, (str, int, float)) and value in shape
+    return isinstance(value, shape) if isinstance(shape, type) else bool(shape(value))
+
+
+class AnyOf(tuple[Any, ...]):
+    """Shapes of which a value has one."""
+
+
 def _is_number(value: Any) -> bool:
     return (
         isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
     )
+
+
+def _is_positive(value: Any) -> bool:
+    """Whether it is a number from 0 on."""
+    return _is_number(value) and value >= 0
 
 
 def _is_count(value: Any) -> bool:
@@ -53,179 +92,79 @@ def _is_tag(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**31
 
 
-def _are(kind: Callable[[Any], bool], value: Any) -> bool:
-    return isinstance(value, list) and all(map(kind, value))
-
-
-def _is_support(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and len(value) == 3
-        and _is_tag(value[0])
-        and isinstance(value[1], bool)
-        and (_are(lambda one: value[1] and one is None or _is_number(one), value[2]) and len(value[2]) in (0, 2, 3))
-    )
-
-
-def _is_field(value: Any) -> bool:
-    return (
-        isinstance(value, dict)
-        and set(value) == {"name", "unit", "meaning", "components", "initial"}
-        and all(isinstance(value[key], str) for key in ("name", "unit", "meaning"))
-        and _is_count(value["components"])
-        and 0 < value["components"] < 1000
-        and _is_number(value["initial"])
-    )
-
-
-def _is_known_by_fingerprint(surface: Any) -> bool:
-    return isinstance(surface.get("fingerprint"), str) and _is_count(surface.get("triangles"))
-
-
 def _is_surface(value: Any) -> bool:
-    return (
-        isinstance(value, dict)
-        and value.get("kind") in KINDS
-        and (value["kind"] != "Triangles" or _is_known_by_fingerprint(value))
-    )
-
-
-def _is_contact(value: Any) -> bool:
-    return (
-        isinstance(value, dict)
-        and set(value) | {"bonded"} == {"surface", "friction", "adhesion", "penalty", "bonded", "body"}
-        and isinstance(value.get("bonded", False), bool)
-        and _is_surface(value["surface"])
-        and all(_is_number(value[key]) for key in ("friction", "adhesion", "penalty"))
-        and _is_body(value["body"])
-    )
-
-
-def _is_field_contact(value: Any) -> bool:
-    return (
-        isinstance(value, dict)
-        and set(value) == {"first", "second", "friction", "adhesion", "interface"}
-        and _is_surface(value["interface"])
-        and all(_is_count(value[key]) for key in ("first", "second"))
-        and all(_is_number(value[key]) for key in ("friction", "adhesion"))
-    )
-
-
-_BODY_NUMBERS, _BODY_HISTORIES = ("start", "mass", "speed"), ("velocity", "spin", "force")
-
-
-def _is_body(value: Any) -> bool:
-    return (
-        isinstance(value, dict)
-        and set(value) == {*_BODY_NUMBERS, *_BODY_HISTORIES, "centre", "inertia", "drive", "rotates"}
-        and all(_is_number(value[key]) for key in _BODY_NUMBERS)
-        and all(_is_history(value[key]) for key in _BODY_HISTORIES)
-        and all(_are(_is_number, value[key]) for key in ("centre", "inertia"))
-        and _are(lambda one: one in (0, 1, 2), value["drive"])
-        and isinstance(value["rotates"], bool)
-    )
-
-
-def _is_history(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and len(value) == 2
-        and _are(_is_number, value[0])
-        and _are(lambda row: _are(_is_number, row), value[1])
-    )
-
-
-def _is_water(value: Any) -> bool:
-    if value is None:
-        return True
-    texts = {"modulus", "suction_limit"}  # as they may be infinite
-    newer = {"suction_limit", "standing", "rain", "retention"}  # which older files lack
-    return (
-        isinstance(value, dict)
-        and set(value) | newer == texts | newer | {"unit_weight", "kozeny_carman", "drained_surface", "conditions"}
-        and _is_number(value["unit_weight"])
-        and all(isinstance(value[key], str) for key in texts & set(value))
-        and all(isinstance(value[key], bool) for key in ("kozeny_carman", "drained_surface"))
-        and _are(_is_water_condition, value["conditions"])
-        and all(_are(_is_pair, value.get(key, [])) for key in ("standing", "rain"))
-        and _are(lambda curves: _are(lambda one: _are(_is_number, one), curves), value.get("retention", []))
-    )
-
-
-def _is_pair(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 2 and _are(_is_number, value)
-
-
-def _is_water_condition(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and len(value) == 5
-        and _is_tag(value[0])
-        and (_is_number(value[1]) or _are(_is_pair, value[1]))
-        and _is_number(value[2])
-        and all(isinstance(one, bool) for one in value[3:])
-    )
+    """Whether it is a surface of a known kind; its numbers are checked when it is made."""
+    if not isinstance(value, dict) or not _has_shape(value.get("kind"), set(KINDS)):
+        return False
+    by_fingerprint = isinstance(value.get("fingerprint"), str) and _is_count(value.get("triangles"))
+    return value["kind"] != "Triangles" or by_fingerprint
 
 
 def _is_border(value: Any) -> bool:
-    if value is None:
-        return True
-    if not (
-        isinstance(value, dict) and set(value) == {"marks", "held", "displacement"} and _are(_is_number, value["marks"])
-    ):
+    """Whether it is the state of a far field, with a row for each node of its border."""
+    if not _has_shape(value, {"marks": [_is_number], "held": [_VECTOR], "displacement": [_VECTOR]}):
         return False
     n = value["marks"][0] if len(value["marks"]) == 3 else -1
-    return all(
-        isinstance(rows, list) and len(rows) == n and all(_are(_is_number, row) and len(row) in (2, 3) for row in rows)
-        for rows in (value["held"], value["displacement"])
-    )
+    return len(value["held"]) == n and len(value["displacement"]) == n
 
 
-def _is_control(value: Any) -> bool:
-    if value is None:
-        return True
-    return (
-        isinstance(value, dict)
-        and {"longest", "length"} <= set(value) <= {"longest", "length", "iterations", "cuts"}
-        and all(_is_number(one) and one >= 0 for one in value.values())
-    )
-
+_PAIR = (_is_number, _is_number)
+_VECTOR = AnyOf([_PAIR, (_is_number, _is_number, _is_number)])
+_NONE = type(None)
+_FREE = AnyOf([_NONE, _is_number])
+"""A component of a support along which there is none, or its value"""
+_SUPPORT = AnyOf([
+    (_is_tag, lambda v: v is True, AnyOf([(), (_FREE, _FREE), (_FREE, _FREE, _FREE)])), (_is_tag, bool, AnyOf([(), *_VECTOR])),
+])  # fmt: skip
+_HISTORY = ([_is_number], [[_is_number]])
+_FIELD = {
+    "name": str, "unit": str, "meaning": str, "components": lambda v: _is_count(v) and 0 < v < 1000, "initial": _is_number
+}  # fmt: skip
+_BODY = {
+    "start": _is_number, "mass": _is_number, "speed": _is_number, "velocity": _HISTORY, "spin": _HISTORY, "force": _HISTORY,
+    "centre": [_is_number], "inertia": [_is_number], "drive": [{0, 1, 2}], "rotates": bool,
+}  # fmt: skip
+_CONTACT = {
+    "surface": _is_surface, "friction": _is_number, "adhesion": _is_number, "penalty": _is_number, "bonded?": bool, "body": _BODY
+}  # fmt: skip
+_FIELD_CONTACT = {
+    "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
+}  # fmt: skip
+_WATER = {
+    "unit_weight": _is_number, "modulus": str, "suction_limit?": str,  # texts, as they may be infinite
+    "kozeny_carman": bool, "drained_surface": bool, "standing?": [_PAIR], "rain?": [_PAIR], "retention?": [[[_is_number]]],
+    "conditions": [(_is_tag, AnyOf([_is_number, [_PAIR]]), _is_number, bool, bool)],
+}  # fmt: skip
+_CONTROL = {"longest": _is_positive, "length": _is_positive, "iterations?": _is_positive, "cuts?": _is_positive}
 
 _OPTIONAL = (
-    "added_fields",
-    "contacts",
-    "far_field",
-    "field_contacts",
-    "water",
-    "geometry",
-    "velocity_fields",
-    "cuts",
-    "left_imbalance",
-    "implicit",
-    "notes",
-)
-_EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "added_fields", "contacts", "far_field", "field_contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance",
+    "implicit", "notes",
+)  # fmt: skip
+"""Entries that older files lack"""
+
+_ENTRIES: dict[str, tuple[Any, str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
     "time": (_is_number, "a number [s]"),
     "steps": (_is_count, "a whole number from 0 on"),
-    "dimension": (lambda v: v in (2, 3), "2 or 3"),
-    "mesh": (lambda v: isinstance(v, str), "a text"),
-    "materials": (lambda v: _are(lambda one: isinstance(one, str), v), "a list of texts"),
-    "gravity": (lambda v: _are(_is_number, v) and len(v) in (2, 3), "2 or 3 numbers [m/s2]"),
-    "gravity_ramp": (lambda v: _is_number(v) and v >= 0, "a number from 0 on [s]"),
-    "outflow_tags": (lambda v: _are(_is_tag, v), "a list of tags"),
-    "supports": (lambda v: _are(_is_support, v), "a list of [tag, whole, vector]"),
-    "prescribed": (lambda v: isinstance(v, dict), "a table"),
+    "dimension": ({2, 3}, "2 or 3"),
+    "mesh": (str, "a text"),
+    "materials": ([str], "a list of texts"),
+    "gravity": (_VECTOR, "2 or 3 numbers [m/s2]"),
+    "gravity_ramp": (_is_positive, "a number from 0 on [s]"),
+    "outflow_tags": ([_is_tag], "a list of tags"),
+    "supports": ([_SUPPORT], "a list of [tag, whole, vector]"),
+    "prescribed": (dict, "a table"),
     "next_id": (_is_count, "a whole number from 0 on"),
-    "added_fields": (lambda v: _are(_is_field, v), "a list of {name, unit, meaning, components, initial}"),
-    "contacts": (lambda v: _are(_is_contact, v), "a list of contacts with rigid surfaces"),
-    "field_contacts": (lambda v: _are(_is_field_contact, v), "a list of contacts between velocity fields"),
-    "far_field": (_is_border, "null, or forces and displacements of its border"),
-    "water": (_is_water, "null, or the properties of the pore water"),
-    "geometry": (lambda v: v in Geometry.__members__, f"one of {', '.join(Geometry.__members__)}"),
-    "velocity_fields": (lambda v: _are(_is_count, v), "a list of whole numbers from 0 on"),
+    "added_fields": ([_FIELD], "a list of {name, unit, meaning, components, initial}"),
+    "contacts": ([_CONTACT], "a list of contacts with rigid surfaces"),
+    "field_contacts": ([_FIELD_CONTACT], "a list of contacts between velocity fields"),
+    "far_field": (AnyOf([_NONE, _is_border]), "null, or forces and displacements of its border"),
+    "water": (AnyOf([_NONE, _WATER]), "null, or the properties of the pore water"),
+    "geometry": (set(Geometry.__members__), f"one of {', '.join(Geometry.__members__)}"),
+    "velocity_fields": ([_is_count], "a list of whole numbers from 0 on"),
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
-    "implicit": (_is_control, "null, or the state of an implicit run"),
-    "notes": (lambda v: isinstance(v, dict), "a table"),
+    "implicit": (AnyOf([_NONE, _CONTROL]), "null, or the state of an implicit run"),
+    "notes": (dict, "a table"),
 }
