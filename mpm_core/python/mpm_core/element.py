@@ -15,7 +15,7 @@ MAX_ITERATIONS = 50
 
 
 class ElementTest:
-    """One point of a law under mixed control of strain and stress.
+    """One point of a law, of which some components of strain and the others of stress are prescribed.
 
     Args:
         law: any law.
