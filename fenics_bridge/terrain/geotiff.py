@@ -69,6 +69,24 @@ def _name(path: Path, reference: Any) -> str:
     return name
 
 
+def check_reference(path: Path, name: str) -> None:
+    """Look up the coordinate reference that a raster or its user names, where rasterio is installed.
+
+    Raises:
+        InputError: one that rasterio does not know, or in degrees or feet.
+    """
+    try:
+        import rasterio
+    except ImportError:
+        return
+    try:
+        reference = rasterio.crs.CRS.from_user_input(name)
+    except rasterio.errors.CRSError as error:
+        raise InputError(f"crs: {name[:40]!r} of {str(path)!r} is unknown ({error}), expected for instance 'EPSG:25832', or "
+                         "'local'") from None  # fmt: skip
+    _name(path, reference)
+
+
 def write_geotiff(
     path: Path, x: NDArray[np.float64], y: NDArray[np.float64], values: NDArray[np.float64], crs: str
 ) -> None:

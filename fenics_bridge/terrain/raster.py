@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError
-from fenics_bridge.terrain.geotiff import read_geotiff, write_geotiff
+from fenics_bridge.terrain.geotiff import check_reference, read_geotiff, write_geotiff
 
 TIFF = (".tif", ".tiff")
 STEEPEST = 20.0
@@ -184,6 +184,8 @@ def _reference(path: Path, crs: Any) -> Any:
         raise InputError(
             f"crs: {str(path)!r} is in degrees ({found[:40]}), expected metres; project it first, for instance by gdalwarp"
         )
+    if found != "local":
+        check_reference(path, str(found))
     return found
 
 

@@ -10,11 +10,14 @@ from ._core import InputError
 
 def positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
     """A finite number above zero, or at least zero."""
-    if not (np.isfinite(value) and (value >= 0 if zero else value > 0)):
-        raise InputError(
-            f"{name} is {value} {unit}, expected a {'number not below zero' if zero else 'positive number'}"
-        )
-    return float(value)
+    expected = "number not below zero" if zero else "positive number"
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}, expected a {expected}") from None
+    if not (np.isfinite(number) and (number >= 0 if zero else number > 0)):
+        raise InputError(f"{name} is {value} {unit}, expected a {expected}")
+    return number
 
 
 def within(name: str, value: float, low: float, high: float, *, open_above: bool = False) -> float:

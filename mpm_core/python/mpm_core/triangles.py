@@ -126,12 +126,23 @@ def _check_sides(vertices: NDArray[np.float64], triangles: NDArray[Any]) -> None
         raise InputError(f"triangle {t} at {_centre(vertices, triangles[t])} m runs the other way than its neighbours")
     border = np.flatnonzero(counts[group] == 1)
     borders = sorted(_loops(starts[border], ends[border], border // 3), key=len)
-    if len(borders) > 1:
+    if len(borders) > 1 or (borders and _is_nearly_closed(vertices, triangles, len(borders[0]))):
         t = borders[0][0]
         raise InputError(
             f"triangles have a hole beside triangle {t} at {_centre(vertices, triangles[t])} m, with {len(borders[0])} sides; "
             "expected a closed surface, or ground with one border"
         )
+
+
+def _is_nearly_closed(vertices: NDArray[np.float64], triangles: NDArray[Any], sides: int) -> bool:
+    """Whether the only border, with so many sides, is a hole of a body: a missing triangle, or a fiftieth of the surface.
+
+    The sum of the areas as vectors is the area within the border. That of ground is not much smaller than the surface.
+    """
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    areas = np.cross(b - a, c - a)
+    opening = np.linalg.norm(areas.sum(axis=0)) / np.linalg.norm(areas, axis=1).sum()
+    return bool(opening < (0.25 if sides == 3 else 0.02))
 
 
 def _centre(vertices: NDArray[np.float64], corners: NDArray[Any]) -> str:

@@ -85,6 +85,15 @@ def test_damaged_files_and_unknown_references_are_named(tmp_path):
         terrain.write_raster(tmp_path / "new.tif", hill("EPSG:0"))
 
 
+@pytest.mark.parametrize(
+    "crs, message", [("EPSG:999999", "'EPSG:999999' of .* is unknown"), ("EPSG:2263", "is in US survey foot")]
+)
+def test_the_reference_of_an_ascii_grid_is_looked_up(crs, message, tmp_path):
+    terrain.write_raster(tmp_path / "ground.asc", hill())
+    with pytest.raises(bridge.InputError, match=message):
+        terrain.read_raster(tmp_path / "ground.asc", crs=crs)
+
+
 def test_the_package_that_is_missing_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rasterio", None)
     for attempt in (lambda p: terrain.write_raster(p, hill()), terrain.read_raster):

@@ -244,6 +244,16 @@ def test_a_hole_is_named_by_a_triangle_beside_it():
     mpm.Triangles(points, triangles[1:])  # at the border: no hole
 
 
+def test_a_body_with_a_hole_is_not_taken_for_ground():
+    corners = np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    faces = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    cube = np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
+    mpm.Triangles(corners, cube)
+    with pytest.raises(mpm.InputError, match="a hole beside triangle .* with 3 sides"):
+        mpm.Triangles(corners, np.delete(cube, 3, axis=0))
+    mpm.Triangles(corners, np.delete(cube, [2, 3], axis=0)[:, ::-1])  # a bin that is open above, with the soil inside
+
+
 def test_triangles_are_for_three_dimensions():
     model = mpm.Model(box((2, 2)), mpm.LinearElastic(young=1e6, poisson=0.3))
     model.seed_points([(0.5, 0.5)], [1e-3], density=1000.0)
