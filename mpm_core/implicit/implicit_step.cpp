@@ -214,6 +214,8 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   model.energy.ahead = 0; // velocities and stresses are of one time
   migrate_particles(model);
   update_resting_rows(model);
+  if (step.pore.flows && changes_masses(*model.water, options))
+    take_masses(model);
   make_resting_cells(model.mesh, model.particles, field);
   model.time += step.dt;
   ++model.totals.steps;
@@ -221,11 +223,6 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const bool books = step.pore.flows && !model.water->may_dry(); // the energy of suction has no account
   if (options.quasi_static && !books) // what the loads do beyond the stresses' work goes nowhere
     start_energy_balance(model);
-  if (model.water && model.water->may_dry()) // the masses have changed
-  {
-    model.ready = false;
-    prepare(model);
-  }
   map_to_nodes_again(model, step);
   return true;
 }

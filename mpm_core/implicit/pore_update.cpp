@@ -113,26 +113,42 @@ double add_increments(Particles<G::dim>& particles, double modulus, const Run& r
   return work;
 }
 
-/// Lets saturation and mass follow the water that particles take up over the step.
+/// Lets mass, and the saturation of soil that may dry, follow the water that particles take up over the step.
 /// @pre pressures are those of the end, volumes and porosities of the start
+/// @returns kinetic energy of the water that leaves them, which moves as they do
 template <class G, int D = G::dim>
-void dry_particles(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double growth,
-                   const CellPressure<D>& pressure, const Vector<G::dim>& centre, Particles<D>& particles)
+double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double growth,
+                     const CellPressure<D>& pressure, const Vector<G::dim>& centre, Particles<D>& particles)
 {
-  const Retention& retention = water.retention[static_cast<std::size_t>(run.material)];
+  double kinetic = 0;
   for (Index p = run.first; p < run.last; ++p)
   {
     double increment = pressure.increment;
     for (int a = 0; a < D; ++a)
       increment += pressure.of_increment[a] * (particles.position[a][p] - centre[a]);
-    const double porosity = particles.porosity[0][p], before = particles.saturation[0][p];
-    const double after = wetness_at(retention, particles.pore_pressure[0][p]).saturation;
+    const double porosity = particles.porosity[0][p];
+    double before = 1, after = 1;
+    if (water.may_dry())
+    {
+      before = particles.saturation[0][p];
+      after = wetness_at(water.retention[static_cast<std::size_t>(run.material)], particles.pore_pressure[0][p])
+                  .saturation;
+      particles.saturation[0][p] = after;
+    }
     const double gained = after * (growth + porosity / water.modulus * increment) + (after - before) * porosity;
-    particles.mass[p] += step.pore.density * particles.volume[p] * gained;
-    particles.saturation[0][p] = after;
+    const double mass = step.pore.density * particles.volume[p] * gained;
+    const Vector<D> v = at<D>(particles.velocity, p);
+    kinetic -= 0.5 * mass * dot<D>(v, v);
+    particles.mass[p] += mass;
   }
+  return kinetic;
 }
 } // namespace
+
+bool changes_masses(const PoreWater& water, const ImplicitOptions& options)
+{
+  return water.may_dry() || !options.hold_positions;
+}
 
 template <class G>
 void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
@@ -149,9 +165,11 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       const auto pressure = cell_pressure(mesh, field, step, run.cell);
       model.energy.stress_work +=
           add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
-      if (model.water->may_dry())
-        dry_particles(run, *model.water, step, volume_strain(mesh, field, step.dt, run.cell), pressure, centre,
-                      model.particles);
+      const double growth = step.options.nmd ? step.strains[run.cell].volumetric
+                                             : volume_strain(mesh, field, step.dt, run.cell);
+      if (changes_masses(*model.water, step.options))
+        model.energy.outflow_kinetic +=
+            take_up_water(run, *model.water, step, growth, pressure, centre, model.particles);
     }
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,

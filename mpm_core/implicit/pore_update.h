@@ -7,9 +7,14 @@
 
 namespace mpm::implicit
 {
+/// Whether the masses of particles follow the water in their pores: not where small displacements leave all pores as
+/// they are and full.
+bool changes_masses(const PoreWater& water, const ImplicitOptions& options);
+
 /// Adds the increments of pressure to the particles, with what they store in the water, n V p dp / K_w, gives them the
 /// gradient at the end, and lets porosity follow the volume (grains do not change theirs) and, where the model says so,
-/// conductivity the porosity. Where soil may dry its saturation follows the pressure, and its mass the water in it.
+/// conductivity the porosity. Masses follow the water that the pores hold, and where soil may dry its saturation the
+/// pressure.
 /// @pre particles are where they were at the step's start
 template <class G>
 void update_pore_water(Model<G>& model, const ImplicitStep<G>& step);

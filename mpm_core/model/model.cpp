@@ -235,9 +235,26 @@ void prepare(Model<G>& model)
   }
 }
 
+template <class G>
+void take_masses(Model<G>& model)
+{
+  for (const std::vector<Run>* runs : {&model.order.runs, &model.fields.front().resting.runs})
+    for (const Run& run : *runs)
+    {
+      VelocityField<G>& field = field_of(model, run.material);
+      field.moments[run.cell] = {};
+      if (!field.tractions.empty())
+        field.tractions[run.cell] = {};
+    }
+  sum_moments(model);
+  find_least_masses(model);
+  model.inventory = taken_inventory(model);
+}
+
 #define INSTANTIATE(G)                                                                                                 \
   template void set_laws(Model<G>&, std::vector<Law>, std::vector<Index>);                                             \
   template void prepare(Model<G>&);                                                                                    \
+  template void take_masses(Model<G>&);                                                                                \
   template Inventory taken_inventory(const Model<G>&);                                                                 \
   template void sort_particles(Model<G>&);                                                                             \
   template void find_cell_runs(Model<G>&, bool);

@@ -177,6 +177,11 @@ inline Vector<D> gravity_at(const Model<G>& model, double time)
 template <class G>
 void prepare(Model<G>& model);
 
+/// Brings moments of cells up to date with masses of particles that a step has changed, in their order as it is.
+/// @note Collective
+template <class G>
+void take_masses(Model<G>& model);
+
 /// The failure of a particle.
 template <int D>
 Failure<D> failure_of(const Particles<D>& particles, typename Failure<D>::Kind kind, Index particle,

@@ -73,3 +73,30 @@ def test_a_step_that_would_close_the_pores_is_refused():
     model.particles.set("porosity", np.full(len(model.particles), 0.02))
     with pytest.raises(mpm.RunError, match="lose its volume"):
         list(model.implicit(1e6, dt=1e5, quasi_static=True))
+
+
+@pytest.mark.parametrize("nmd", [False, True])
+def test_pressed_soil_loses_the_weight_of_the_water_that_leaves_it(nmd):
+    """A column under water that loses some 10 % of its height rests under its buoyant weight and its load: sum V s' = sum f y."""
+    model = mpm.Model(box([1, 16], [0.1, 4 / 3], body=([0, 0], [0.1, 1.0])), mpm.LinearElastic(young=100e3, poisson=0.3))
+    model.seed(density=1800.0, per_cell=3, cell_tag=1)
+    model.roller(1, (1, 0))
+    model.roller(2, (1, 0))
+    model.fix(3)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=0.5, conductivity=1e-6, modulus=np.inf, drained_surface=True)
+    model.stand_water(2.0)
+    p = model.particles
+    model.set_pore_pressure(lambda x: 9810.0 * (2.0 - x[:, 1]))
+    p.set("stress", -(1800 * 9.81 - 9810) * (1 - p.position[:, 1:]) * np.array([3 / 7, 1, 3 / 7, 0]))
+    load = -20e3 * 0.1 * p.volume / p.volume.sum()
+    p.set("traction", np.column_stack([0 * load, load]))
+    mass, pores, dt = p.mass.sum(), (p.volume * p.porosity).sum(), 1000.0
+    while model.time < 1e6:
+        model.implicit(model.time + dt, dt=dt, quasi_static=True, nmd=nmd).last()
+        dt = min(1.6 * dt, 2e5)
+    lost = mass - p.mass.sum()
+    assert lost == pytest.approx(-1000 * model.water_inflow(), rel=1e-9) and lost > 0.03 * mass
+    assert lost == pytest.approx(1000 * (pores - (p.volume * p.porosity).sum()), rel=1e-9)
+    carried = load - 9.81 * (p.mass - 1000 * p.volume)
+    assert p.volume @ p.stress[:, 1] == pytest.approx(carried @ p.position[:, 1], rel=5e-3)
