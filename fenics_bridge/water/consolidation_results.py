@@ -1,0 +1,150 @@
+"""What a consolidation has found: displacements, pressures, stresses, forces, and the water that is there and that flows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import ArrayLike, NDArray
+
+from fenics_bridge import compat
+from fenics_bridge.fem.equilibrium import Body
+from fenics_bridge.fem.evaluate import evaluate_at
+from fenics_bridge.fem.fields import force_on, nodal_average, part_of
+from fenics_bridge.fem.point_functions import PointFunctions
+from fenics_bridge.types import MeshTags, OfPosition
+from fenics_bridge.water.applied import AppliedBoundary
+from fenics_bridge.water.coupled import WaterTerms
+from fenics_bridge.water.motion import Motion
+from fenics_bridge.water.positions import at_positions
+
+
+class ConsolidationResults(PointFunctions):
+    """The results of `Consolidation`, whose constructor sets these attributes."""
+
+    domain: Mesh
+    radius: Any
+    pressure: fem.Function
+    motion: Motion | None
+    _body: Body
+    _laws: list[Any]
+    _terms: WaterTerms
+    _applied: AppliedBoundary
+    _soils: Any
+    _displacements: Any
+    _facet_tags: MeshTags
+    _external: NDArray[np.float64]
+    _inflow: NDArray[np.float64]
+
+    @property
+    def displacement(self) -> fem.Function:
+        """Displacement as a function of its own [m]."""
+        return part_of(self._body.solution, self._displacements, "displacement")
+
+    def stress_function(self, smooth: bool = False) -> fem.Function:
+        """Effective stress as a function.
+
+        Args:
+            smooth: average the stress of the cells at the nodes, which makes it continuous.
+
+        Returns:
+            Effective stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
+
+        Note:
+            Collective.
+        """
+        mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
+        return nodal_average(mean, self.radius) if smooth else mean
+
+    @property
+    def laws(self) -> list[Any]:
+        """The laws as a list, in the order in which they were given."""
+        return self._laws
+
+    def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Values at points, whichever ranks have the points and their cells.
+
+        Args:
+            points: positions [m], shape (n, D).
+
+        Returns:
+            `displacement` [m], shape (n, D), `pressure` [Pa], shape (n, 1), and effective `stress` [Pa], shape (n, S).
+
+        Raises:
+            InputError: a point is outside the body; the message names it. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        return evaluate_at(
+            points, displacement=self.displacement, pressure=self.pressure, stress=self.stress_function()
+        )
+
+    def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
+        """The pore pressure as a function of positions, for stages, collapse loads and factors of safety, as of `Seepage`.
+
+        Args:
+            suction: False for zero where it is negative; True for the suction there times the effective saturation at the nodes.
+            outside: function of positions (n, D) [m] for points outside the body; None for zero there.
+
+        Returns:
+            Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
+
+        Note:
+            Collective.
+        """
+        acting = fem.Function(self.pressure.function_space, name="pore_pressure")
+        acting.x.array[:] = np.maximum(self.pressure.x.array, 0.0)
+        for soil, cells in zip(self._soils[0], self._soils[2]) if suction else ():
+            part = soil.retention.effective(-self.pressure) * self.pressure
+            acting.interpolate(fem.Expression(part, compat.interpolation_points(acting.function_space)), cells)
+        return at_positions(acting, outside)
+
+    def stored_water(self) -> float:
+        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure.
+
+        Note:
+            Collective.
+        """
+        return self.domain.comm.allreduce(fem.assemble_scalar(self._terms.content))
+
+    def inflow(self, facet_tag: int | str | None) -> float:
+        """Water that entered through the facets of a tag in the last step; as for `Seepage`.
+
+        Args:
+            facet_tag: number or name of the tag; None for all boundary conditions together.
+
+        Returns:
+            Inflow [m3/s], [m2/s] in plane strain; negative where water leaves.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        return self._applied.inflow(facet_tag, self._inflow)
+
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """Force of the body, soil and water, on its support at the facets of a tag, summed over them.
+
+        Args:
+            facet_tag: number or name of the tag.
+
+        Returns:
+            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        self._body.increment.x.array[:] = 0.0
+        if self.motion is not None:
+            self.motion.rest_on()
+        forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
+        space, dofs = self._displacements
+        return force_on(space, forces[dofs], self._facet_tags, facet_tag)
