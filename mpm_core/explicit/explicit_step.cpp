@@ -72,7 +72,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     clock.begin(Phase::mapping);
     find_velocity_change(field, options.pic_fraction, dt);
     scatter_momentum<G>(mesh, exchange, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
-    map_resting_change<G>(mesh, field, field.velocity);
+    map_resting_change<G>(field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - options.pic_fraction, field);
   }

@@ -4,6 +4,7 @@
 #include "transfer/resting.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace mpm::model
 {
@@ -24,14 +25,29 @@ namespace
 {
 /// sum m_p N_k N_l over the particles of a cell.
 template <class G, int D = G::dim>
-double mass_of(const CellMoments<G>& moments, const CellShape<D>& shape, int k, int l)
+VertexMatrix<D> mass_matrix(const CellMoments<G>& moments, const CellShape<D>& shape)
 {
-  const AffineScalar<D> n_k{1.0 / (D + 1), shape.gradient[k]}, n_l{1.0 / (D + 1), shape.gradient[l]};
-  return sum_of_products<G>(n_k, n_l, moments);
+  VertexMatrix<D> masses;
+  for (int k = 0; k <= D; ++k)
+    for (int l = 0; l <= D; ++l)
+      masses[k][l] =
+          sum_of_products<G>({1.0 / (D + 1), shape.gradient[k]}, {1.0 / (D + 1), shape.gradient[l]}, moments);
+  return masses;
 }
 
-/// Shape functions and masses of the cells. By symmetry of the rule the mass matrix of a cell has one number on its
-/// diagonal and one elsewhere, and its rows sum up to m / (D + 1); not in axial symmetry, where the moments are used.
+/// Whether a matrix has one number on its diagonal and one elsewhere. That of a rule that is the same for all vertices
+/// has; not those of eight or 32 points in a tetrahedron, nor any in axial symmetry.
+template <int D>
+bool is_uniform(const VertexMatrix<D>& masses)
+{
+  for (int k = 0; k <= D; ++k)
+    for (int l = 0; l <= D; ++l)
+      if (std::abs(masses[k][l] - masses[0][k == l ? 0 : 1]) > 1e-12 * masses[0][0])
+        return false;
+  return true;
+}
+
+/// Shape functions and masses of the cells.
 template <class G, int D = G::dim>
 void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
 {
@@ -42,17 +58,23 @@ void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
     column.assign(n, 0.0);
   for (auto* column : {&resting.hoop, &resting.mass, &resting.own_mass})
     column->assign(n, 0.0);
+  resting.masses.assign(resting.runs.size(), {});
+  bool uniform = true;
   for (std::size_t r = 0; r < resting.runs.size(); ++r)
   {
-    const Run& run = resting.runs[r];
-    resting.vertices[r] = mesh.cells[run.cell];
+    const Index cell = resting.runs[r].cell;
+    resting.vertices[r] = mesh.cells[cell];
     for (int k = 0; k < D; ++k)
       for (int b = 0; b < D; ++b)
-        resting.gradient[k * D + b][r] = mesh.shapes[run.cell].gradient[k + 1][b];
-    resting.hoop[r] = hoop_gradient<G>(mesh.shapes[run.cell]);
-    resting.mass[r] = mass_of(field.moments[run.cell], mesh.shapes[run.cell], 0, 1);
-    resting.own_mass[r] = mass_of(field.moments[run.cell], mesh.shapes[run.cell], 0, 0) - resting.mass[r];
+        resting.gradient[k * D + b][r] = mesh.shapes[cell].gradient[k + 1][b];
+    resting.hoop[r] = hoop_gradient<G>(mesh.shapes[cell]);
+    resting.masses[r] = mass_matrix(field.moments[cell], mesh.shapes[cell]);
+    resting.mass[r] = resting.masses[r][0][1];
+    resting.own_mass[r] = resting.masses[r][0][0] - resting.mass[r];
+    uniform = uniform && is_uniform<D>(resting.masses[r]);
   }
+  if (uniform)
+    resting.masses.clear();
 }
 
 template <class G, int D = G::dim>
@@ -140,9 +162,10 @@ const MeshPart& part_of_particles(VelocityField<G>& field)
 
 namespace
 {
-/// Mass matrix times `velocity_change`, in `mapped`.
-template <class G>
-void map_change(VelocityField<G>& field)
+/// Adds to `mapped` what the masses of the cells make of `velocity_change`.
+/// @param gained_by  momentum of vertex k of cell r by the changes of its vertices; a callable
+template <class G, class GainedBy>
+void map_change(VelocityField<G>& field, GainedBy&& gained_by)
 {
   constexpr int D = G::dim;
   RestingCells<D>& resting = field.resting;
@@ -152,48 +175,57 @@ void map_change(VelocityField<G>& field)
     std::array<Components<D>, D + 1> change;
     for (int k = 0; k <= D; ++k)
       change[k] = components<D>(field.velocity_change[vertices[k]]);
-    Components<D> all = change[0];
-    for (int k = 1; k <= D; ++k)
-      all += change[k];
-    all *= resting.mass[r];
+    const auto gained = gained_by(r, change);
     for (int k = 0; k <= D; ++k)
-    {
-      const Components<D> gained = all + resting.own_mass[r] * change[k];
       for (int a = 0; a < D; ++a)
-        resting.mapped[vertices[k]][a] += gained[a];
-    }
+        resting.mapped[vertices[k]][a] += gained[k][a];
   }
 }
 
-/// Likewise by the moments of the cells, where masses differ from vertex to vertex.
-template <class G>
-void map_change_by_moments(const Mesh<G::dim>& mesh, VelocityField<G>& field)
+template <int D>
+using VertexComponents = std::array<Components<D>, D + 1>;
+
+/// By two numbers of a cell.
+template <int D>
+VertexComponents<D> gained_uniformly(const RestingCells<D>& resting, std::size_t r, const VertexComponents<D>& change)
 {
-  constexpr int D = G::dim;
-  const auto change_of = [&](Index i) -> const Vector<D>& { return field.velocity_change[i]; };
-  for (const Run& run : field.resting.runs)
+  Components<D> all = change[0];
+  for (int k = 1; k <= D; ++k)
+    all += change[k];
+  all *= resting.mass[r];
+  VertexComponents<D> gained;
+  for (int k = 0; k <= D; ++k)
+    gained[k] = all + resting.own_mass[r] * change[k];
+  return gained;
+}
+
+/// By the whole matrix of a cell.
+template <int D>
+VertexComponents<D> gained_by_matrix(const VertexMatrix<D>& masses, const VertexComponents<D>& change)
+{
+  VertexComponents<D> gained;
+  for (int k = 0; k <= D; ++k)
   {
-    const AffineField<D> change = affine_field<D>(mesh, run.cell, change_of);
-    for (int k = 0; k <= D; ++k)
-      for (int a = 0; a < D; ++a)
-        field.resting.mapped[mesh.cells[run.cell][k]][a] +=
-            sum_of_products<G>({1.0 / (D + 1), mesh.shapes[run.cell].gradient[k]},
-                               {change.value[a], change.gradient[a]}, field.moments[run.cell]);
+    gained[k] = masses[k][0] * change[0];
+    for (int l = 1; l <= D; ++l)
+      gained[k] += masses[k][l] * change[l];
   }
+  return gained;
 }
 } // namespace
 
 template <class G>
-void map_resting_change(const Mesh<G::dim>& mesh, VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
+void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
 {
   constexpr int D = G::dim;
   RestingCells<D>& resting = field.resting;
   for (Index i : resting.nodes)
     resting.mapped[i] = {};
-  if constexpr (G::has_hoop)
-    map_change_by_moments(mesh, field);
+  if (resting.masses.empty())
+    map_change(field, [&](std::size_t r, const auto& change) { return gained_uniformly<D>(resting, r, change); });
   else
-    map_change(field);
+    map_change(field,
+               [&](std::size_t r, const auto& change) { return gained_by_matrix<D>(resting.masses[r], change); });
   resting.is_mapped = true;
   if (momentum.empty())
     return;
@@ -242,11 +274,11 @@ void add_pic_loss(Model<G>& model, const PassOptions& options)
 
 /// The gains of the nodes in a step: momentum, and velocities and displacements that the rows do not know yet.
 template <class G, int D = G::dim>
-void move_nodes(const Mesh<D>& mesh, const PassOptions& options, VelocityField<G>& field)
+void move_nodes(const PassOptions& options, VelocityField<G>& field)
 {
   RestingCells<D>& resting = field.resting;
   if (!resting.is_mapped)
-    map_resting_change<G>(mesh, field, {});
+    map_resting_change<G>(field, {});
   const double flip = 1 - options.pic_fraction;
   for (Index i : resting.nodes)
     for (int a = 0; a < D; ++a)
@@ -265,7 +297,7 @@ template <class G>
 void move_resting_nodes(Model<G>& model, const PassOptions& options)
 {
   add_pic_loss(model, options);
-  move_nodes(model.mesh, options, model.fields.front());
+  move_nodes(options, model.fields.front());
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -273,7 +305,7 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   template void make_resting_cells(const Mesh<G::dim>&, const Particles<G::dim>&, VelocityField<G>&);                  \
   template void update_resting_rows(Model<G>&);                                                                        \
   template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
-  template void map_resting_change(const Mesh<G::dim>&, VelocityField<G>&, std::span<Vector<G::dim>>);                 \
+  template void map_resting_change(VelocityField<G>&, std::span<Vector<G::dim>>);                                      \
   template void move_resting_nodes(Model<G>&, const PassOptions&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

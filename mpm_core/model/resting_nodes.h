@@ -50,7 +50,7 @@ const MeshPart& part_of_particles(VelocityField<G>& field);
 
 /// Adds the momentum of resting cells by the field's `velocity_change`, their mass matrix times it.
 template <class G>
-void map_resting_change(const Mesh<G::dim>& mesh, VelocityField<G>& field, std::span<Vector<G::dim>> momentum);
+void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum);
 
 /// Moves resting cells with their nodes: velocities as (18), with the energy that PIC takes out of them. The rows learn
 /// of it later.

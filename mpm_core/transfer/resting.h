@@ -39,6 +39,10 @@ std::vector<double> rule_weights(const Mesh<D>& mesh, Index cell, const Rule<D>&
 template <class G, int D = G::dim>
 void take_mass(const Mesh<D>& mesh, Index cell, double mass, const Rule<D>& rule, CellMoments<G>& moments);
 
+/// Numbers of the pairs of vertices of a cell.
+template <int D>
+using VertexMatrix = std::array<std::array<double, D + 1>, D + 1>;
+
 /// The resting cells of a velocity field, in rising order. Entries per cell are followed by some of zero, so that the
 /// last ones fill a vector.
 template <int D>
@@ -53,8 +57,9 @@ struct RestingCells
   std::vector<std::array<Index, D + 1>> vertices;
   std::array<std::vector<double>, D * D> gradient; ///< of the shape functions of all vertices but the first
   std::vector<double> hoop;                        ///< strain by a radial velocity of a vertex, in axial symmetry
-  std::vector<double> mass;     ///< of a vertex by the sum over all of them: m_kl without k = l; not in axial symmetry
-  std::vector<double> own_mass; ///< the rest of m_kk
+  std::vector<double> mass;                        ///< m_kl of different vertices, sum m_p N_k N_l
+  std::vector<double> own_mass;                    ///< m_kk - m_kl
+  std::vector<VertexMatrix<D>> masses;             ///< m_kl instead, where these differ within a cell; empty elsewhere
 
   // Per node
   std::vector<Index> nodes;            ///< of these cells

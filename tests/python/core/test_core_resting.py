@@ -92,7 +92,7 @@ def test_rest_and_conversion_give_back_the_particles(geometry):
     ],
     ids=str,
 )
-@pytest.mark.parametrize("geometry", GEOMETRIES[:2])
+@pytest.mark.parametrize("geometry", GEOMETRIES)
 def test_converted_cells_go_on_as_particles(geometry, options):
     law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=150.0, friction_angle=20.0)
     model = shaken(geometry, law)
@@ -104,7 +104,7 @@ def test_converted_cells_go_on_as_particles(geometry, options):
     particles = mpm.Model(model.mesh, law, geometry=geometry)
     if geometry == mpm.Geometry.AXISYMMETRIC:
         particles.roller(1, (1, 0))
-    particles.seed(density=DENSITY, per_cell=PER_CELL[2])
+    particles.seed(density=DENSITY, per_cell=PER_CELL[model.mesh.dim])
     particles.place(by_id(model, "position")[np.argsort(np.argsort(particles.particles.id))])
     order = np.argsort(np.argsort(particles.particles.id))
     for name in ("velocity", "stress", "volume", "mass", "initial_position", "deviatoric_strain", "state"):

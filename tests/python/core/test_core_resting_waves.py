@@ -50,17 +50,50 @@ def bar(ratio, rest=None):
     return np.bincount(cells, model.particles.velocity[fine, 0])[::-1] / np.bincount(cells)[::-1] / small
 
 
+def matrices(size):
+    """Stiffness over the modulus, lumped masses over the density, and averages by the mass matrix, of a chain of elements."""
+    n = len(size) + 1
+    stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
+    for e, h in enumerate(size):
+        stiffness[e : e + 2, e : e + 2] += np.array([[1.0, -1.0], [-1.0, 1.0]]) / h
+        mass[e : e + 2, e : e + 2] += h / 6 * np.array([[2.0, 1.0], [1.0, 2.0]])
+    lumped = mass.sum(axis=1)
+    return stiffness, lumped, mass / lumped[:, None]
+
+
+def exact_reflection(ratio, averaged, per_wave=PER_WAVE):
+    """|R| of a wave of one frequency where an infinite chain of elements h becomes one of elements ratio h.
+
+    The nodal values obey M_L U'' = -K A U, with the averages A = M_L^-1 M, or 1 of a lumped chain. On either side U is a sum of
+    z^j over the nodes j with (4 / h^2) s (1 - 2 s / 3) = w^2, s = (2 - z - 1/z) / 4: a wave, and with averages a part that dies out
+    within some cells. Equations of the nodes around the border give their amplitudes.
+    """
+    sizes, part, reach = (1.0, float(ratio)), 2 / 3 if averaged else 0.0, 4
+    s = np.sin(np.pi / per_wave) ** 2
+    squared = 4 * s * (1 - part * s)
+
+    def modes(h):  # outgoing or dying out away from the border
+        roots = np.roots([-part, 1.0, -squared * h * h / 4]) if averaged else np.array([squared * h * h / 4])
+        z = np.exp(1j * np.arccos(1 - 2 * np.sort(roots) + 0j))
+        return np.where(np.abs(z) > 1 + 1e-9, 1 / z, z)
+
+    j = np.arange(-reach, reach + 1.0)
+    fine, coarse = modes(sizes[0]), modes(sizes[1])
+    stiffness, lumped, average = matrices(np.repeat(sizes, reach))
+    operator = squared * np.eye(len(j)) - stiffness / lumped[:, None] @ (average if averaged else np.eye(len(j)))
+    outgoing = np.array([*(np.where(j <= 0, z**-j, 0) for z in fine), *(np.where(j > 0, z**j, 0) for z in coarse)])
+    rows = slice(reach - 1, reach + 3) if averaged else slice(reach, reach + 2)
+    incoming = np.where(j <= 0, fine[0] ** j, 0)
+    return abs(np.linalg.solve(operator[rows] @ outgoing.T, -operator[rows] @ incoming)[0])
+
+
 def chain(ratio, averaged):
     """The same of a chain of linear elements in one dimension, lumped, or with velocities averaged by the mass matrix."""
     x = edges(ratio)
     size, n = np.diff(x), len(x)
-    gradient = np.zeros((n - 1, n))
-    mass = np.zeros((n, n))
-    for e, h in enumerate(size):
-        gradient[e, e : e + 2] = np.array([-1.0, 1.0]) / h
-        mass[e : e + 2, e : e + 2] += h / 6 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    lumped = mass.sum(axis=1)
-    average = mass / lumped[:, None] if averaged else np.eye(n)
+    gradient = np.diff(np.eye(n), axis=0) / size[:, None]
+    _, lumped, average = matrices(size)
+    average = average if averaged else np.eye(n)
     force, strain = -(gradient * size[:, None]).T / lumped[:, None], gradient @ average
     steps = int(WAVES * PER_WAVE / 0.3)
     velocity, stress, dt = shape(x), -shape(0.5 * (x[1:] + x[:-1])), WAVES / steps
@@ -87,8 +120,18 @@ def test_a_border_where_cells_grow_reflects_what_the_mesh_reflects_and_no_more()
     assert amplitude(reflected["coarse rests"]) == pytest.approx(of_chain, abs=1e-3)
 
 
-def test_a_lumped_chain_reflects_as_the_closed_form_says():
-    """R = (cos(k h1 / 2) - cos(k h2 / 2)) / (their sum) for one wave length; a train of waves has others beside it."""
-    fine, coarse = np.cos(np.pi / PER_WAVE), np.cos(2 * np.pi / PER_WAVE)
-    expected = (fine - coarse) / (fine + coarse)
-    assert amplitude(chain(2, averaged=False) - chain(1, averaged=False)) == pytest.approx(expected, rel=0.1)
+@pytest.mark.parametrize("averaged", [False, True])
+def test_a_chain_reflects_as_the_exact_solution_says(averaged):
+    """That of one wave length; a train of waves has others beside it."""
+    expected = exact_reflection(2, averaged)
+    assert amplitude(chain(2, averaged) - chain(1, averaged)) == pytest.approx(expected, rel=0.1)
+
+
+def test_the_exact_reflection_of_a_lumped_chain_is_the_closed_form():
+    """R = (cos(k h1 / 2) - cos(k h2 / 2)) / (their sum), with the wave number of each side for the same frequency."""
+    assert exact_reflection(1, True) < 1e-12 and exact_reflection(1, False) < 1e-12
+    for per_wave in (20, 40):
+        fine = np.pi / per_wave
+        coarse = np.arcsin(2 * np.sin(fine))  # sin(k h / 2) / h is the same on both sides
+        expected = (np.cos(fine) - np.cos(coarse)) / (np.cos(fine) + np.cos(coarse))
+        assert exact_reflection(2, False, per_wave) == pytest.approx(expected, rel=1e-9)
