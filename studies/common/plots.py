@@ -22,7 +22,7 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from particle_player import Quantity, Scene, axis_labels, colour_limits, disc_diameter
+from particle_player import Quantity, Scene, axis_labels, boundary_edges, colour_limits, disc_diameter  # noqa: F401
 from particle_player.scene import ROUND_TICKS
 
 from .figures import save_figure

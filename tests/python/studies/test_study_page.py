@@ -4,9 +4,11 @@ import json
 import re
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from particle_player import Movie
+from studies.common import movie
 from studies.common.page import TITLES
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, Scene
@@ -65,6 +67,15 @@ def test_no_panel_is_of_one_colour_at_first(tmp_path):
     assert page(tmp_path, [slide, before])[1]["first"] == "vertical_stress"
     still = Movie("still", SCENE, [frame(0.0)], QUANTITIES)
     assert page(tmp_path, [still])[1]["first"] == "shear_strain"
+
+
+def test_a_study_written_for_the_earlier_version_still_makes_its_movie():
+    frames = [frame(t, speed=np.ones(4)) for t in TIMES]
+    with pytest.warns(DeprecationWarning, match="common.movie.particle_movie; the old name will go"):
+        old = movie.Movie
+    made = old("particles", SCENE, frames)
+    assert made == movie.particle_movie("particles", SCENE, frames) and set(made.quantities) == set(movie.QUANTITIES)
+    assert old("particles", None, frames) is None  # on ranks other than the first
 
 
 def test_names_of_columns_are_words_with_units():
