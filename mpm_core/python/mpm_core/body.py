@@ -16,7 +16,7 @@ from .checks import positive, renamed
 from .collective import collectively
 from .far_field import FarFields
 from .mesh import Mesh, Tag, floats
-from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
+from .particle_values import ParticleValues
 from .particles import Particles
 from .pore_water import PoreWater
 from .resting import RestingCells, refuse_resting
@@ -47,7 +47,7 @@ def _whole_numbers(name: str, values: Sequence[int]) -> list[int]:
     return [int(value) for value in values]
 
 
-class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
+class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
     """The part of a model that does not depend on the scheme; see `Model`."""
 
     def __init__(
@@ -114,11 +114,6 @@ class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
     def _seeded(self, added: int, ids: int) -> int:
         self._next_id += ids
         return self.comm.allreduce(added)
-
-    def _material(self, material: int) -> int:
-        if not 0 <= material < len(self.laws):
-            raise InputError(f"material is {material}, expected 0 to {len(self.laws) - 1}, the number of a law")
-        return material
 
     def seed(self, *, density: float, per_cell: int = 10, cell_tag: Tag | None = None, material: int = 0) -> int:
         """Place particles evenly in cells, each with the same fraction of its cell's area or volume.
@@ -243,124 +238,6 @@ class Body(PoreWater, RestingCells, AbsorbingSides, FarFields):
             >>> model.load_surface(mpm.Disc((0.0, -5.0), 1.0), pressure=50e3)  # in a tunnel
         """
         return load_surface(self, surface, pressure, traction)
-
-    def add_field(self, name: str, *, unit: str, meaning: str, components: int = 1, initial: float = 0.0) -> None:
-        """Declare a field of the particles of your own, which from now on is an attribute of ``particles``.
-
-        It is sorted, sent to other ranks, saved in checkpoints and offered to output as all fields are.
-
-        Args:
-            name: letters, digits and ``_``; no other field may have it.
-            unit: such as "Pa"; "-" without dimension.
-            meaning: a sentence.
-            components: numbers per particle.
-            initial: value of all particles, present and future.
-
-        Raises:
-            InputError: a name that is already used or not a word, no components, an initial value that is not finite.
-
-        Example:
-            >>> model.add_field("first_yield", unit="s", meaning="Time at which the particle yielded first", initial=-1.0)
-            >>> model.particles.set("first_yield", np.where(model.particles.plastic_strain > 0, model.time, -1.0))
-        """
-
-        def add() -> None:
-            value = float(floats("initial", initial, ()))
-            if hasattr(self.particles, name) or name.startswith("_"):
-                raise InputError(f"name of the field is {name!r}, which an attribute of the particles has")
-            if isinstance(components, bool) or not isinstance(components, (int, np.integer)):
-                raise InputError(f"components is {components!r}, expected a whole number")
-            self._core.add_field(name, str(unit), str(meaning), int(components), value)
-
-        collectively(self.comm, add)
-
-    def state(self, name: str) -> NDArray[np.float64]:
-        """A state variable by its name in ``state_names`` of the laws, such as "excess_pore_pressure".
-
-        Returns:
-            Shape (n,), in the order of ``particles``; NaN where a particle's law has no such variable. Not collective.
-        """
-        state, material = self.particles.state, self.particles.material
-        values = np.full(len(material), np.nan)
-        for number, column in self._state_columns(name):
-            values[material == number] = state[material == number, column]
-        return values
-
-    def set_state(self, name: str, values: ArrayLike) -> None:
-        """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
-        state, material = self.particles.state.copy(), self.particles.material
-        new = np.asarray(values, dtype=np.float64)
-        if new.shape != material.shape:
-            raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")
-        for number, column in self._state_columns(name):
-            state[material == number, column] = new[material == number]
-        self.particles.set("state", state)
-
-    def parameter(self, name: str) -> NDArray[np.float64]:
-        """Values of a law's parameter that varies from particle to particle, see `set_parameter`.
-
-        Returns:
-            Shape (n,), in the order of ``particles``; NaN where it does not vary in a particle's law. Not collective.
-        """
-        values = np.full(len(self.particles), np.nan)
-        for number, law in enumerate(self.laws):
-            if has_varying(law, name):
-                rows = self.particles.material == number
-                column = law.state_names.index(f"{name}_difference")
-                values[rows] = nominal_value(law, name) + self.particles.state[rows, column]
-        return values
-
-    def set_parameter(self, name: str, values: Field) -> None:
-        """Give particles their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
-
-        Particles keep their values as they move. Give values after the particles are there; those seeded later have the
-        number of their law.
-
-        Args:
-            name: of the parameter, such as "cohesion".
-            values: a number; an array, shape (n,), in the order of ``particles``; a function of positions, shape (n, D), that
-                returns such an array, for instance a `RandomField`; or {cell tag or name: number} for the cells where the
-                particles are now.
-
-        Raises:
-            InputError: on all ranks: no law varies in the parameter, another shape, a value out of the parameter's range.
-
-        Example:
-            >>> soil = mpm.Heterogeneous(mpm.tresca(young=3e6, poisson=0.45, shear_strength=12e3), ["cohesion"])
-            >>> model.set_parameter("cohesion", lambda x: 12e3 + 1.5e3 * (3.0 - x[:, 1]))  # s_u grows with depth
-            >>> model.set_parameter("cohesion", -0.25 * model.particles.stress[:, 1])  # s_u of the stress at the start
-        """
-
-        def checked() -> NDArray[np.float64]:
-            tags = {tag: self.mesh.tags_of("cell", tag) for tag in values} if isinstance(values, dict) else {}
-            of_cell = self.mesh.cell_tags[self.particles.cell] if tags else None
-            new = parameter_values(name, values, self.particles.position, of_cell, tags)
-            return differences_of(name, new, self.laws, self.particles.material, self.particles.state)
-
-        self.particles.set("state", collectively(self.comm, checked))
-
-    def _state_columns(self, name: str) -> list[tuple[int, int]]:
-        """(number of a law, column of the state variable) for each law that has it."""
-        columns = [(k, law.state_names.index(name)) for k, law in enumerate(self.laws) if name in law.state_names]
-        if not columns:
-            known = sorted({known for law in self.laws for known in law.state_names})
-            raise InputError(f"name is '{name}', expected a state variable of the laws: {', '.join(known)}")
-        return columns
-
-    def assign(self, material: ArrayLike) -> None:
-        """Give each particle its law: numbers of laws, shape (n,), in the order of ``particles``. Not collective.
-
-        Example:
-            >>> model.assign(np.where(model.particles.position[:, 1] < 2.0, 1, 0))  # layers
-        """
-        numbers = np.asarray(material)
-        if numbers.shape != (len(self.particles),) or not np.issubdtype(numbers.dtype, np.integer):
-            raise InputError(
-                f"material has shape {numbers.shape} and dtype {numbers.dtype}, expected one whole number each"
-            )
-        for number in np.unique(numbers):
-            self._material(int(number))
-        self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
 
     def remove(self, chosen: ArrayLike) -> int:
         """Take particles away, such as excavated soil; the others may have another order afterwards.
