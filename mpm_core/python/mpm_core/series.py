@@ -66,9 +66,8 @@ class Series:
         self._closed, self._frames = False, [""]
         self._length, self._next_rewriting, self._unnamed = 0, 0.0, 0
         self._thread: ThreadPoolExecutor | None = None
-        self._unfinished: tuple[
-            Callable[[], object], str
-        ] | None = None  # what writes or waits for a frame, and its text
+        self._unfinished: tuple[Callable[[], object], str] | None = None
+        """What writes a frame or waits for it, and its text in the XDMF file"""
         self.shared: dict[str, Any] = {}
         """What frames that are on the disk have for later ones to refer to; a frame that failed had perhaps stored it"""
         check_same_path(comm, text)
