@@ -28,7 +28,7 @@ from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary
 from fenics_bridge.water.consolidation_results import ConsolidationResults
-from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, solve_step
+from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, collapsed, solve_step
 from fenics_bridge.water.coupled import (
     CoupledConstraints,
     Element,
@@ -208,7 +208,8 @@ class Consolidation(ConsolidationResults):
             dt: length of the step [s].
 
         Returns:
-            Report of the step; a step that fails changes nothing.
+            Report of the step; a step that fails changes nothing. One after which soil has moved by a tenth of the body
+            has failed: it collapses.
 
         Raises:
             InputError: dt is not positive, or a load or boundary condition is not possible. Raised on all ranks alike.
@@ -228,6 +229,8 @@ class Consolidation(ConsolidationResults):
         if self.motion is not None:
             self.motion.begin(dt)
         report, active, iterations, reason = self._solved(external, load.displacement, end, dt)
+        if self.motion is None and not reason:
+            reason = collapsed(self._moved(), self.domain)
         if reason:
             return ConsolidationReport(self.time, dt, iterations, report.residuals, reason=reason)
         self._inflow = self._step_state(dt)[1]
@@ -269,6 +272,11 @@ class Consolidation(ConsolidationResults):
             Collective.
         """
         return run(self, until, first_step, growth, longest, progress)
+
+    def _moved(self) -> NDArray[np.float64]:
+        """Displacements at the end of the step under trial [m], shape (m,)."""
+        body, dofs = self._body, self._displacements[1]
+        return (body.solution.x.array + body.increment.x.array)[dofs]
 
     def _read_pressure(self) -> None:
         self.pressure.x.array[:] = self._unit * self._body.solution.x.array[self._pressures[1]]

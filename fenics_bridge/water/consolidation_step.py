@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from dolfinx.mesh import Mesh
 from mpm_core.newton import EASY_ITERATIONS, newton
 from numpy.typing import NDArray
 
@@ -16,6 +17,9 @@ from fenics_bridge.types import Law
 
 MOST_SETS = 30
 """Guesses of where a pressure is at its upper bound, in a step."""
+
+COLLAPSE = 0.1
+"""Of the size of a body, by which soil does not move in quasi-static steps."""
 
 SLACK = 1e-9
 """By how much, relative to the largest, a head may exceed its bound or a flow have the wrong sign."""
@@ -142,3 +146,15 @@ def solve_step(
             return report, active, iterations, ""
         active = right
     return report, active, iterations, f"where water leaves was not found in {MOST_SETS} guesses"
+
+
+def collapsed(displacements: NDArray[np.float64], domain: Mesh) -> str:
+    """Why displacements [m] are none of small strains; empty where they are. Collective.
+
+    At collapse residuals hardly depend on the motion of the mechanism, so that Newton's method may end anywhere along it.
+    """
+    x, comm = domain.geometry.x, domain.comm
+    ends = (-x.min(axis=0), x.max(axis=0)) if len(x) else (np.full(3, -np.inf),) * 2
+    size = np.max(comm.allgather(ends), axis=0).sum(axis=0).max()
+    largest, most = max(comm.allgather(np.abs(displacements).max(initial=0.0))), COLLAPSE * size
+    return f"it collapses: soil would move by {largest:.2g} m, more than {most:.2g} m" if largest > most else ""

@@ -235,3 +235,31 @@ def test_a_bank_that_consolidates_gains_strength():
         fem.reconfigure(pore_pressure=model.pore_pressure())
         factors.append(bridge.factor_of_safety(fem, bridge.Load(unit_weight=20e3), tolerance=0.05).value)
     assert factors[1] > 1.2 * factors[0]
+
+
+def test_a_slope_that_collapses_is_handed_over_and_slides():
+    """Its weight grows until it carries no more, when the run ends; particles begin in place with its pressures, and slide."""
+    background = bridge.slope_mesh(MPI.COMM_WORLD, height=4.0, angle=45.0, crest=4.0, cell_size=0.8, kind="fitted")
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    clay = mpm.MohrCoulomb(young=5e6, poisson=0.3, cohesion=7e3, friction_angle=20.0, dilation_angle=0.0)
+    weight = lambda time: 1.9e3 * time
+    model = water.Consolidation(
+        domain, clay, water.PorousSoil(1e-8), facet_tags, [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)],
+        [water.SeepageFace(bridge.SLOPE)], element=water.Element.STABILISED,
+        load=lambda time: bridge.Load(unit_weight=weight(time)),
+    )  # fmt: skip
+    last = model.run(20.0, 0.5, growth=1.0)[-1]
+    assert not last.converged and 4.0 < model.time < 15.0
+    assert np.abs(model.displacement.x.array).max() < 1.6  # no step goes anywhere along the mechanism
+    body = mpm.Model(bridge.background_mesh(*background), clay)
+    body.seed(density=weight(model.time) / 9.81, per_cell=3, cell_tag=bridge.SOIL)
+    body.roller(bridge.LEFT, (1, 0))
+    body.fix(bridge.BASE)
+    body.set_gravity((0.0, -9.81))
+    body.add_water(porosity=0.4, conductivity=1e-8, drained_surface=True)
+    assert bridge.initialise(body, model, equilibrate=False).unbalanced_ratio < 1e-8
+    body.particles.set("mass", 1.1 * body.particles.mass)
+    body.implicit(1.0, dt=0.05, nmd=True).last()
+    speed, pressure = body.particles.velocity, body.particles.pore_pressure
+    assert np.linalg.norm(body.particles.displacement, axis=1).max() > 0.1 and np.isfinite(pressure).all()
+    assert np.linalg.norm(speed, axis=1).max() < 9.81
