@@ -10,14 +10,14 @@ namespace
 /// What a particle has, and what it gets over the step.
 struct DryingParticle
 {
-  double volume, porosity, storage, mobility; ///< V, n, n / K_w, k dt / gamma_w
+  double volume, porosity, storage;           ///< V, n, n / K_w
   double growth;                              ///< volumetric strain
   double start, end;                          ///< pressures [Pa]
   double standing;                            ///< pressure of water that stands above it [Pa]
 };
 
 template <int D>
-void add_particle(const DryingParticle& particle, const Retention& retention, const std::array<double, D + 1>& n,
+void add_particle(const DryingParticle& particle, const Vector<D>& mobility, const Retention& retention, const std::array<double, D + 1>& n,
                   DryingCell<D>& cell)
 {
   const Wetness before = wetness_at(retention, particle.start), after = wetness_at(retention, particle.end);
@@ -26,14 +26,16 @@ void add_particle(const DryingParticle& particle, const Retention& retention, co
   const double content = after.saturation * gained + (after.saturation - before.saturation) * particle.porosity;
   const double capacity = after.saturation * particle.storage + after.by_saturation * (gained + particle.porosity);
   cell.pressure += volume * (after.effective * particle.end - particle.standing);
-  cell.flux += volume * after.permeability * particle.mobility;
+  for (int a = 0; a < D; ++a)
+    cell.flux[a] += volume * after.permeability * mobility[a];
   for (int k = 0; k <= D; ++k)
   {
     const double weight = volume * n[k];
     cell.by_pressure[k] += weight * (after.effective + after.by_effective * particle.end);
     cell.content[k] += weight * content;
     cell.wet[k] += weight * after.saturation;
-    cell.flux_by_pressure[k] += weight * after.by_permeability * particle.mobility;
+    for (int a = 0; a < D; ++a)
+      cell.flux_by_pressure[k][a] += weight * after.by_permeability * mobility[a];
     for (int l = 0; l <= D; ++l)
       cell.capacity[k][l] += weight * n[l] * capacity;
   }
@@ -51,6 +53,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, water, run.cell);
     const double growth = volume_strain(mesh, field, step.dt, run.cell);
+    const auto anisotropy = anisotropy_of<D>(water, run.material);
     for (Index p = run.first; p < run.last; ++p)
     {
       const Vector<D> x = at<D>(particles.position, p);
@@ -61,12 +64,14 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
       const DryingParticle particle{factor * particles.volume[p],
                                     particles.porosity[0][p],
                                     particles.porosity[0][p] / water.modulus,
-                                    step.dt * particles.conductivity[0][p] / water.unit_weight,
                                     growth,
                                     particles.pore_pressure[0][p],
                                     end,
                                     pressure_at<D>(standing, n)};
-      add_particle<D>(particle, water.retention[static_cast<std::size_t>(run.material)], n,
+      Vector<D> mobility = anisotropy;
+      for (double& component : mobility)
+        component *= step.dt * particles.conductivity[0][p] / water.unit_weight;
+      add_particle<D>(particle, mobility, water.retention[static_cast<std::size_t>(run.material)], n,
                       pore.drying[static_cast<std::size_t>(run.cell)]);
     }
   }

@@ -20,7 +20,7 @@ template <int D>
 struct PoreSums
 {
   double volume = 0;     ///< 1
-  double mobility = 0;   ///< k / gamma_w
+  Vector<D> mobility{};  ///< k / gamma_w along each axis
   double compliance = 0; ///< 1 / M + n / K_w + n dS/dp, the compliance of the soil without drainage
   double swung = 0;      ///< likewise, of soil whose mass resists too: what the pressure projection goes by
 };
@@ -77,6 +77,8 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight;
+  const auto anisotropy = anisotropy_of<D>(water, run.material);
+  const double largest = *std::ranges::max_element(anisotropy) * mobility;
   double stored = storage;
   if (dries)
     stored += particles.porosity[0][p] *
@@ -85,7 +87,8 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
   add_pore_load(mesh.shapes[run.cell], particles, water, standing, moments, run.material, p, volume, cell.load);
   sums.volume += volume;
-  sums.mobility += volume * mobility;
+  for (int a = 0; a < D; ++a)
+    sums.mobility[a] += volume * anisotropy[a] * mobility;
   sums.compliance += volume * compliance;
   sums.swung += volume * (1 / (modulus + inertia * particles.mass[p] / particles.volume[p]) + stored);
   for (int k = 0; k <= D; ++k)
@@ -101,7 +104,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
     NodalWater& sum = nodes[node];
     sum.volume += weight;
     sum.pressure += weight * there;
-    sum.mobility += weight * mobility;
+    sum.mobility += weight * largest;
     sum.compliance += weight * compliance;
   }
 }
@@ -110,7 +113,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
 template <int D>
 void add_projection(const PoreSums<D>& sums, double edge_squared, double dt, PoreCell<D>& cell)
 {
-  const double margin = 1.5 * sums.swung - 6 * dt * sums.mobility / edge_squared;
+  const double margin = 1.5 * sums.swung - 6 * dt * *std::ranges::min_element(sums.mobility) / edge_squared;
   const double factor = projection_margin * std::max(0.0, margin) / (D + 2);
   for (int k = 0; k <= D; ++k)
     for (int l = 0; l <= D; ++l)
@@ -149,7 +152,8 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   {
     PoreCell<D>& cell = step.pore.cells[c];
     const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
-    cell.flux = step.dt * of_cell.mobility;
+    for (int a = 0; a < D; ++a)
+      cell.flux[a] = step.dt * of_cell.mobility[a];
     cell.compliance = of_cell.compliance;
     add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
   }

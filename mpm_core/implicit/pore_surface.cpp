@@ -125,7 +125,7 @@ double outflow_per_area(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::s
   const PoreCell<D>& cell = step.pore.cells[c];
   const double h = cell_size<D>(mesh.shapes[c].volume), volume = volume_of(cell);
   if (volume > 0)
-    return penalty * (cell.flux / h + cell.compliance * h) / volume;
+    return penalty * (*std::ranges::max_element(cell.flux) / h + cell.compliance * h) / volume;
   double largest = 0;
   for (Index node : mesh.cells[c])
     largest = std::max(largest, step.dt * nodes[node].mobility / h + nodes[node].compliance * h);

@@ -201,8 +201,8 @@ void add_flow(const Mesh<G::dim>& mesh, const VelocityField<G>& field, const Imp
       totals.external_work -= step.dt * load.volume[k] * dot<G::dim>(load.gradient, field.velocity[nodes[k]]);
     const auto drive = driving_gradient(mesh, field, step, c);
     const auto weight = water_weight(mesh, field, step, c);
-    totals.external_work -= flux_of(pore, c) * dot<G::dim>(drive, weight);
-    totals.drag_work += flux_of(pore, c) * dot<G::dim>(drive, drive);
+    totals.external_work -= flow<G::dim>(flux_of(pore, c), drive, weight);
+    totals.drag_work += flow<G::dim>(flux_of(pore, c), drive, drive);
   }
   for (const auto& point : pore.surface)
   {

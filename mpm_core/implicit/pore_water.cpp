@@ -125,7 +125,7 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
     {
       double& content = pore.content[nodes[k]];
       content += pore.drying.empty() ? cell.mean[k] * dilation : pore.drying[c].content[k];
-      content += flux_of(pore, c) * dot<D>(mesh.shapes[c].gradient[k], drive);
+      content += flow<D>(flux_of(pore, c), mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
         content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]];
     }
@@ -176,20 +176,21 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   const CellShape<D>& shape = mesh.shapes[c];
   const Index row = mesh.cells[c][k], column = mesh.cells[c][l];
   const double unit = pore.unit;
-  const double volume = volume_of(cell), flux = flux_of(pore, c);
+  const double volume = volume_of(cell);
+  const Vector<D>& flux = flux_of(pore, c);
   const double inertia = step.options.quasi_static ? 0
-                                                   : flux * pore.density * cell.mean[l] /
+                                                   : pore.density * cell.mean[l] /
                                                          (volume * step.stage.weight * step.stage.dt * step.dt);
   Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
   for (int a = 0; a < D; ++a)
   {
     forces[a] *= pore.held[column] ? 0 : -unit * (dries ? pore.drying[c].by_pressure[l] : cell.mean[l]);
     const double wet = dries ? pore.drying[c].wet[k] : cell.mean[k];
-    volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * shape.gradient[k][a]);
+    volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * flux[a] * shape.gradient[k][a]);
   }
-  double water = cell.capacity[k][l] + flux * dot<D>(shape.gradient[k], shape.gradient[l]);
+  double water = cell.capacity[k][l] + flow<D>(flux, shape.gradient[k], shape.gradient[l]);
   if (dries)
-    water += pore.drying[c].capacity[k][l] + pore.drying[c].flux_by_pressure[l] * dot<D>(shape.gradient[k], drive);
+    water += pore.drying[c].capacity[k][l] + flow<D>(pore.drying[c].flux_by_pressure[l], shape.gradient[k], drive);
   if (pore.drained)
     water += surface.cells[c][k][l];
   double by_pressure = -unit * unit * water;

@@ -46,9 +46,9 @@ Vector<G::dim> water_weight(const Mesh<G::dim>& mesh, const VelocityField<G>& fi
 template <class G, int D = G::dim>
 double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double dt, Index cell);
 
-/// Sum V k_r k dt / gamma_w of a cell under the iterate.
+/// Sum V k_r k dt / gamma_w of a cell along each axis, under the iterate.
 template <int D>
-inline double flux_of(const PoreStep<D>& pore, Index cell)
+inline const Vector<D>& flux_of(const PoreStep<D>& pore, Index cell)
 {
   return pore.drying.empty() ? pore.cells[cell].flux : pore.drying[cell].flux;
 }

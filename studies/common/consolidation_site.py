@@ -78,19 +78,24 @@ class ConsolidationSite:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
 
         Raises:
-            InputError: the water has a boundary condition other than reservoirs, or a conductivity that depends on the direction.
+            InputError: the water has a boundary condition other than reservoirs, or a conductivity that is a tensor.
         """
         model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
         for k, (soil, weight) in enumerate(self.unit_weight.items()):
-            if np.ndim(self.soils[soil].conductivity):
-                raise mpm.InputError(f"soils.{soil}: conductivity: has several values, expected one for particles")
+            if np.ndim(self.soils[soil].conductivity) > 1:
+                raise mpm.InputError(f"soils.{soil}: conductivity: is a tensor, expected one along each axis for particles")
             for tag in model.mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=k)
         bridge.apply_supports(model, self.supports)
         model.set_gravity((0.0, -GRAVITY))
+        anisotropy = [
+            soil.conductivity / np.ravel(soil.conductivity)[-1] if np.ndim(soil.conductivity) else None
+            for soil in self.soils.values()
+        ]
         model.add_water(
             porosity={name: soil.porosity for name, soil in self.soils.items()},
-            conductivity={name: float(soil.conductivity) for name, soil in self.soils.items()},
+            conductivity={name: float(np.ravel(soil.conductivity)[-1]) for name, soil in self.soils.items()},
+            anisotropy=anisotropy if any(factors is not None for factors in anisotropy) else None,
         )
         self.load_particles(model, fem.time)
         bridge.initialise(model, fem)

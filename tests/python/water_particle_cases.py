@@ -66,7 +66,7 @@ class Column:
         return -self.model.water_inflow() / (self.area * self.load / self.oedometer)
 
 
-def layer(law, water_modulus, weight=20e3):
+def layer(law, water_modulus, weight=20e3, anisotropy=None):
     """A layer, 2 m by 1 m, free at its drained right side, as finite elements and as particles at the centroids of their cells.
 
     The right side is drained, as is the top; water is at rest at the beginning and the effective stresses are those of a
@@ -74,8 +74,9 @@ def layer(law, water_modulus, weight=20e3):
     """
     domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (8, 4))
     supports = [bridge.roller(LEFT, (1, 0)), bridge.fixed(BASE)]
+    conductivity = 1e-6 if anisotropy is None else 1e-6 * np.asarray(anisotropy)
     fem = water.Consolidation(
-        domain, law, water.PorousSoil(1e-6, porosity=0.4), facet_tags, supports, [water.Head(TOP, 1.0), water.Head(RIGHT, 1.0)],
+        domain, law, water.PorousSoil(conductivity, porosity=0.4), facet_tags, supports, [water.Head(TOP, 1.0), water.Head(RIGHT, 1.0)],
         load=bridge.Load(unit_weight=weight), element=water.Element.STABILISED, water_modulus=water_modulus,
     )  # fmt: skip
     model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law)
@@ -83,7 +84,7 @@ def layer(law, water_modulus, weight=20e3):
     model.roller(LEFT, (1, 0))
     model.fix(BASE)
     model.set_gravity((0.0, -9.81))
-    model.add_water(porosity=0.4, conductivity=1e-6, modulus=water_modulus)
+    model.add_water(porosity=0.4, conductivity=1e-6, modulus=water_modulus, anisotropy=anisotropy)
 
     def at_rest(x):
         return GRAVITY_OF_WATER * (1.0 - x[:, 1])

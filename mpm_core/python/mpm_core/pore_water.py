@@ -62,6 +62,7 @@ class PoreWater(Conditions):
         suction_limit: float = np.inf,
         drained_surface: bool = False,
         retention: Any = None,
+        anisotropy: Any = None,
     ) -> None:
         """Fill the pores of all particles with water, which from then on flows in implicit and explicit steps.
 
@@ -84,6 +85,8 @@ class PoreWater(Conditions):
                 where soil stays saturated): an object with functions ``saturation``, ``effective`` and
                 ``relative_permeability`` of the suction [Pa], such as `fenics_bridge.water.VanGenuchten`. Effective stress is
                 Bishop's, with the effective saturation; particles become lighter as they dry.
+            anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, in implicit runs; or a list with those
+                of each law (None for 1 along all). Axes are fixed in space.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
@@ -102,6 +105,7 @@ class PoreWater(Conditions):
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             _require_pores(n, k)
             self._set_retention(water, curves_of_laws(retention, self.laws))
+            water.anisotropy = factors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
                 raise InputError(
                     "laws has an Undrained one, whose pores hold water already; expected laws of effective stress"
@@ -385,3 +389,28 @@ def refuse_water(body: PoreWater, scheme: str) -> None:
         raise InputError(
             f"the model has pore water, whose flow {scheme} does not support; use implicit() by Newton's method"
         )
+
+
+def factors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[tuple[float, float, float]]:
+    """Factors of the conductivity along three axes for each law; nothing where all soil is isotropic.
+
+    Raises:
+        InputError: not (D,), or one for each law, or a factor that is not positive.
+    """
+    if anisotropy is None:
+        return []
+    one_each = isinstance(anisotropy, (list, tuple)) and any(part is None or np.ndim(part) for part in anisotropy)
+    given = list(anisotropy) if one_each else [anisotropy] * laws
+    if len(given) != laws:
+        raise InputError(f"anisotropy has {len(given)} entries, expected {dim} factors, or an entry for each of the {laws} laws")
+    factors = []
+    for entry in given:
+        try:
+            values = np.ones(dim) if entry is None else np.asarray(entry, dtype=float)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape != (dim,) or not (np.all(np.isfinite(values)) and np.all(values > 0)):
+            raise InputError(f"anisotropy is {entry!r}, expected {dim} positive factors, one along each axis")
+        x, y, z = (*values, 1.0)[:3]
+        factors.append((float(x), float(y), float(z)))
+    return factors

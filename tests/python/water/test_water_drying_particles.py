@@ -168,8 +168,8 @@ def test_a_level_at_facets_follows_its_table():
 
 
 def test_a_restart_knows_curves_levels_and_rain(tmp_path):
-    def bank():
-        model = column(cells=8, height=0.9, air=2, drained_surface=True)
+    def bank(anisotropy=(5.0, 0.5)):
+        model = column(cells=8, height=0.9, air=2, drained_surface=True, anisotropy=anisotropy)
         model.stand_water([(0.0, 0.5), (500.0, 0.2)])
         model.rain([(0.0, 0.0), (500.0, 2e-6)])
         return model
@@ -179,7 +179,7 @@ def test_a_restart_knows_curves_levels_and_rain(tmp_path):
     list(whole.implicit(1000.0, **options))
     list(half.implicit(400.0, **options))
     half.save(tmp_path / "half.h5")
-    again = bank()
+    again = bank(anisotropy=None)
     again.restore(tmp_path / "half.h5")
     list(again.implicit(1000.0, **options))
     for name in ("pore_pressure", "saturation", "mass", "stress", "position"):
@@ -208,6 +208,8 @@ class Tight(water.Gardner):
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=Tight(1e-4)), "permeability goes.*more than 0"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=[CURVE, CURVE]), "2 curves, expected one"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=3.0), r"retention is 3.0, which has no saturation\(\)"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=(1.0, 0.0)), "0.0.*expected 2 positive factors"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=[None, (1, 1)]), "has 2 entries, expected 2 factors"),
         (lambda m: m.rain(1e-6), "no retention curve"),
         (lambda m: m.stand_water(1.0), "level: the free surface is not drained"),
         (lambda m: m.hold_pore_pressure(TOP, level=[(1.0, 2.0), (1.0, 3.0)]), "level is .*rising times"),

@@ -24,10 +24,11 @@ def terzaghi_base(factor):
 # --- the same as finite elements -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("anisotropy", [None, (20.0, 0.5)], ids=["isotropic", "anisotropic"])
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
 @pytest.mark.parametrize("modulus", [np.inf, 2.2e8])
-def test_particles_at_centroids_are_the_stabilised_finite_elements(law, modulus):
-    fem, model = layer(law, modulus)
+def test_particles_at_centroids_are_the_stabilised_finite_elements(law, modulus, anisotropy):
+    fem, model = layer(law, modulus, anisotropy=anisotropy)
     for dt in (1.0, 2.0, 4.0, 100.0):
         assert fem.advance(dt).converged
         *_, report = model.implicit(
