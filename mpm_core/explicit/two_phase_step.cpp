@@ -47,7 +47,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   add_phase_work(soil, water, exchange.owned, gravity, options.damping, dt, density, model.totals);
   // Flow of the water through the soil, and volumetric strains
   clock.begin(Phase::averaging);
-  find_flux(soil, *model.water, water);
+  find_flux(mesh, soil, *model.water, water);
   if (options.nmd)
   {
     average_strains(mesh, exchange, soil, dt);

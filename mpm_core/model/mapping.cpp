@@ -142,6 +142,8 @@ void map_to_nodes(Model<G>& model)
       for (const auto* runs : {&model.order.runs, &field.resting.runs})
         add_pore_forces(model.mesh, model.particles, *model.water, *runs, field);
       add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
+      if (has_two_phases(model) && !model.water->standing.empty())
+        add_standing_forces<G>(model.mesh, model.particles, *model.water, model.order.runs, field.nodes);
     }
     sum_shared(model.exchange, field.nodes);
   }
@@ -151,6 +153,8 @@ void map_to_nodes(Model<G>& model)
   water_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, *model.water, model.fields.front(),
                  water);
   add_surface_pressures(model.mesh, *model.water, &PressureCondition::held, water.motion);
+  if (!model.water->standing.empty())
+    add_standing_forces<G>(model.mesh, model.particles, *model.water, model.order.runs, water.motion.nodes);
   sum_shared(model.exchange, water.motion.nodes);
   sum_shared(model.exchange, water.nodes);
 }

@@ -2,6 +2,8 @@
 
 #include "model/integration.h"
 
+#include <algorithm>
+
 namespace mpm::model
 {
 template <class G, int D>
@@ -28,6 +30,31 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
       for (int a = 0; a < D; ++a)
         internal[a] += force[a] + load.volume[k] * load.gradient[a];
     }
+  }
+}
+
+template <class G, int D>
+void add_standing_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,
+                         const std::vector<Run>& runs, Array<NodeSums<D>>& nodes)
+{
+  for (const Run& run : runs)
+  {
+    const auto standing = standing_water(mesh, water, run.cell);
+    if (std::ranges::all_of(standing.pressure, [](double pressure) { return pressure == 0; }))
+      continue;
+    double pressure = 0;
+    std::array<double, D + 1> volume{};
+    for (Index p = run.first; p < run.last; ++p)
+    {
+      const auto n = shape_functions<D>(mesh.shapes[run.cell], at<D>(particles.position, p));
+      pressure += particles.volume[p] * pressure_at<D>(standing, n);
+      for (int k = 0; k <= D; ++k)
+        volume[k] += particles.volume[p] * n[k];
+    }
+    for (int k = 0; k <= D; ++k)
+      for (int a = 0; a < D; ++a)
+        nodes[mesh.cells[run.cell][k]].traction[a] -=
+            pressure * mesh.shapes[run.cell].gradient[k][a] + volume[k] * standing.gradient[a];
   }
 }
 
@@ -83,6 +110,8 @@ void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, boo
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template void add_standing_forces<G>(const Mesh<G::dim>&, const Particles<G::dim>&, const PoreWater&,                \
+                                       const std::vector<Run>&, Array<NodeSums<G::dim>>&);                             \
   template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, bool PressureCondition::*,                \
                                       VelocityField<G>&);                                                              \
   template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const PoreWater&,                       \

@@ -198,7 +198,7 @@ void keep_out(const PoreNode<D>& node, Vector<D>& flux)
 } // namespace
 
 template <class G>
-void find_flux(const VelocityField<G>& soil, const PoreWater& water, WaterField<G>& field)
+void find_flux(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, const PoreWater& water, WaterField<G>& field)
 {
   const bool may_run_empty = water.suction_limit < std::numeric_limits<double>::infinity();
   for (Index i : soil.part.nodes)
@@ -207,7 +207,8 @@ void find_flux(const VelocityField<G>& soil, const PoreWater& water, WaterField<
     const double content = light ? 0 : field.motion.nodes[i].mass / field.nodes[i].volume;
     for (int a = 0; a < G::dim; ++a)
       field.flux[i][a] = content * (field.motion.velocity[i][a] - soil.velocity[i][a]);
-    if (may_run_empty && !field.supplied[i])
+    const bool under_water = may_run_empty && standing_pressure(water, mesh.points[i][G::dim - 1]) > 0;
+    if (may_run_empty && !field.supplied[i] && !under_water)
       keep_out<G::dim>(field.nodes[i], field.flux[i]);
   }
 }
@@ -233,7 +234,7 @@ void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt
   template void split_phases(Model<G>&);                                                                               \
   template void water_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&, const std::vector<Run>&,  \
                                const PoreWater&, const VelocityField<G>&, WaterField<G>&);                             \
-  template void find_flux(const VelocityField<G>&, const PoreWater&, WaterField<G>&);                                  \
+  template void find_flux(const Mesh<G::dim>&, const VelocityField<G>&, const PoreWater&, WaterField<G>&);             \
   template double outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                                   \
   template void average_outflow(const Mesh<G::dim>&, NodeExchange&, double, WaterField<G>&);
 INSTANTIATE(PlaneStrain)

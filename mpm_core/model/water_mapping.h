@@ -35,7 +35,7 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
 /// Where pores may run empty, no water enters at the free surface: there is none outside, so that what flows inwards
 /// leaves its place empty.
 template <class G>
-void find_flux(const VelocityField<G>& soil, const PoreWater& water, WaterField<G>& field);
+void find_flux(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, const PoreWater& water, WaterField<G>& field);
 
 /// Mass that flows out of a unit of volume of a cell over dt, dt div j [kg/m3].
 template <class G>

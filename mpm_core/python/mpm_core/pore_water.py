@@ -207,7 +207,7 @@ class PoreWater(Conditions):
         p.set("saturation", after)
 
     def stand_water(self, level: Value) -> None:
-        """Let water stand over the free surface of the soil in implicit runs, wherever that is and however it moves.
+        """Let water stand over the free surface of the soil, wherever that is and however it moves.
 
         Its pressure is that of the pore water at the surface, where water enters or leaves, and presses on the soil. A further
         call changes the level. Along facets with a tag, at the sides of the mesh, use `hold_pore_pressure` besides.

@@ -231,6 +231,33 @@ def test_soil_at_rest_under_water_has_its_buoyant_weight():
         np.testing.assert_allclose(means, weight * (1 - 0.2 * (np.arange(5) + 0.5)), atol=0.01 * weight)
 
 
+@pytest.mark.parametrize("suction_limit", [np.inf, 0.0])
+def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_limit):
+    """Whatever the shape of its surface, which cuts cells: no effective stress, no motion, the pressures of the water."""
+    mesh = box([16, 8], [2.0, 1.0], diagonals="alternating")
+    model = mpm.Model(mesh, mpm.LinearElastic(young=10e6, poisson=0.3))
+    x, y = (np.arange(64) + 0.5) / 32, (np.arange(32) + 0.5) / 32
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2) + [1e-3, 2e-3]
+    points = points[points[:, 1] < 0.9 - 0.5 * np.minimum(points[:, 0], 1.2)]
+    model.seed_points(points, np.full(len(points), 1 / 32**2), density=1000.0)
+    model.roller(1, (1, 0))
+    model.roller(2, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=POROSITY, conductivity=1e-3, modulus=2.2e7, drained_surface=True, suction_limit=suction_limit)
+    model.set_pore_pressure(lambda x: 9810.0 * (1.5 - x[:, 1]))
+    model.stand_water(1.5)
+    report = model.explicit(0.3, nmd=True).last()
+    p = model.particles
+    assert np.abs(p.stress).max() < 0.02 * 9810.0 and np.linalg.norm(p.displacement, axis=1).max() < 1e-5
+    np.testing.assert_allclose(p.pore_pressure, 9810.0 * (1.5 - p.position[:, 1]), atol=9810.0 / 7)  # one value in each cell
+    assert abs(model.water_inflow()) < 1e-4 * model.water_volume()
+    assert report.unexplained_fraction == pytest.approx(0.0, abs=1e-5)
+    model.stand_water(-1.0)  # without it the weight of the soil acts
+    model.explicit(0.4, nmd=True).last()
+    assert np.linalg.norm(p.displacement, axis=1).max() > 1e-4
+
+
 # --- pores that run empty ---------------------------------------------------------------------------------------------
 
 
@@ -268,6 +295,10 @@ def test_input_that_explicit_water_cannot_work_with():
         light.explicit(1.0)
     with pytest.raises(mpm.InputError, match="without DUAL_DOMAIN integration"):
         model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)
+    with pytest.raises(mpm.InputError, match="without conductivities that depend on the direction"):
+        layered = column(4)
+        layered.add_water(porosity=0.4, conductivity=1e-3, anisotropy=(2.0, 1.0))
+        layered.explicit(1.0)
     with pytest.raises(mpm.InputError, match="suction_limit is -1.0 Pa, expected 0 or more"):
         model.add_water(porosity=0.4, conductivity=1e-3, suction_limit=-1.0)
     with pytest.raises(mpm.InputError, match="above the critical time step"):
