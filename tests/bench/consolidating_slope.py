@@ -22,8 +22,8 @@ comm = MPI.COMM_WORLD
 YEAR, GRAVITY, HEIGHT, CREST, FILL = 365.25 * 86400.0, 9.81, 5.0, 6.0, 20e3  # s, m/s2, m, m, Pa
 
 
-def slope(cell_size: float, per_cell: int) -> mpm.Model:
-    """The slope at rest, with the fill on its crest and water that leaves at its surface."""
+def slope(cell_size: float, per_cell: int, *, wet: bool = True) -> mpm.Model:
+    """The slope at rest, dry or with water that leaves at its surface."""
     mesh = bridge.slope_mesh(comm, height=HEIGHT, angle=30.0, crest=CREST, cell_size=cell_size, kind="fitted")
     clay = mpm.MohrCoulomb(young=3e6, poisson=0.3, cohesion=15e3, friction_angle=25.0, dilation_angle=0.0)
     model = mpm.Model(bridge.background_mesh(*mesh), clay)
@@ -31,16 +31,26 @@ def slope(cell_size: float, per_cell: int) -> mpm.Model:
     model.roller(bridge.LEFT, (1, 0))
     model.fix(bridge.BASE)
     model.set_gravity((0.0, -GRAVITY))
+    if wet:
+        fill_pores(model)
+    model.equilibrate(small_displacements=True)
+    return model
+
+
+def fill_pores(model: mpm.Model) -> None:
+    """Pressures grow with the depth below the surface."""
     model.add_water(porosity=0.5, conductivity=1e-9, modulus=np.inf, kozeny_carman=True, drained_surface=True)
     surface = lambda x: np.clip(HEIGHT - (x[:, 0] - CREST) * np.tan(np.radians(30.0)), 0.0, HEIGHT)
     model.set_pore_pressure(lambda x: 9810.0 * np.maximum(surface(x) - x[:, 1], 0.0))
-    model.equilibrate(small_displacements=True)
+
+
+def load_crest(model: mpm.Model, cell_size: float, pressure: float) -> None:
+    """Put a fill of a pressure [Pa] on the crest."""
     x = model.particles.position
     loaded = (x[:, 1] > HEIGHT - cell_size) & (x[:, 0] < CREST)
     force = np.zeros_like(x)
-    force[loaded, 1] = -FILL * CREST / comm.allreduce(int(loaded.sum()))
+    force[loaded, 1] = -pressure * CREST / comm.allreduce(int(loaded.sum()))
     model.particles.set("traction", force)
-    return model
 
 
 def follow(model: mpm.Model, until: float, first: float, growth: float) -> tuple[int, int, int]:
@@ -61,6 +71,7 @@ def main() -> None:
     parser.add_argument("--years", type=float, default=10.0)
     a = parser.parse_args()
     model = slope(a.cell_size, a.particles_per_cell)
+    load_crest(model, a.cell_size, FILL)
     start, volume = (perf_counter(), process_time()), model.water_volume()
     steps, iterations, cuts = follow(model, a.years * YEAR, 3600.0, 1.2)
     seconds = [perf_counter() - start[0], process_time() - start[1]]
