@@ -17,6 +17,7 @@ import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled, elastic_stress, strain
+from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, require_same_geometry, weighted
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.stiffness import Stiffness
 from fenics_bridge.fem.supports import Constraints, Support, tagged_facets
@@ -52,6 +53,8 @@ class FarField:
         poisson: Poisson's ratio [-].
         density: [kg/m3]; without weight by default.
         degree: of the elements, from 1 on.
+        geometry: `Geometry.AXISYMMETRIC` for a half section of a body of revolution, with x the radius; by default plane strain in two
+            dimensions and a solid in three.
         options_prefix: prefix of the PETSc options of the linear solver.
 
     Raises:
@@ -77,23 +80,33 @@ class FarField:
         poisson: float,
         density: float = 0.0,
         degree: int = 2,
+        geometry: mpm.Geometry | None = None,
         options_prefix: str = "far_field_",
     ) -> None:
         agree(domain.comm, _first_mistake(young, poisson, density, degree, supports))
         self._domain = domain
+        self.geometry = geometry_of(domain, geometry)
         self._space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
         on_border = tagged_facets(domain.comm, facet_tags, border, "border")
         self._facets = facets_of_space(self._space, on_border)
         domain.topology.create_connectivity(domain.topology.dim - 1, domain.topology.dim)
         blocks = fem.locate_dofs_topological(self._space, domain.topology.dim - 1, on_border)
         held = Constraints(self._space, facet_tags, supports)
+        require_axis_held(self._space, self.geometry, held)
         self._ground = f"linear elastic, E = {young:g} Pa, nu = {poisson:g}, density {density:g} kg/m3"
         self._degree = degree
         self._condense(blocks, held, float(young), float(poisson), float(density), options_prefix)
 
     def __repr__(self) -> str:
         border = f"border of {len(self.nodes)} nodes with {len(self.stiffness)} degrees of freedom"
-        return body_text("FarField", self._domain, f"displacement of degree {self._degree}", self._ground, border)
+        return body_text(
+            "FarField",
+            self._domain,
+            f"displacement of degree {self._degree}",
+            self._ground,
+            border,
+            geometry=self.geometry,
+        )
 
     def _condense(
         self,
@@ -108,7 +121,8 @@ class FarField:
         space, dim = self._space, self._domain.geometry.dim
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
         moduli = [fem.Constant(self._domain, value) for value in (young, poisson)]
-        work = ufl.inner(elastic_stress(strain(du), *moduli), strain(v)) * ufl.dx
+        radius = radius_of(self._domain, self.geometry)
+        work = weighted(ufl.inner(elastic_stress(strain(du, radius), *moduli), strain(v, radius)), radius) * ufl.dx
         self._whole = petsc.assemble_matrix(fem.form(work))
         self._whole.assemble()
         self._inner_ends = Constraints(space, None, (), blocks)
@@ -119,7 +133,7 @@ class FarField:
         self._loads = []
         for axis in np.eye(dim):
             force = fem.Constant(self._domain, density * axis)
-            self._loads.append(assembled(fem.form(ufl.inner(force, v) * ufl.dx), space).array.copy())
+            self._loads.append(assembled(fem.form(weighted(ufl.inner(force, v), radius) * ufl.dx), space).array.copy())
 
         index_map = space.dofmap.index_map
         numbers = index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32))
@@ -197,6 +211,7 @@ class FarField:
         Raises:
             InputError: the facets do not cover the border, or what `mpm_core.Model.attach_far_field` refuses. On all ranks alike.
         """
+        require_same_geometry(model, self)
         border = self.on_mesh(model.mesh, facet_tag)
         self._gravity = model.gravity if balanced else np.zeros(model.mesh.dim)
         model.attach_far_field(border.nodes, border.stiffness, border.mass, balanced=balanced)
@@ -213,7 +228,8 @@ class FarField:
         """
         other = facets_of_mesh(mesh, tuple(mesh.tags_of("facet", facet_tag)))
         nodes, first = np.unique(other.nodes, return_index=True)
-        sides = [overlap(side, other, self.nodes, nodes) for side in sides_of(self._facets)]
+        by_radius = self.geometry == mpm.Geometry.AXISYMMETRIC
+        sides = [overlap(side, other, self.nodes, nodes, by_radius) for side in sides_of(self._facets)]
         _require_same_border(mesh.comm, self._facets, other, sum(side.area for side in sides))
         places = other.points.reshape(-1, mesh.dim)[first]
         order = np.lexsort(np.round(places, 9).T)  # which does not depend on the ranks

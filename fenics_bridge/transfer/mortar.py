@@ -83,14 +83,16 @@ class Overlap(NamedTuple):
     """Integrals over a border between the nodes of two meshes."""
 
     own: NDArray[np.float64]
-    """Of products of the first mesh's shape functions, shape (n, n) [m^(D-1)]"""
+    """Of products of the first mesh's shape functions, shape (n, n) [m^(D-1)]; times the radius in axial symmetry"""
     other: NDArray[np.float64]
     """Of products with those of the second mesh, shape (n, m)"""
     area: float
     """Of the common part [m^(D-1)]"""
 
 
-def overlap(first: Facets, second: Facets, nodes: NDArray[np.int64], other_nodes: NDArray[np.int64]) -> Overlap:
+def overlap(
+    first: Facets, second: Facets, nodes: NDArray[np.int64], other_nodes: NDArray[np.int64], by_radius: bool = False
+) -> Overlap:
     """Integrals over the common part of two borders, exact for polynomials: over each intersection of two facets.
 
     Args:
@@ -98,6 +100,7 @@ def overlap(first: Facets, second: Facets, nodes: NDArray[np.int64], other_nodes
         second: facets of the second one.
         nodes: numbers of the first one's nodes, rising, shape (n,).
         other_nodes: numbers of the second one's nodes, rising, shape (m,).
+        by_radius: whether to multiply by the first coordinate, the radius in axial symmetry.
     """
     own, other, area = np.zeros((len(nodes),) * 2), np.zeros((len(nodes), len(other_nodes))), 0.0
     seconds = [Polynomials(*each) for each in zip(second.corners, second.points, strict=True)]
@@ -109,11 +112,12 @@ def overlap(first: Facets, second: Facets, nodes: NDArray[np.int64], other_nodes
         for f in np.flatnonzero(near):
             columns = np.searchsorted(other_nodes, second.nodes[f])
             for part in intersection(corners, second.corners[f]):
-                at, weights = quadrature(part, 2 * max(shapes.degree, seconds[f].degree))
+                at, weights = quadrature(part, 2 * max(shapes.degree, seconds[f].degree) + by_radius)
                 values = shapes(at)
+                area += weights.sum()
+                weights = weights * at[:, 0] if by_radius else weights
                 own[np.ix_(rows, rows)] += (values.T * weights) @ values
                 other[np.ix_(rows, columns)] += (values.T * weights) @ seconds[f](at)
-                area += weights.sum()
     return Overlap(own, other, area)
 
 

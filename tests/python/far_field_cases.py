@@ -39,10 +39,10 @@ def part_of_box(comm, counts, lengths, inside, shake=0.0, seed=0):
     return distributed_mesh(comm, MeshArrays(points, cells, np.ones(len(cells), np.int32), facets, tags), dim)
 
 
-def particles(parts, gravity=None, law=SOIL, per_cell=None):
+def particles(parts, gravity=None, law=SOIL, per_cell=None, geometry=None):
     """A model with particles in all cells of a part."""
     mesh = bridge.background_mesh(*parts)
-    model = mpm.Model(mesh, law)
+    model = mpm.Model(mesh, law, geometry=geometry)
     model.seed(density=DENSITY, per_cell=per_cell or {2: 3, 3: 4}[mesh.dim])
     if gravity is not None:
         model.set_gravity(gravity)
@@ -54,7 +54,7 @@ def everywhere(x):
 
 
 def footing(comm, n, coarse=None, degree=2, reach=(5.0, 4.0), **options):
-    """Half of a strip load on ground 20 m wide and 10 m deep, with squares of 10 / n m: (model, far field).
+    """Half of a strip or circular load on ground 20 m wide and 10 m deep, with squares of 10 / n m: (model, far field).
 
     Args:
         coarse: squares along the depth of the far field; None for particles everywhere, without one.
@@ -83,6 +83,7 @@ def footing(comm, n, coarse=None, degree=2, reach=(5.0, 4.0), **options):
             poisson=POISSON,
             density=DENSITY,
             degree=degree,
+            geometry=model.geometry,
         )
         far.attach(model, BORDER)
     return model, far

@@ -46,14 +46,14 @@ class FarFields:
 
         Args:
             nodes: numbers over all ranks of the nodes on the border, shape (n,), with soil around each.
-            stiffness: K [N/m], shape (n D, n D); per metre in plane strain. Each rank keeps it: (n D)^2 numbers.
+            stiffness: K [N/m], shape (n D, n D); per metre in plane strain, per radian in axial symmetry. Each rank keeps it: (n D)^2 numbers.
             mass: W [kg], shape (n, D, D): the force of a node by gravity; none by default.
             balanced: whether f_0 holds the soil as it is now, in equilibrium with the ground beyond, with its weight.
                 By default f_0 is zero.
 
         Raises:
             InputError: on all ranks: an array of another shape, a stiffness that is not symmetric, a node that is none or without
-                soil, axial symmetry, several velocity fields, pore water.
+                soil, several velocity fields, pore water.
 
         Note:
             Collective. A second call replaces the far field of the first.
@@ -146,8 +146,6 @@ def refuse_far_field(model: Any, what: str) -> None:
 
 def _refuse(model: Any) -> None:
     """Raises InputError for models that cannot have a far field."""
-    if model.geometry.name == "AXISYMMETRIC":
-        raise InputError("geometry is AXISYMMETRIC, expected PLANE_STRAIN or SOLID for a far field")
     if len(set(model._velocity_fields)) > 1:
         raise InputError("the model has several velocity fields, expected one for a far field")
     if model._core.water is not None:

@@ -12,6 +12,8 @@ import mpm_core as mpm
 from fenics_bridge.fem.fields import elastic_stress, strain
 
 COMM = MPI.COMM_WORLD
+SIDES = [2, 4, LOADED]
+"""Tags of the right side and of the upper one"""
 BLOCK = {2: ((3, 2), (4.0, 3.0)), 3: ((3, 2, 2), (4.0, 3.0, 2.0))}
 """Squares or cubes, and lengths, of a block on a fixed base"""
 
@@ -63,6 +65,35 @@ def test_constant_stress_passes_the_border_whose_nodes_do_not_match(dim, degree,
     assert np.abs(forces - expected).max() < 1e-9 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize(("degree", "squares"), [(1, (7, 5)), (2, (5, 7))])
+def test_constant_stress_passes_the_border_of_a_body_of_revolution(degree, squares):
+    """Patch test in axial symmetry: u = (a r, b y) of a cylinder on a smooth base has one stress, along the axis too."""
+    counts, lengths = BLOCK[2]
+    domain, _, facets = part_of_box(COMM, counts, lengths, everywhere, shake=0.2)
+    far = bridge.FarField(
+        domain, facets, border=np.intersect1d(SIDES, facets.values), supports=[bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1))],
+        young=YOUNG, poisson=POISSON, density=DENSITY, degree=degree, geometry=mpm.Geometry.AXISYMMETRIC,
+    )  # fmt: skip
+    parts = part_of_box(COMM, squares, lengths, everywhere)
+    mesh = bridge.background_mesh(*parts)
+    border = far.on_mesh(mesh, np.intersect1d(SIDES, parts[2].values).tolist())
+    a, b = 1e-3, -2e-3
+    shear, lame = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
+    stress = lame * (2 * a + b) + 2 * shear * np.array([a, b])
+    expected = np.zeros(mesh.points.shape)  # integrals of N t r
+    for facet in mesh.facets:
+        r, y = mesh.points[facet].T
+        for axis, end in ((0, r), (1, y)):
+            if np.ptp(end) < 1e-9 and end[0] > lengths[axis] - 1e-9:
+                length = np.hypot(np.ptp(r), np.ptp(y))
+                expected[facet, axis] += stress[axis] * length * (r + r.sum()) / 6
+    forces = (border.stiffness @ (mesh.points[border.nodes] * (a, b)).ravel()).reshape(-1, 2)
+    moves = mesh.points[border.nodes] > 1e-9  # where supports hold the ground, their forces are in the balance too
+    difference = np.where(moves, forces - expected[border.nodes], 0.0)
+    assert np.abs(difference).max() < 1e-9 * np.abs(expected).max()
+    assert border.mass[:, 1, 1].sum() < DENSITY * lengths[0] ** 2 / 2 * lengths[1]  # the base carries the rest
+
+
 @pytest.mark.parametrize(("dim", "degree"), [(2, 2), (3, 1)])
 def test_a_rigid_motion_of_free_ground_needs_no_force_and_weight_is_complete(dim, degree):
     counts, lengths = BLOCK[dim]
@@ -109,10 +140,13 @@ def test_elements_that_match_give_what_particles_everywhere_give():
     assert np.abs(moved[1] - moved[0]).max() < 1e-10 * np.abs(moved[0]).max()
 
 
-@pytest.mark.parametrize(("coarse", "degree"), [(10, 2), (10, 3), (20, 2)])
-def test_a_footing_on_deep_ground_settles_as_with_particles_everywhere(coarse, degree):
-    whole, _ = footing(COMM, 40)
-    cut, _ = footing(COMM, 40, coarse, degree)
+@pytest.mark.parametrize(
+    ("coarse", "degree", "geometry"),
+    [(10, 2, None), (10, 3, None), (20, 2, None), (20, 2, mpm.Geometry.AXISYMMETRIC)],
+)
+def test_a_footing_on_deep_ground_settles_as_with_particles_everywhere(coarse, degree, geometry):
+    whole, _ = footing(COMM, 40, geometry=geometry)
+    cut, _ = footing(COMM, 40, coarse, degree, geometry=geometry)
     assert len(cut.particles) < 0.2 * len(whole.particles)
     moved = []
     for model in (whole, cut):
@@ -248,5 +282,5 @@ def test_what_a_model_refuses():
         far.attach(empty, 1)
     round_body = mpm.Model(empty.mesh, SOIL, geometry=mpm.Geometry.AXISYMMETRIC)
     round_body.seed(density=DENSITY, per_cell=3)
-    with pytest.raises(mpm.InputError, match="geometry is AXISYMMETRIC"):
+    with pytest.raises(mpm.InputError, match="geometry is PLANE_STRAIN, that of the particles is AXISYMMETRIC"):
         far.attach(round_body, 1)
