@@ -1,6 +1,7 @@
 #include "explicit/momentum.h"
 
 #include "model/mapping.h"
+#include "transfer/affine_field.h"
 
 namespace mpm::explicit_scheme
 {
@@ -12,12 +13,12 @@ void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt,
   {
     const NodeSums<D>& node = field.nodes[i];
     const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
-    const Vector<D> residual = unbalanced_force<D>(node, gravity);
+    // Components side by side: of single numbers g++ makes branches on the signs of velocities
+    const Components<D> residual = components<D>(unbalanced_force<D>(node, gravity));
+    const Components<D> momentum = node.mass * components<D>(field.start_velocity[i]);
+    const Components<D> acceleration = (residual - local_damping(damping, residual, momentum, dt)) * per_mass;
     for (int a = 0; a < D; ++a)
-    {
-      const double drag = local_damping(damping, residual[a], node.mass * field.start_velocity[i][a], dt);
-      field.acceleration[i][a] = (residual[a] - drag) * per_mass;
-    }
+      field.acceleration[i][a] = acceleration[a];
   }
   for (const Support<D>& support : field.supports)
   {

@@ -112,14 +112,18 @@ double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index
 /// With the mean, the new velocity rises with the old one at a slope between (1 - alpha) / (1 + alpha) and 1, so that
 /// differences never grow by the damping. The implicit scheme has the same law, solved for R
 /// (implicit/damped_inertia.h).
+/// @tparam T        double, or a vector of components
 /// @param momentum  m v at the step's start [N s]
 /// @param dt        [s]
-inline double local_damping(double alpha, double residual, double momentum, double dt)
+template <class T>
+inline T local_damping(double alpha, const T& residual, const T& momentum, double dt)
 {
   // The force that stops the node at the step's end with its drag; R times the part of the step until the stop lies
   // between zero and R. Selections of values, since branches on the signs of velocities cannot be predicted.
-  const double stopping = -1 / ((1 + alpha) * dt) * momentum;
-  const double slowing = std::max(std::min(residual, 0.0), std::min(std::max(residual, 0.0), stopping));
+  const T stopping = -1 / ((1 + alpha) * dt) * momentum, none{};
+  const T forwards = residual > none ? residual : none, backwards = residual < none ? residual : none;
+  const T at_most = stopping < forwards ? stopping : forwards;
+  const T slowing = at_most > backwards ? at_most : backwards;
   return alpha * (residual - 2 * slowing);
 }
 } // namespace mpm::model

@@ -32,11 +32,11 @@ TEST(LocalDamping, IsThatOfTheImplicitScheme)
 
 TEST(LocalDamping, HoldsForceTimesSignWhereTheVelocityKeepsIt)
 {
-  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, 5, dt), 0.75 * 8);
-  EXPECT_DOUBLE_EQ(local_damping(0.75, -8, 5, dt), 0.75 * 8);
-  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, -5, dt), -0.75 * 8);
-  EXPECT_DOUBLE_EQ(local_damping(0.75, 8, 0, dt), 0.75 * 8); // from rest R moves the node, with (1 - alpha) R
-  EXPECT_EQ(local_damping(0.75, 0, 5, dt), 0);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8.0, 5.0, dt), 0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, -8.0, 5.0, dt), 0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8.0, -5.0, dt), -0.75 * 8);
+  EXPECT_DOUBLE_EQ(local_damping(0.75, 8.0, 0.0, dt), 0.75 * 8); // from rest R moves the node, with (1 - alpha) R
+  EXPECT_EQ(local_damping(0.75, 0.0, 5.0, dt), 0);
 }
 
 TEST(LocalDamping, NeverMakesADifferenceGrow)
