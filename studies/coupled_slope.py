@@ -34,6 +34,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
+FOLLOWED = 0.2
+"""Crest and toe are means over the soil within this distance from them, over the height of the slope"""
 KINDS = {"particles": "particles everywhere", "coupled": "resting cells and particles"}
 
 
@@ -127,8 +129,9 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> 
     run = a.height / np.tan(np.radians(a.angle))
     level = level_of(a)
     places = {"crest": np.array([level, a.height]), "toe": np.array([level + run, 0.0])}
+    reach = max(FOLLOWED * a.height, a.cell_size)  # the same soil on all meshes, whose results can then be compared
     followed = {
-        name: numbers_in(model, cells_near(model, place, 2 * a.cell_size, [bridge.SOIL]))
+        name: numbers_in(model, cells_near(model, place, reach, [bridge.SOIL]))
         for name, place in places.items()
     }
     conversion = mpm.Conversion(plastic_strain=a.plastic_strain, displacement=a.displacement)
