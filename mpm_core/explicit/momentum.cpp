@@ -102,28 +102,35 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
                 double damping, double dt, Totals& totals)
 {
   constexpr int D = G::dim;
-  double at_end = 0, external = 0, internal = 0, of_rest = 0; // sums kept in registers need not wait for memory
+  using Row = Components<D>;
+  Row at_end{}, external{}, internal{}, of_rest{}; // sums kept in registers need not wait for memory
   for (Index i : field.part.nodes)
   {
     const NodeSums<D>& node = field.nodes[i];
     if (!owned[i] || is_light(field, i))
       continue;
     const NodeWork<D> work = work_of_node(field, i, gravity, dt);
-    for (int a = 0; a < D; ++a)
-    {
-      external += work.external[a] * work.displacement[a];
-      internal += node.internal[a] * work.displacement[a];
-      of_rest += (work.external[a] - node.internal[a] - node.mass * field.acceleration[i][a]) * work.displacement[a];
-      at_end += node.internal[a] * dt * field.velocity[i][a];
-    }
+    const Row acting = components<D>(work.external), stress = components<D>(node.internal);
+    const Row displacement = components<D>(work.displacement);
+    external += acting * displacement;
+    internal += stress * displacement;
+    of_rest += (acting - stress - node.mass * components<D>(field.acceleration[i])) * displacement;
+    at_end += dt * stress * components<D>(field.velocity[i]);
   }
+  const auto sum_of = [](const Row& components)
+  {
+    double sum = 0;
+    for (int a = 0; a < D; ++a)
+      sum += components[a];
+    return sum;
+  };
   // What the forces leave of m_i a_i is the drag, and at boundary conditions the reactions too.
   const double of_supports = work_of_supports(field, owned, gravity, damping, dt);
-  totals.external_work += external;
-  totals.internal_work += internal;
+  totals.external_work += sum_of(external);
+  totals.internal_work += sum_of(internal);
   totals.support_work += of_supports;
-  totals.damping_work += damping == 0 ? 0 : of_rest + of_supports;
-  return at_end;
+  totals.damping_work += damping == 0 ? 0 : sum_of(of_rest) + of_supports;
+  return sum_of(at_end);
 }
 
 #define INSTANTIATE(G)                                                                                                 \

@@ -9,7 +9,6 @@
 #include "transfer/turn.h"
 
 #include <cmath>
-#include <numeric>
 
 namespace mpm::model
 {
@@ -122,13 +121,14 @@ Lanes work(const std::array<Lanes, G::n_working>& stress, const Lanes& volume,
 
 /// Strains the cells of a batch: rotates their stresses, grows their volumes, accumulates deviatoric strains, and
 /// leaves the increments in the scratch.
+/// @param growth  set to a sum over volumetric strains, finite where all are
 /// @returns work of the stresses before on the strains
 template <class G, int D = G::dim>
 double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
-                    Particles<D>& particles, RestingScratch<D>& scratch)
+                    Particles<D>& particles, RestingScratch<D>& scratch, double& growth)
 {
   constexpr int S = n_symmetric<D>;
-  Lanes work_before{};
+  Lanes work_before{}, all_growth{};
   const auto strain_piece = [&]<std::size_t N>(Piece<N>& piece, std::size_t i)
   {
     const auto gradient = displacement_gradient(field, options.dt, batch.first_run + i);
@@ -146,6 +146,7 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
       store(increment[k], scratch.strain[working_component<G>[k]] + i);
     }
     store(strain.volumetric, scratch.volumetric + i);
+    all_growth += strain.volumetric;
     for (int k = 0; k < D * D; ++k)
       store(gradient[k / D][k % D], scratch.gradient[k] + i);
     work_before +=
@@ -155,6 +156,7 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
     piece[S + 1] += strain.deviatoric;
   };
   change_rows(columns_to_strain<G>(particles), batch.first, batch.last, strain_piece);
+  growth = sum(all_growth);
   return sum(work_before);
 }
 
@@ -221,8 +223,8 @@ template <class G, int D = G::dim>
 void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch, RestingScratch<D>& scratch)
 {
   VelocityField<G>& field = model.fields.front();
-  model.energy.stress_work += 0.5 * strain_batch(model.mesh, field, options, batch, model.particles, scratch);
-  const double growth = std::accumulate(scratch.volumetric, scratch.volumetric + (batch.last - batch.first), 0.0);
+  double growth = 0;
+  model.energy.stress_work += 0.5 * strain_batch(model.mesh, field, options, batch, model.particles, scratch, growth);
   if (!std::isfinite(growth))
     note_failure<D>(model.failure, model.particles, Failure<D>::Kind::not_finite, batch.first, {});
   const auto deform = [&](const MaterialPoints<D>& material, LawIncrement<D>& columns, PointBatch<D>& points)
