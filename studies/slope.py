@@ -62,7 +62,7 @@ COLUMNS = [
     "unbalanced_ratio", "plastic_fraction", "dt_s",
 ]  # fmt: skip
 MAY_CHANGE = {
-    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "frames", "frame-steps", "rebalance",
+    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "transfer", "frames", "frame-steps", "rebalance",
     "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
@@ -118,6 +118,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
             options.integration == "particles",
             lambda: f"--integration is {options.integration}, expected particles with --paper",
         )
+        check(p, options.transfer == "flip", lambda: "--transfer is affine, expected flip with --paper")
         options.initial, options.dt = "zero", 1e-4
     check(p, options.ensemble == 1 or (options.restart is None and options.site is None),
           lambda: f"--ensemble is {options.ensemble}, expected 1 with --restart or --site")  # fmt: skip

@@ -52,6 +52,8 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
   const auto gravity = gravity_at(model, model.time);
   const auto& mesh = model.mesh;
   NodeExchange& exchange = model.exchange;
+  const bool affine = options.transfer == Transfer::affine; // PIC then takes from the gradients that particles carry
+  const double replaced = affine ? 0 : options.pic_fraction;
   for (VelocityField<G>& field : model.fields)
   {
     // Particles to nodes: m_i (11), momentum, f_int,i (14) and tractions (15)
@@ -70,23 +72,27 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     // The second mapping, m_i v_i = sum m_p N_i v_p (19) with v_p from (18), comes before (18) here: sum m_p N_i dt
     // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
     clock.begin(Phase::mapping);
-    find_velocity_change(field, options.pic_fraction, dt);
+    find_velocity_change(field, replaced, dt);
     scatter_momentum<G>(mesh, exchange, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
     map_resting_change<G>(field, field.velocity);
     sum_shared(exchange, field.velocity);
-    find_mapped_velocity(1 - options.pic_fraction, field);
+    find_mapped_velocity(1 - replaced, field);
   }
   separate_fields(model, dt);
   for (VelocityField<G>& field : model.fields)
   {
     clock.begin(Phase::momentum);
     add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
+    if (affine)
+      begin_transfer_loss(field, exchange.owned, dt, model.energy);
     note_rayleigh_work(exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
     find_means(mesh, exchange, options, dt, field);
   }
   note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock); // (18), (20), stresses; migration
+  if (affine)
+    model.energy.pic_loss -= model.energy.kinetic;
 }
 
 /// Stresses last, with v_i + dt a_i (USL).

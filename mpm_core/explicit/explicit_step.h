@@ -2,6 +2,7 @@
 /// @file
 /// The explicit scheme, section 3 of the paper.
 
+#include "model/affine.h"
 #include "model/material_points.h"
 #include "model/rayleigh.h"
 
@@ -21,7 +22,8 @@ struct ExplicitOptions
   double damping = 0;      ///< local damping alpha of FLAC, in [0, 1)
   Rayleigh rayleigh;       ///< damping at small strains
   double pic_fraction = 0; ///< of a step, in [0, 1]
-  bool nmd = false;        ///< nodal mixed discretisation
+  Transfer transfer = Transfer::flip;
+  bool nmd = false; ///< nodal mixed discretisation
   Integration integration = Integration::particles;
   bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
 };

@@ -133,12 +133,27 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
   return sum_of(at_end);
 }
 
+template <class G>
+void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt,
+                         EnergyBook& book)
+{
+  double work = 0;
+  for (Index i : field.part.nodes)
+    if (owned[i] && !is_light(field, i))
+      for (int a = 0; a < G::dim; ++a)
+        work += 0.5 * dt * field.nodes[i].mass * field.acceleration[i][a] *
+                (field.start_velocity[i][a] + field.velocity[i][a]);
+  book.pic_loss += work + book.kinetic;
+  book.kinetic = 0; // the particles' pass sums it again
+}
+
 #define INSTANTIATE(G)                                                                                                 \
   template void find_acceleration(const Vector<G::dim>&, double, double, VelocityField<G>&);                           \
   template void find_advanced_velocity(double, VelocityField<G>&);                                                     \
   template void find_mapped_velocity(double, VelocityField<G>&);                                                       \
   template double add_work(const VelocityField<G>&, std::span<const unsigned char>, const Vector<G::dim>&, double,     \
-                           double, Totals&);
+                           double, Totals&);                                                                           \
+  template void begin_transfer_loss(const VelocityField<G>&, std::span<const unsigned char>, double, EnergyBook&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -27,4 +27,10 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field);
 template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
                 double damping, double dt, Totals& totals);
+
+/// Begins to book what an affine transfer takes out: the work that moves the nodes, and the particles' kinetic energy
+/// at the start, of which that at the end is left.
+template <class G>
+void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt,
+                         EnergyBook& book);
 } // namespace mpm::explicit_scheme

@@ -15,7 +15,7 @@ template <class G>
 void update_particles(Model<G>& model, const ExplicitOptions& options, double dt, bool stress, PhaseClock& clock)
 {
   clock.begin(Phase::particles);
-  particle_pass(model, {dt, true, stress, options.pic_fraction, options.nmd, dt});
+  particle_pass(model, {dt, true, stress, options.pic_fraction, options.nmd, dt, false, options.transfer});
   agree_on_failure(model);
   if (model.failure)
     return;

@@ -71,14 +71,15 @@ void require_integration(const Model<G>& model, const ExplicitOptions& options)
                      "velocity fields");
 }
 
-/// @throws InputError what reproducible runs do not cover
+/// @param option  that runs with more than particles and boundary conditions do not have, as `name is value`
+/// @throws InputError what the run has beside these
 template <class G>
-void require_reproducible(const Model<G>& model, const ExplicitOptions& options)
+void require_plain(const Model<G>& model, const ExplicitOptions& options, const std::string& option)
 {
-  const auto refuse = [](bool asked, const std::string& what)
+  const auto refuse = [&option](bool asked, const std::string& what)
   {
     if (asked)
-      throw InputError("reproducible is True with " + what + ", expected a run without");
+      throw InputError(option + " with " + what + ", expected a run without");
   };
   refuse(options.integration == Integration::dual_domain, "integration DUAL_DOMAIN");
   refuse(options.stress_update == StressUpdate::first, "stress_update FIRST");
@@ -89,6 +90,15 @@ void require_reproducible(const Model<G>& model, const ExplicitOptions& options)
   refuse(model.water.has_value(), "pore water");
   for (const VelocityField<G>& field : model.fields)
     refuse(!field.dashpots.empty() || !field.free_fields.empty(), "absorbing sides");
+}
+
+/// @throws InputError what affine transfer does not cover
+template <class G>
+void require_affine(const Model<G>& model, const ExplicitOptions& options)
+{
+  require_plain(model, options, "transfer is AFFINE");
+  if (options.reproducible || model.fields.size() > 1)
+    throw InputError("transfer is AFFINE, expected FLIP in reproducible runs and with several velocity fields");
 }
 
 template <class G>
@@ -113,8 +123,12 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
 {
   require_integration(model, options);
   if (options.reproducible)
-    require_reproducible(model, options);
+    require_plain(model, options, "reproducible is True");
+  if (options.transfer == Transfer::affine)
+    require_affine(model, options);
+  begin_transfer(model, options.transfer);
   prepare(model);
+  model.energy.kinetic = kinetic_energy(model.particles, 0, model.particles.size());
   ExplicitOptions of_step = options;
   std::int64_t done = 0;
   double dt = 0;

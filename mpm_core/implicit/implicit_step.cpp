@@ -17,6 +17,7 @@
 #include "implicit/stages.h"
 #include "implicit/supported.h"
 #include "implicit/trial.h"
+#include "model/affine.h"
 #include "model/cell_change.h"
 #include "model/far_field.h"
 #include "model/mapping.h"
@@ -36,6 +37,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   if (model.fields.size() > 1)
     throw InputError("the model has " + std::to_string(model.fields.size()) +
                      " velocity fields, expected one in implicit steps");
+  begin_transfer(model, Transfer::flip);
   prepare(model);
   model.exchange.reproducible = false; // an explicit run before may have asked for it
   VelocityField<G>& field = model.fields.front();

@@ -40,8 +40,11 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
     }
     const AffineField<D> velocity =
         affine_field_of_vertices<D>(mesh.shapes[cell], [&](int k) { return velocity_of(cell, k); });
-    scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, affine_field<D>(mesh, cell, change),
-                                           scaled<D>(velocity, options.dt)};
+    if (options.transfer == Transfer::affine)
+      scratch.motion[r - batch.first_run] = {0, velocity, scaled<D>(velocity, options.dt)};
+    else
+      scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, affine_field<D>(mesh, cell, change),
+                                             scaled<D>(velocity, options.dt)};
   }
 }
 } // namespace

@@ -3,6 +3,7 @@
 #include "mesh/search.h"
 #include "model/resting.h"
 #include "model/resting_nodes.h"
+#include "transfer/affine_momentum.h"
 
 #include <numeric>
 
@@ -43,6 +44,7 @@ void follow_leaving(Model<G>& model, const Run& run, VelocityField<G>& field)
       continue;
     CellMoments<G> moments{};
     add_moments<G>(model.particles, p, p + 1, shape, moments);
+    add_affine_momentum(model.mesh, model.particles, p, p + 1, run.cell, moments);
     take_out(moments, field.moments[run.cell]);
     if (!field.tractions.empty())
     {
@@ -69,6 +71,7 @@ void add_entered(const Mesh<D>& mesh, const Particles<D>& particles, std::span<c
     const auto number = static_cast<std::size_t>(field_of_law[static_cast<std::size_t>(material)]);
     VelocityField<G>& field = fields[number];
     add_moments<G>(particles, p, p + 1, mesh.shapes[cell], field.moments[cell]);
+    add_affine_momentum(mesh, particles, p, p + 1, cell, field.moments[cell]);
     add_tractions(particles, mesh.shapes[cell], p, p + 1, cell, field);
     cells[number].push_back(cell);
   }
@@ -111,6 +114,7 @@ void migrate_particles(Model<G>& model)
     const ParticleEnergy energy = particle_energy(model, p);
     model.totals.outflow_mass += model.particles.mass[p];
     model.energy.outflow_kinetic += energy.kinetic;
+    model.energy.kinetic -= energy.kinetic;
     model.energy.outflow_stored += energy.stored;
   }
   model.totals.outflow_particles += static_cast<std::int64_t>(migration.outflow.size());

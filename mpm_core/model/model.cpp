@@ -3,6 +3,7 @@
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
+#include "transfer/affine_momentum.h"
 #include "transfer/resting.h"
 
 #include <algorithm>
@@ -191,6 +192,7 @@ void sum_moments(Model<G>& model)
     VelocityField<G>& field = field_of(model, run.material);
     const auto& shape = model.mesh.shapes[run.cell];
     add_moments<G>(particles, run.first, run.last, shape, field.moments[run.cell]);
+    add_affine_momentum(model.mesh, particles, run.first, run.last, run.cell, field.moments[run.cell]);
     if (!field.tractions.empty())
       add_moments(particles, run.first, run.last, shape, field.tractions[run.cell]);
   }

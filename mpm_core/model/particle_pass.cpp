@@ -5,6 +5,7 @@
 #include "model/resting_pass.h"
 #include "model/strain_kind.h"
 #include "transfer/affine_field.h"
+#include "transfer/affine_momentum.h"
 
 #include <algorithm>
 
@@ -50,6 +51,24 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
   model.energy.ahead += Kind::template half_work_of_batch<G>(particles, batch, scratch);
 }
 
+/// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out.
+template <int D>
+Matrix<D> carried_gradient(const PassOptions& options, const CellMotion<D>& motion)
+{
+  return scaled<D>(motion.change, 1 - options.pic_fraction).gradient;
+}
+
+/// Gives the particles of a run the gradient of their velocity.
+template <int D>
+void keep_gradient(Particles<D>& particles, const Run& run, const Matrix<D>& gradient)
+{
+  for (int k = 0; k < D * D; ++k)
+  {
+    const auto column = particles.velocity_gradient[k].begin();
+    std::fill(column + run.first, column + run.last, gradient[k / D][k % D]);
+  }
+}
+
 /// Keeps the sum of stresses of a run, for the work of the batch.
 template <class G>
 void note(const Working<G>& stress, std::size_t run, double (&by_run)[n_stress<G::dim>][batch_size])
@@ -61,11 +80,16 @@ void note(const Working<G>& stress, std::size_t run, double (&by_run)[n_stress<G
 /// What the moments of a cell become when its particles move along with the nodes, whoever they are: only stresses are
 /// summed over particles, run by run, and tractions, which are rare.
 template <class G, int D = G::dim>
-void update_moments(const Particles<D>& particles, const PassOptions& options, const Run& run, std::size_t in_batch,
-                    BatchScratch<D>& scratch, CellMoments<G>& moments)
+void update_moments(const Mesh<D>& mesh, const Particles<D>& particles, const PassOptions& options, const Run& run,
+                    std::size_t in_batch, BatchScratch<D>& scratch, CellMoments<G>& moments)
 {
   if (run.first_in_cell && options.move)
+  {
     move<G>(moments, scratch.motion[in_batch]);
+    if (options.transfer == Transfer::affine)
+      add_affine_momentum<G>(carried_gradient(options, scratch.motion[in_batch]),
+                             spread_about_particles(mesh, run.cell, moments), moments);
+  }
   if (run.first_in_cell && options.stress)
   {
     moments.volume *= 1 + scratch.cells[in_batch / lanes].volumetric[in_batch % lanes];
@@ -87,11 +111,20 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
 {
   auto& runs = model.order.runs;
   Particles<D>& particles = model.particles;
-  for (std::size_t r = batch.first_run; options.pic_fraction > 0 && r < batch.last_run; ++r)
+  const bool affine = options.transfer == Transfer::affine;
+  for (std::size_t r = batch.first_run; options.pic_fraction > 0 && !affine && r < batch.last_run; ++r)
     model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction);
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
-    runs[r].out_of_order = !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell],
-                                              scratch.motion[r - batch.first_run]);
+  {
+    const CellMotion<D>& motion = scratch.motion[r - batch.first_run];
+    runs[r].out_of_order =
+        !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
+    if (affine)
+    {
+      keep_gradient<D>(particles, runs[r], carried_gradient(options, motion));
+      model.energy.kinetic += kinetic_energy(particles, runs[r].first, runs[r].last);
+    }
+  }
 }
 
 /// Moves and strains the particles of a batch, and brings the moments of their cells to where they are then.
@@ -119,10 +152,11 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
       if (run.first_in_cell)
         moments = {};
       add_moments<G>(model.particles, run.first, run.last, shape, moments);
+      add_affine_momentum(model.mesh, model.particles, run.first, run.last, run.cell, moments);
       note<G>(stress_sum<G>(model.particles, run.first, run.last), i, scratch.stress_after);
     }
     else if constexpr (Kind::moves_moments)
-      update_moments<G>(model.particles, options, run, i, scratch, moments);
+      update_moments<G>(model.mesh, model.particles, options, run, i, scratch, moments);
     add_tractions(model.particles, shape, run.first, run.last, run.cell, field);
     if (run.out_of_order)
       follow_leaving(model, run, field);

@@ -2,7 +2,7 @@
 /// @file
 /// The one pass over the particles in a step: nodes to particles, stress update, and the moments for the next step.
 
-#include "model/model.h"
+#include "model/affine.h"
 
 namespace mpm::model
 {
@@ -16,6 +16,7 @@ struct PassOptions
   bool nmd;            ///< take volumetric strains from the field's `volumetric_strain` (nodal mixed discretisation)
   double law_dt;       ///< duration of the increment for laws [s]; infinite where they are given all time
   bool small = false;  ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
+  Transfer transfer = Transfer::flip;
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal

@@ -1,6 +1,7 @@
 #include "model/resting.h"
 
 #include "base/eigen.h"
+#include "model/affine.h"
 #include "parallel/agreement.h"
 #include "particles/seed.h"
 #include "transfer/resting.h"
@@ -174,6 +175,7 @@ void rest_cells(Model<G>& model, std::span<const unsigned char> chosen)
                                     " velocity fields, expected one");
                  cells = rows_of_cells<G>(model.mesh, particles, chosen);
                });
+  begin_transfer(model, Transfer::flip);
   require(particles.resting, particles.id.size());
   require(particles.velocity_gradient, particles.id.size());
   require(particles.resting_displacement, particles.id.size());

@@ -76,7 +76,9 @@ void for_each_field(P& particles, F&& f)
     particles.traction);
   f(Field{"resting", "-", "Number of particles that a resting cell stands for; 0 in a particle"}, particles.resting);
   f(Field{"velocity_gradient", "1/s",
-          "Gradient of the velocity in a resting cell, dv_x/dx first, then dv_x/dy; 0 in a particle", settable},
+          "Gradient of the velocity in a resting cell, and of particles with affine transfer; dv_x/dx first, then "
+          "dv_x/dy",
+          settable},
     particles.velocity_gradient);
   f(Field{"resting_displacement", "m", "Displacement of the centre of a resting cell since it began to rest"},
     particles.resting_displacement);

@@ -482,6 +482,13 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
       .value("PARTICLES", Integration::particles)
       .value("MIXED", Integration::mixed)
       .value("DUAL_DOMAIN", Integration::dual_domain);
+  py::enum_<Transfer>(m, "Transfer", R"(Which velocities particles carry from step to step.
+
+FLIP: their own, which change by the increments of the nodes' velocities (18), with ``pic`` a part of these velocities. AFFINE: the
+velocity of the nodes at their place, and its gradient (APIC, in linear simplices the same as TPIC): no motion that nodes do not
+see; ``pic`` leaves a part of the gradient out.)")
+      .value("FLIP", Transfer::flip)
+      .value("AFFINE", Transfer::affine);
   py::class_<ExplicitOptions>(m, "ExplicitOptions")
       .def(py::init<>())
       .def_readwrite("stress_update", &ExplicitOptions::stress_update)
@@ -494,6 +501,7 @@ functions that are continuous over the sides of cells (Zhang, Ma & Giguere 2011)
             options.rayleigh = {std::get<0>(given), std::get<1>(given), std::get<2>(given)};
           })
       .def_readwrite("nmd", &ExplicitOptions::nmd)
+      .def_readwrite("transfer", &ExplicitOptions::transfer)
       .def_readwrite("integration", &ExplicitOptions::integration)
       .def_readwrite("reproducible", &ExplicitOptions::reproducible);
   py::class_<RunOptions>(m, "RunOptions")

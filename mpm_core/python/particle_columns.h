@@ -215,6 +215,8 @@ void set_column(Model<G>& model, const std::string& name, const py::array& array
       if constexpr (is_optional<Columns>)
         require(columns, n, field.initial);
       set_rows(values<double>(array), columns_of(columns));
+      if (field.name == "velocity" && !particles.resting.present)
+        particles.velocity_gradient = {}; // those of the velocities that were there
       is_set = true;
     }
   };

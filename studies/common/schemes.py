@@ -16,12 +16,13 @@ INTEGRATIONS = {
     "mixed": mpm.Integration.MIXED,
     "dual-domain": mpm.Integration.DUAL_DOMAIN,
 }
+TRANSFERS = {"flip": mpm.Transfer.FLIP, "affine": mpm.Transfer.AFFINE}
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
 
 
 def add_scheme_options(parser: argparse.ArgumentParser) -> None:
-    """Options ``--scheme``, ``--solver``, ``--second-order``, ``--integration`` and ``--dt``."""
+    """Options ``--scheme``, ``--solver``, ``--second-order``, ``--integration``, ``--transfer`` and ``--dt``."""
     add_choice(parser, "--scheme", "explicit", SCHEMES,
                "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
@@ -45,7 +46,7 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
 
 
 def add_discretisation(parser: argparse.ArgumentParser) -> None:
-    """Options ``--second-order`` and ``--integration``."""
+    """Options ``--second-order``, ``--integration`` and ``--transfer``."""
     add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
     add_choice(
         parser,
@@ -53,6 +54,9 @@ def add_discretisation(parser: argparse.ArgumentParser) -> None:
         "particles",
         tuple(INTEGRATIONS),
         "how stresses are integrated over a cell to nodal forces",
+    )
+    add_choice(
+        parser, "--transfer", "flip", tuple(TRANSFERS), "which velocities particles carry from step to step (explicit)"
     )
 
 
@@ -67,6 +71,8 @@ def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Name
           lambda: f"--second-order is given, expected --scheme implicit with it, not {options.scheme}")  # fmt: skip
     check(parser, options.integration != "dual-domain" or options.scheme == "explicit",
           lambda: f"--integration is dual-domain, expected particles or mixed with --scheme {options.scheme}")  # fmt: skip
+    check(parser, options.transfer == "flip" or (options.scheme == "explicit" and options.integration != "dual-domain"),
+          lambda: "--transfer is affine, expected --scheme explicit and --integration particles or mixed")  # fmt: skip
 
 
 def solver_named(name: str) -> mpm.Newton | mpm.Relaxation:
@@ -116,7 +122,7 @@ def run_scheme(
         "integration": INTEGRATIONS[a.integration],
     }
     if a.scheme == "explicit":
-        return model.explicit(a.time, dt=dt, **common)
+        return model.explicit(a.time, dt=dt, transfer=TRANSFERS[a.transfer], **common)
     return model.implicit(
         a.time,
         dt=dt,

@@ -24,12 +24,19 @@ if TYPE_CHECKING:
 
 
 def explicit_options(
-    damping: float, nmd: bool, integration: Any, stress_update: Any, rayleigh: Rayleigh, reproducible: bool
+    damping: float,
+    nmd: bool,
+    integration: Any,
+    stress_update: Any,
+    rayleigh: Rayleigh,
+    reproducible: bool,
+    transfer: Any,
 ) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.nmd = bool(nmd)
+    options.transfer = transfer
     options.integration = integration
     options.stress_update = stress_update
     options.reproducible = bool(reproducible)

@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import checkpoint
-from ._core import InputError, Integration, StressUpdate
+from ._core import InputError, Integration, StressUpdate, Transfer
 from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import positive
@@ -268,6 +268,7 @@ class Model(Body):
         nmd: bool = False,
         integration: Integration = Integration.PARTICLES,
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
+        transfer: Transfer = Transfer.FLIP,
         allow_unstable: bool = False,
         rebalance: float | None = None,
         energy_limit: float | None = 0.2,
@@ -295,6 +296,7 @@ class Model(Body):
                 transpose, so that both do the same work.
             integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
+            transfer: which velocities particles carry: FLIP or AFFINE; see `Transfer`.
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
@@ -305,8 +307,8 @@ class Model(Body):
                 program on the same kind of processor; sums in reports differ by round-off.
 
         Raises:
-            InputError: an argument out of its range; ``reproducible`` with what it does not cover; ``dt`` above the critical time
-                step, with both numbers.
+            InputError: an argument out of its range; ``reproducible`` or ``transfer`` with what it does not cover; ``dt`` above the
+                critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; or the unexplained
                 energy reached its limit.
         """
@@ -320,7 +322,7 @@ class Model(Body):
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
-                explicit_options(damping, nmd, integration, stress_update, damped, reproducible),
+                explicit_options(damping, nmd, integration, stress_update, damped, reproducible, transfer),
                 run_options(dt, courant, pic, allow_unstable),
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),

@@ -1,0 +1,114 @@
+"""Affine transfer: what nodes get back of the velocities that they gave, and what becomes of energy and momentum."""
+
+import numpy as np
+import pytest
+from core_cases import DIMS, box, by_id, run
+
+import mpm_core as mpm
+
+FLIP, AFFINE = mpm.Transfer.FLIP, mpm.Transfer.AFFINE
+ELASTIC = mpm.LinearElastic(young=200e3, poisson=0.3)
+PER_CELL = {2: 6, 3: 10}
+
+
+def thrown_block(dim, transfer_of_velocities):
+    """A block in the middle of a larger mesh, whose particles have the velocities that a function gives their positions."""
+    model = mpm.Model(box([8] * dim, [2.0] * dim, body=([0.5] * dim, [1.0] * dim), shake=0.1), ELASTIC)
+    model.seed(density=2000.0, per_cell=PER_CELL[dim], cell_tag=1)
+    model.particles.set("velocity", transfer_of_velocities(model.particles.position))
+    return model
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize("transfer", [FLIP, AFFINE])
+def test_nodes_get_an_affine_velocity_back(dim, transfer):
+    # sum m_p N_i (v_p + C (x_i - x_p)) = m_i (A x_i + b) where v_p = A x_p + b and C = A. By FLIP a node gets the mean of the
+    # particles around it, which at the surface of the block lie on one side.
+    gradient, value = np.random.default_rng(1).normal(size=(dim, dim)), np.arange(1.0, dim + 1)
+    model = thrown_block(dim, lambda x: x @ gradient.T + value)
+    run(model, 1e-10, dt=1e-10, transfer=transfer)
+    has_mass = model.nodal("mass") > 0
+    expected = model.mesh.points @ gradient.T + value
+    error = np.abs(model.nodal("velocity") - expected)[has_mass].max()
+    assert error < 1e-9 if transfer == AFFINE else error > 0.05
+
+
+def vibrating_bar(courant, **options):
+    """Energy that is left, over that at the start, of the first longitudinal mode after five periods."""
+    model = mpm.Model(box([16, 2], [1.0, 0.125]), mpm.LinearElastic(young=200e3, poisson=0.0))
+    model.seed(density=2000.0, per_cell=6)
+    model.roller(1, normal=(1, 0))
+    model.roller(2, normal=(1, 0))
+    model.particles.set("velocity", 1e-3 * np.sin(np.pi * model.particles.position) * [1, 0])
+    start = model.report().kinetic_energy
+    report = run(model, 5 * 2.0 / np.sqrt(200e3 / 2000.0), courant=courant, **options)
+    return (report.kinetic_energy + report.stored_energy) / start
+
+
+def test_what_affine_transfer_takes_out_does_not_grow_with_the_number_of_steps():
+    # No particle crosses: nodes get back what they gave, in 300 steps as in 3000. Pure PIC spreads momentum in each step.
+    assert vibrating_bar(0.5, transfer=AFFINE) == pytest.approx(1, abs=0.02)
+    assert vibrating_bar(0.05, transfer=AFFINE) == pytest.approx(1, abs=0.02)
+    assert vibrating_bar(0.5, pic=1.0) < 0.8
+
+
+def test_pic_takes_as_much_of_an_affine_transfer_as_of_flip():
+    # With pic = 1 particles take the velocities of the nodes and no gradient, whichever transfer that began as.
+    ends = [vibrating_bar(0.5, pic=1.0, transfer=transfer) for transfer in (FLIP, AFFINE)]
+    assert ends[1] == pytest.approx(ends[0], rel=0.02)
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize(
+    "scheme", [{}, {"integration": mpm.Integration.MIXED, "nmd": True}], ids=["particles", "mixed"]
+)
+def test_a_tumbling_block_keeps_its_momentum_and_its_energy_adds_up(dim, scheme):
+    # It flies over two cells while it turns and rings; no force acts on it from outside.
+    spin = np.zeros((dim, dim))
+    spin[0, 1], spin[1, 0] = -1.0, 1.0
+    model = thrown_block(dim, lambda x: 1.0 + (x - 0.75) @ spin.T)
+    mass = model.particles.mass
+    momentum = mass @ model.particles.velocity
+    report = run(model, 0.5, courant=0.3, transfer=AFFINE, **scheme)
+    assert np.abs(model.particles.displacement).max() > 0.4
+    np.testing.assert_allclose(model.particles.mass @ model.particles.velocity, momentum, rtol=1e-12)
+    assert abs(report.unexplained_fraction) < 0.01
+    # Particles have no motion that nodes do not see; the nodes' energy is more by that of the gradients within cells.
+    assert report.nodal_kinetic_energy == pytest.approx(report.kinetic_energy, rel=0.02)
+
+
+def test_a_run_goes_on_from_a_file_to_the_last_bit(tmp_path):
+    first = thrown_block(2, lambda x: 1.0 + np.sin(3 * x))
+    run(first, 0.1, transfer=AFFINE)
+    first.save(tmp_path / "state.h5")
+    second = thrown_block(2, lambda x: 0 * x)
+    second.restore(tmp_path / "state.h5")
+    for model in (first, second):
+        run(model, 0.2, transfer=AFFINE)
+    for name in ("position", "velocity", "stress", "velocity_gradient"):
+        np.testing.assert_array_equal(by_id(second, name), by_id(first, name))
+
+
+def test_flip_after_an_affine_run_has_no_gradients():
+    # The momentum of the nodes is that of the particles' own velocities again, as in a model that never had gradients.
+    models = [thrown_block(2, lambda x: 1.0 + np.sin(3 * x)) for _ in range(2)]
+    run(models[0], 1e-10, dt=1e-10, transfer=AFFINE)
+    models[1].particles.set("velocity", models[0].particles.velocity[models[0].particles.find(models[1].particles.id)])
+    for model in models:
+        run(model, model.time + 1e-3, dt=1e-4)
+    np.testing.assert_allclose(by_id(models[0], "velocity"), by_id(models[1], "velocity"), rtol=1e-9)
+    assert not models[0].particles.velocity_gradient.any()
+
+
+@pytest.mark.parametrize(
+    "options, what",
+    [
+        ({"stress_update": mpm.StressUpdate.LAST}, "stress_update LAST"),
+        ({"integration": mpm.Integration.DUAL_DOMAIN}, "DUAL_DOMAIN"),
+        ({"reproducible": True}, "reproducible runs"),
+        ({"rayleigh": mpm.Rayleigh(mass=0.1)}, "rayleigh damping"),
+    ],
+)
+def test_what_affine_transfer_does_not_cover_is_refused_by_name(options, what):
+    with pytest.raises(mpm.InputError, match=f"transfer is AFFINE.*{what}"):
+        run(thrown_block(2, lambda x: x), 0.1, transfer=AFFINE, **options)
