@@ -5,6 +5,7 @@
 #include "implicit/system.h"
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 namespace mpm::implicit
@@ -19,7 +20,7 @@ struct BlockEntries
 };
 
 /// Sums contributions to the blocks of a matrix. The first time it makes the blocks; later times, when the same
-/// contributions come in the same order, it only looks up where they go.
+/// contributions come in the same order, it only looks up where they go. Builds with assertions check that they do.
 class BlockSum
 {
 public:
@@ -32,6 +33,7 @@ public:
     if (!_known)
       _first.assign(numbers.size(), none);
   }
+  ~BlockSum() { assert(_next == _entries.targets.size()); }
   BlockSum(const BlockSum&) = delete;
   BlockSum& operator=(const BlockSum&) = delete;
 
@@ -40,6 +42,7 @@ public:
   {
     if (!_known)
       _entries.targets.push_back(find_or_make(row, _numbers[column]));
+    assert(is_next(_numbers[row], _numbers[column]));
     return target();
   }
 
@@ -48,11 +51,19 @@ public:
   {
     if (!_known)
       _entries.targets.push_back(make(row, column));
+    assert(is_next(row, column));
     return target();
   }
 
 private:
   std::size_t size() const { return static_cast<std::size_t>(_entries.shape[0]) * _entries.shape[1]; }
+
+  /// Whether the next contribution is to the block between these two, as it was the first time.
+  bool is_next(GlobalIndex row, GlobalIndex column) const
+  {
+    return _next < _entries.targets.size() &&
+           _entries.nodes[static_cast<std::size_t>(_entries.targets[_next])] == std::array{row, column};
+  }
 
   double* target() { return &_entries.values[static_cast<std::size_t>(_entries.targets[_next++]) * size()]; }
 
