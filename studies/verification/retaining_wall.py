@@ -73,8 +73,12 @@ def run(quick: bool, folder) -> Result:
             }
             ends = np.array([0.0, max(x.max() for x, _ in curves.values())])
             lines = {
-                f"{name}, field of stresses": (ends, np.full(2, wall.bounds(a)[0])) for name, (a, _) in chosen.items()
+                f"{name}, field of stresses": (ends, np.full(2, wall.bounds(a)[0]))
+                for name, (a, _) in chosen.items()
+                if a.dilation_angle == 0
             }
+            if motion == "passive" and not quick:
+                lines["rough, log-spiral"] = (ends, np.full(2, spiral))
             save_comparison(folder / f"{motion}.png", curves, lines,
                             ("Displacement of the wall over its height [-]", "Coefficient of earth pressure [-]"),
                             joined=True, limits=((0.0, None), (0.0, None)))  # fmt: skip
