@@ -131,13 +131,16 @@ void slide(const Vector<D>& a, double longest, double by_radius, const Spring& s
 } // namespace
 
 template <int D>
-RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest)
+RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Vector<D>& driven)
 {
   RigidBody<D> body = contact.body;
   body.velocity = {};
   body.spin = {};
   if (!at_rest)
     prescribe_motion(step, contact.of_ranks, body);
+  for (std::size_t i = 0; i < D; ++i)
+    if (body.drive[i] != Drive::prescribed)
+      body.velocity[i] = driven[i];
   move_body(step.dt, body);
   return body;
 }
@@ -227,7 +230,7 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
 #define INSTANTIATE(D)                                                                                                 \
   template EndTouch<D> tied_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,         \
                                       const Vector<D>&, const Vector<D>&);                                             \
-  template RigidBody<D> body_at_end(const Contact<D>&, const TimeStep&, bool);                                         \
+  template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Vector<D>&);                    \
   template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,     \
                                   const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)

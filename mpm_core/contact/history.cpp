@@ -35,6 +35,22 @@ Vector<N> mean(const History<N>& history, double from, double to)
   return sum;
 }
 
+template <int N>
+Vector<N> value_at(const History<N>& history, double time)
+{
+  const auto& t = history.times;
+  const auto next = static_cast<std::size_t>(std::ranges::upper_bound(t, time) - t.begin());
+  if (next == 0 || next == t.size())
+    return history.values[next == 0 ? 0 : next - 1];
+  Vector<N> w;
+  for (std::size_t i = 0; i < N; ++i)
+    w[i] =
+        std::lerp(history.values[next - 1][i], history.values[next][i], (time - t[next - 1]) / (t[next] - t[next - 1]));
+  return w;
+}
+
+template Vector<2> value_at<2>(const History<2>&, double);
+template Vector<3> value_at<3>(const History<3>&, double);
 template Vector<2> mean<2>(const History<2>&, double, double);
 template Vector<3> mean<3>(const History<3>&, double, double);
 } // namespace mpm::contact

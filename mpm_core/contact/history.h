@@ -19,4 +19,8 @@ struct History
 /// Mean of a vector from one time to a later one.
 template <int N>
 Vector<N> mean(const History<N>& history, double from, double to);
+
+/// A vector at a time.
+template <int N>
+Vector<N> value_at(const History<N>& history, double time);
 } // namespace mpm::contact

@@ -2,22 +2,14 @@
 
 #include "contact/clearance.h"
 #include "contact/touch.h"
+#include "implicit/driven_bodies.h"
+#include "model/contacts.h"
 #include "transfer/affine_field.h"
 
 namespace mpm::implicit
 {
 namespace
 {
-/// Shape functions of a cell's vertices at a particle.
-template <int D>
-std::array<double, D + 1> weights_at(const CellShape<D>& shape, const Vector<D>& x)
-{
-  std::array<double, D + 1> weights;
-  for (std::size_t k = 0; k <= D; ++k)
-    weights[k] = 1.0 / (D + 1) + dot<D>(shape.gradient[k], difference<D>(x, shape.centre));
-  return weights;
-}
-
 template <int D>
 Vector<D> slip_of(const std::vector<Column>* slips, Index p)
 {
@@ -47,6 +39,7 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
     for (int i = 0; i < D; ++i)
       u[i] = dt * (field.value[i] + dot<D>(field.gradient[i], xi));
     TouchingParticle<D> found{p,
+                              static_cast<Index>(run.cell),
                               {},
                               spring_of<G>(model.particles, p, moduli, contact.penalty),
                               radius_at_end<G>(model.particles, p, volumetric, u)};
@@ -106,7 +99,8 @@ void scatter(const Model<G>& model, Index cell, std::span<const TouchingParticle
 /// @param strains  of the cells
 template <class G, int D = G::dim>
 void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const std::vector<CellStrain<D>>& strains,
-                   const TimeStep& time, bool at_rest, bool tangents, ContactStep<D>& step)
+                   const TimeStep& time, bool at_rest, bool tangents, const DrivenBodies<D>& bodies,
+                   ContactStep<D>& step)
 {
   step.surfaces.resize(model.contacts.size());
   step.forces.assign(model.mesh.points.size(), {});
@@ -117,7 +111,7 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
     Contact<D>& contact = model.contacts[k];
     keep_clearance<D>(model.mesh, contact);
     TrialContact<D>& trial = step.surfaces[k];
-    trial.end = body_at_end(contact, time, at_rest);
+    trial.end = body_at_end<D>(contact, time, at_rest, driven_velocity<D>(bodies, k));
     trial.touching.clear();
     const auto* slips = columns_of(model.particles, contact.slip);
     const auto* tied = columns_of(model.particles, contact.bond);
@@ -145,7 +139,7 @@ void try_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
     step.contact = {};
   else
     find_contacts<G, G::dim>(model, model.fields.front().velocity, step.strains, {step.time, step.dt},
-                             step.options.at_rest, tangents, step.contact);
+                             step.options.at_rest, tangents, step.bodies, step.contact);
 }
 
 template <class G, int D>
@@ -193,7 +187,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     auto* slips = columns_of(model.particles, contact.slip);
     for (std::size_t i = 0; slips && i < D; ++i)
       std::ranges::fill((*slips)[i], 0.0);
-    for (const auto& [p, touch, spring, radius] : step.contact.surfaces[k].touching)
+    for (const auto& [p, cell, touch, spring, radius] : step.contact.surfaces[k].touching)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];
@@ -214,6 +208,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
 template <class G>
 void move_bodies(Model<G>& model, const ImplicitStep<G>& step)
 {
+  sum_reactions(model);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
   {
     auto& contact = model.contacts[k];

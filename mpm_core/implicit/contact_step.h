@@ -10,7 +10,7 @@ namespace mpm::implicit
 template <int D>
 struct TouchingParticle
 {
-  Index particle;
+  Index particle, cell;
   EndTouch<D> touch;
   Spring spring;
   EndRadius radius;
@@ -31,6 +31,40 @@ struct CellContact
   std::array<std::array<Matrix<D>, D + 1>, D + 1> blocks{}; ///< -df/du between vertices, at constant volumetric strain
   std::array<Vector<D>, D + 1> by_volumetric{};             ///< -df/d theta of the vertices, by that strain of the cell
 };
+
+/// An axis along which forces move a body; see driven_bodies.h.
+template <int D>
+struct DrivenAxis
+{
+  std::size_t surface; ///< number of the body
+  int axis;
+  double mass;                         ///< [kg]; 0 where the load is controlled
+  double start = 0;                    ///< velocity at the step's start [m/s]
+  double velocity = 0;                 ///< the iterate [m/s]
+  double applied = 0;                  ///< force and weight at the step's end [N]
+  double residual = 0;                 ///< R [N]
+  std::vector<Vector<D>> column{};     ///< of B, at the nodes [N/m]
+  std::vector<Vector<D>> row{};        ///< of C [N/m]
+  std::vector<double> row_by_strain{}; ///< the part of C by the nodes' averaged volumetric strains [N]
+};
+
+/// All such axes, those of a body one after the other.
+template <int D>
+struct DrivenBodies
+{
+  std::vector<DrivenAxis<D>> axes;
+  std::vector<double> block; ///< E, row by row [N/m]
+};
+
+/// Shape functions of a cell's vertices at a particle.
+template <int D>
+std::array<double, D + 1> weights_at(const CellShape<D>& shape, const Vector<D>& x)
+{
+  std::array<double, D + 1> weights;
+  for (std::size_t k = 0; k <= D; ++k)
+    weights[k] = 1.0 / (D + 1) + dot<D>(shape.gradient[k], difference<D>(x, shape.centre));
+  return weights;
+}
 
 template <int D>
 struct ContactStep

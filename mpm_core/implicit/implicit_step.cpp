@@ -4,6 +4,7 @@
 #include "implicit/averaging.h"
 #include "implicit/balance.h"
 #include "implicit/contact_force.h"
+#include "implicit/driven_bodies.h"
 #include "implicit/external_force.h"
 #include "implicit/far_field.h"
 #include "implicit/ghost.h"
@@ -65,6 +66,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   field.velocity = field.start_velocity;
   impose_supports(step, field);
   begin_first_stage(field, step);
+  start_bodies(model, step);
   start_pore_water(model, step);
   step.forces.assign(field.nodes.size(), {});
   step.external = external_forces(field, gravity_at(model, model.time + step.dt), step.options.load_fraction);
@@ -95,6 +97,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
   try_contacts(model, tangents, step);
+  balance_bodies(model, tangents, step);
   if (step.pore.flows)
     update(step.halos.nodes, step.pore.rate);
   if (model.water && model.water->may_dry())
@@ -115,7 +118,8 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   for (std::size_t i = 0; i < step.forces.size(); ++i)
     field.nodes[i].internal = step.forces[i].internal;
   model.last.plastic = count.plastic;
-  const TrialReport report = trial_report(exchange, field, step, count);
+  TrialReport report = trial_report(exchange, field, step, count);
+  add_bodies(step, report);
   step.failure = report.failed > 0 ? shared_failure(exchange, count.failure) : std::nullopt;
   return report;
 }

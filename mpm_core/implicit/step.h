@@ -121,6 +121,7 @@ struct ImplicitStep
   bool halos_ready = false;
   bool has_contacts = false;         ///< with rigid surfaces, which follow
   ContactStep<D> contact;            ///< with rigid surfaces
+  DrivenBodies<D> bodies;            ///< those that forces move
   PoreStep<D> pore;                  ///< flow of the pore water; nothing in it without water
   std::vector<double> elastic;       ///< stiffness of each node, sum V (K + 4G/3) |grad N|^2; this rank's part [N/m]
   std::vector<double> frequency;     ///< of each node's elastic oscillations [rad/s]; where damping acts

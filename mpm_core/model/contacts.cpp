@@ -11,12 +11,10 @@ void begin_contacts(Model<G>& model, const TimeStep& step)
     begin_step(model.mesh, step, contact);
 }
 
-namespace
-{
-/// What the soil of all ranks does to the bodies that it moves, by one sum.
-template <class G, int D = G::dim>
+template <class G>
 void sum_reactions(Model<G>& model)
 {
+  constexpr int D = G::dim;
   std::vector<Contact<D>*> moved;
   std::vector<Reaction<D>> sums;
   for (auto& contact : model.contacts)
@@ -33,7 +31,6 @@ void sum_reactions(Model<G>& model)
   for (std::size_t k = 0; k < moved.size(); ++k)
     moved[k]->of_ranks = sums[k];
 }
-} // namespace
 
 template <class G>
 void end_contacts(Model<G>& model, const TimeStep& step)
@@ -74,6 +71,7 @@ void add_contact_forces(Model<G>& model, double dt, VelocityField<G>& field)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void begin_contacts(Model<G>&, const TimeStep&);                                                            \
+  template void sum_reactions(Model<G>&);                                                                              \
   template void end_contacts(Model<G>&, const TimeStep&);                                                              \
   template void add_contact_forces(Model<G>&, double, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)

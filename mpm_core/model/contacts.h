@@ -15,6 +15,11 @@ void begin_contacts(Model<G>& model, const TimeStep& step);
 template <class G>
 void end_contacts(Model<G>& model, const TimeStep& step);
 
+/// What the soil of all ranks does to the bodies that it moves, by one sum.
+/// @note Collective where there are any
+template <class G>
+void sum_reactions(Model<G>& model);
+
 /// Adds the forces of all contacts to the tractions at the nodes of a field, over all ranks.
 /// @pre sums and start velocities of the field's nodes are there
 /// @note Collective where there are contacts

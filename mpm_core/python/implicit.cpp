@@ -1,4 +1,5 @@
 #include "explicit/run.h"
+#include "implicit/driven_bodies.h"
 #include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
 #include "implicit/relaxation.h"
@@ -96,6 +97,57 @@ py::array_t<double> owned_points(const Implicit<G>& implicit)
   return copied(values).reshape({-1, D});
 }
 
+/// One vector of this rank's unknowns for each axis along which forces move a body, without supported directions.
+template <class G, int D = G::dim>
+py::array_t<double> of_bodies(const Implicit<G>& implicit, std::vector<Vector<D>> DrivenAxis<D>::*nodal)
+{
+  std::vector<double> all;
+  for (const DrivenAxis<D>& driven : implicit.step.bodies.axes)
+    for (Index node : implicit.system.owned)
+    {
+      const Vector<D> v = product<D>(projector(implicit.system, node), (driven.*nodal)[static_cast<std::size_t>(node)]);
+      all.insert(all.end(), v.begin(), v.end());
+    }
+  return copied(all);
+}
+
+/// The bodies that forces move: their unknowns, balances and derivatives; see implicit/driven_bodies.h.
+template <class G, int D = G::dim>
+void bind_bodies(py::class_<Implicit<G>>& bound)
+{
+  using I = Implicit<G>;
+  const auto numbers = [](double DrivenAxis<D>::*number)
+  {
+    return [number](const I& i)
+    {
+      std::vector<double> all;
+      for (const DrivenAxis<D>& driven : i.step.bodies.axes)
+        all.push_back(driven.*number);
+      return copied(all);
+    };
+  };
+  bound
+      .def_property("body_velocity", numbers(&DrivenAxis<D>::velocity),
+                    [](I& i, const std::vector<double>& velocity)
+                    {
+                      for (std::size_t k = 0; k < i.step.bodies.axes.size(); ++k)
+                        i.step.bodies.axes[k].velocity = velocity.at(k);
+                    })
+      .def_property_readonly("body_residual", numbers(&DrivenAxis<D>::residual))
+      .def_property_readonly("body_block", [](const I& i) { return copied(i.step.bodies.block); })
+      .def_property_readonly("body_columns", [](const I& i) { return of_bodies<G, D>(i, &DrivenAxis<D>::column); })
+      .def_property_readonly("body_rows", [](const I& i) { return of_bodies<G, D>(i, &DrivenAxis<D>::row); })
+      .def_property_readonly("body_rows_by_strain",
+                             [](const I& i)
+                             {
+                               std::vector<double> all;
+                               for (const DrivenAxis<D>& driven : i.step.bodies.axes)
+                                 for (Index node : i.system.owned)
+                                   all.push_back(driven.row_by_strain[static_cast<std::size_t>(node)]);
+                               return copied(all);
+                             });
+}
+
 template <class G, int D = G::dim>
 void bind_implicit_step(py::module_& m, const std::string& suffix)
 {
@@ -131,9 +183,8 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
       .def(
           "assemble", [](I& i) { find_tangent(i.model.mesh, i.model.fields.front(), i.step, i.system, i.tangent); },
           Release())
-      .def_property_readonly(
-          "has_surface",
-          [](const I& i) { return i.step.pore.drained && i.model.water && i.model.water->may_dry(); })
+      .def_property_readonly("has_surface", [](const I& i)
+                             { return i.step.pore.drained && i.model.water && i.model.water->may_dry(); })
       .def(
           "revise_surface", [](I& i) { return revise_surface(i.model.mesh, i.model.exchange.comm, i.step); }, Release())
       .def(
@@ -179,6 +230,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           [](const I& i)
           { return unknowns<G>(i, i.model.fields.front().velocity, i.step.pore.rate, 1 / i.step.pore.unit); },
           &set_unknowns<G>);
+  bind_bodies(bound);
   bind_matrix(bound, "stiffness", &TangentEntries::stiffness);
   bind_matrix(bound, "volumetric_force", &TangentEntries::volumetric_force);
   bind_matrix(bound, "volumetric_strain", &TangentEntries::volumetric_strain);

@@ -34,3 +34,21 @@ def test_implicit_contact_is_the_same_on_any_partition(comm, owners_of):
             value = getattr(other, name)
             assert getattr(one, name) == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max())
     assert runs[0][1].impulse[1] < 0  # the ground carries the block
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_load_settles_alike_on_any_partition(comm, owners_of):
+    runs = []
+    for ranks in (comm, MPI.COMM_SELF):
+        mesh = spread_box((12, 8), (1.2, 0.8), ranks, owners_of)
+        model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.45))
+        grid = 0.05 * (np.indices((24, 8)).reshape(2, -1).T + 0.5)
+        model.seed_points(grid, np.full(len(grid), 0.05**2), density=1000.0)
+        model.fix(3)
+        servo = mpm.Servo(force=(150.0, -900.0), speed=1.0)
+        plate = model.add_contact(mpm.Box((0.31, 0.4), (0.87, 0.6)), friction=0.5, body=servo)
+        list(model.implicit(0.2, dt=0.1, quasi_static=True, nmd=True))
+        runs.append((model, plate))
+    assert_same(*(all_by_id(model, (*FIELDS, "contact_slip_0")) for model, _ in runs))
+    assert runs[0][1].displacement == pytest.approx(runs[1][1].displacement, rel=1e-7)
+    assert runs[0][1].force == pytest.approx([-150.0, 900.0], rel=1e-6)

@@ -65,6 +65,15 @@ def tangent(step, dim):
     return j + g.T @ (matrix(step.mean_stress_places(), step.mean_stress_values(), (nodes, dofs)) + h @ g)
 
 
+def matrix_of_strains(step, dim, by_strain):
+    """Rows by the nodes' averaged volumetric strains, (k, nodes), as rows by displacements, (k, unknowns)."""
+    strain = step.volumetric_strain_values()
+    if len(strain) == 0:
+        return np.zeros((len(by_strain), step.total_nodes * step.unknowns))
+    shape = (step.total_nodes, step.total_nodes * step.unknowns)
+    return by_strain @ sp.csr_matrix((strain, step.volumetric_strain_places()), shape=shape)
+
+
 SLOPE_SOIL = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
 
 

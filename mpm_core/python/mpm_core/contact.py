@@ -363,11 +363,13 @@ def refuse_contacts(model: Model, scheme: str) -> None:
         raise InputError(f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not support")
 
 
-def refuse_driven_bodies(model: Model, scheme: str) -> None:
-    """Raises InputError where a scheme would leave out the forces that move a rigid body."""
-    for entry in model._contacts:
-        if any(entry["body"]["drive"]) or entry["body"]["rotates"]:
-            raise InputError(
-                f"the model has a {entry['surface']['kind']} that is a FreeBody or a Servo, expected a prescribed motion, "
-                f"velocity= and spin=, in {scheme}"
-            )
+def refuse_driven_bodies(model: Model, scheme: str, *, second_order: bool) -> None:
+    """Raises InputError where an implicit step would leave out what moves a rigid body."""
+    for number, entry in enumerate(model._contacts):
+        body, kind = entry["body"], entry["surface"]["kind"]
+        if body["rotates"]:
+            raise InputError(f"the model has a {kind} that rotates freely, expected rotates=False in {scheme}")
+        if any(body["drive"]) and second_order:
+            raise InputError(f"second_order is True, expected False with a {kind} that is a FreeBody or a Servo")
+        if any(body["drive"]) and any(number in (one["ball"], one["other"]) for one in model._collisions):
+            raise InputError(f"the model has a {kind} that collides with other bodies, which {scheme} does not support")

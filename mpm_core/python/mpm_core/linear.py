@@ -101,6 +101,18 @@ class Tangent:
             self._ksp.setFromOptions()
             self._ksp.setUp()
 
+    def by_displacement(self, by_strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows by the nodes' averaged volumetric strains, (k, nodes of this rank), as rows by displacements, (k, unknowns)."""
+        if not self._averaged:
+            return np.zeros((len(by_strain), self.matrix.getLocalSize()[0]))
+        rows = []
+        for row in by_strain:
+            x, b = self._strain.createVecs()
+            b.array[:] = row
+            self._strain.multTranspose(b, x)
+            rows.append(x.array.copy())
+        return np.array(rows)
+
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """J^-1 times this rank's part of a vector; None if the solver failed, with the reason in `failure`."""
         x, b = self.matrix.createVecs()

@@ -397,7 +397,7 @@ class Model(Body):
             RunError: a step of dt / 1024 did not converge, or a particle left the mesh; with the reason. The
                 particles have the state after the last step that converged.
         """
-        refuse_driven_bodies(self, "the implicit scheme")
+        refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
         if self._core.water is not None:

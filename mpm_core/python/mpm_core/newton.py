@@ -7,12 +7,17 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from .linear import Tangent
 from .solution import Solution, relative
 
 EASY_ITERATIONS = 8
 """Iterations of a step up to which the next one may be twice as long, at most dt"""
+
+
+FLOATING = 1e12
+"""Stiffness of a rigid body in contact, over that with the soil around it, beyond which nothing holds it"""
 
 
 RUN_AWAY = 10.0
@@ -198,6 +203,37 @@ class NewtonSolver:
         self._tangent.update(step)
         return self._tangent
 
+    def with_bodies(
+        self, step: Any, tangent: Tangent, du: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], ...] | None:
+        """The corrections of nodes and of rigid bodies that forces move; None where they cannot be found.
+
+        The bodies have few unknowns dq, so that du is eliminated: with J Z = B, (E - C Z) dq = R - C J^-1 r and
+        du = J^-1 r - Z dq (implicit/driven_bodies.h).
+
+        Args:
+            step: the core's implicit step, with its tangents.
+            tangent: J.
+            du: J^-1 r, of this rank's nodes.
+        """
+        right = step.body_residual
+        n = len(right)
+        if n == 0:
+            return du, right
+        columns, rows = (vectors.reshape(n, -1) for vectors in (step.body_columns, step.body_rows))
+        rows = rows + tangent.by_displacement(step.body_rows_by_strain.reshape(n, -1))
+        solved = [tangent.solve(column) for column in columns]
+        if any(z is None for z in solved):
+            return None
+        z = np.array(solved)
+        products = self._comm.allreduce(np.column_stack([rows @ z.T, rows @ du]))
+        block = step.body_block.reshape(n, n)
+        remaining = block - products[:, :n]
+        if np.linalg.cond(remaining) > FLOATING or not remaining.diagonal().min() > block.diagonal().max() / FLOATING:
+            return None
+        dq = np.linalg.solve(remaining, right - products[:, n])
+        return du - dq @ z, dq
+
     def sum(self, value: float) -> float:
         """Over all ranks."""
         return self._comm.allreduce(value)
@@ -217,8 +253,10 @@ class _StepSystem:
         residual = self._trial(tangents=True)
         if residual == float("inf"):  # v0 carried on over the whole step is too much; begin at rest
             self._step.iterate = np.zeros_like(self._step.iterate)
+            self._step.body_velocity = np.zeros_like(self._step.body_velocity)
             residual = self._trial(tangents=True)
         self._base, self._last = self._step.iterate, residual
+        self._base_bodies = self._step.body_velocity
         return residual
 
     def correction(self) -> bool:
@@ -230,18 +268,27 @@ class _StepSystem:
         if du is None:
             self.reason = tangent.failure
             return False
-        self._correction = du / self._dt
+        found = self._solver.with_bodies(self._step, tangent, du)
+        if found is None:
+            self.reason = (
+                tangent.failure
+                or "nothing holds a rigid body that forces move: it must touch the soil, or have inertia"
+            )
+            return False
+        self._correction, self._body_correction = (change / self._dt for change in found)
         return True
 
     def move(self, fraction: float) -> float:
         self._step.iterate = self._base + fraction * self._correction
+        self._step.body_velocity = self._base_bodies + fraction * self._body_correction
         return self._trial(tangents=fraction == 1.0 and not self._ends_next())
 
     def work(self) -> float:
-        return self._solver.sum(float(self._step.residual @ self._correction))
+        bodies = float(self._step.body_residual @ self._body_correction)  # the same on all ranks
+        return self._solver.sum(float(self._step.residual @ self._correction)) + bodies
 
     def keep(self) -> None:
-        self._base = self._step.iterate
+        self._base, self._base_bodies = self._step.iterate, self._step.body_velocity
         self._reduction, self._last = self._residual / self._last, self._residual
 
     def _ends_next(self) -> bool:

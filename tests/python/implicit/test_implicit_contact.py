@@ -203,10 +203,6 @@ def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
 
 def test_what_the_scheme_leaves_out_is_refused():
     model = soil(2)
-    model.add_contact(mpm.Disc((0.72, 0.3), 0.15), body=mpm.FreeBody(mass=3.0))
-    with pytest.raises(mpm.InputError, match="Disc that is a FreeBody or a Servo, expected a prescribed motion"):
-        model.implicit(1.0, dt=0.1)
-    model = soil(2)
     model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)))
     for options in ({"small_displacements": True, "quasi_static": True}, {"solver": mpm.Relaxation()}):
         with pytest.raises(mpm.InputError, match=r"rigid surfaces \(Plane\)"):

@@ -1,0 +1,128 @@
+"""Rigid bodies that forces move in implicit steps: derivatives, balance, closed forms, and Newton's method."""
+
+import numpy as np
+import pytest
+from core_cases import box, rollers
+from implicit_cases import matrix_of_strains
+from mpi4py import MPI
+from test_implicit_contact import CLAY, ELASTIC, G, soil, started
+
+import mpm_core as mpm
+
+pytestmark = pytest.mark.filterwarnings("error:nothing holds the particles")  # a surface does
+
+
+@pytest.mark.parametrize("dim, geometry", [(2, None), (3, None), (2, mpm.Geometry.AXISYMMETRIC)])
+@pytest.mark.parametrize("nmd", [False, True])
+def test_the_derivatives_are_those_of_the_balances(dim, geometry, nmd):
+    model, dt = soil(dim, geometry=geometry), 0.02
+    surface = (mpm.Disc if dim == 2 else mpm.Sphere)([0.7] * (dim - 1) + [0.3], 0.2)
+    axes = [not geometry] * (dim - 1) + [True]
+    model.add_contact(surface, friction=0.4, body=mpm.FreeBody(mass=7.0, axes=axes, rotates=False))
+    rng = np.random.default_rng(3)
+    step = started(model, dt, nmd=nmd)
+    n = sum(axes)
+    v = rng.normal(0.0, 0.1, step.iterate.shape).reshape(-1, dim) + np.array([0.0] * (dim - 1) + [-0.6])
+    v, w = v.ravel(), np.array([0.2] * (n - 1) + [0.4])
+
+    def balances(nodes, bodies):
+        step.iterate, step.body_velocity = nodes, bodies
+        assert step.trial(tangents=False)["failed"] == 0
+        return np.array(step.residual), np.array(step.body_residual)
+
+    step.iterate, step.body_velocity = v, w
+    step.trial(tangents=True)
+    step.assemble()
+    columns, rows = (np.array(x).reshape(n, -1) for x in (step.body_columns, step.body_rows))
+    rows = rows + matrix_of_strains(step, dim, np.array(step.body_rows_by_strain).reshape(n, -1))
+    block = np.array(step.body_block).reshape(n, n)
+    small = 1e-6
+    for k in range(n):
+        there, back = (balances(v, w + sign * small * np.eye(n)[k]) for sign in (1, -1))
+        nodes, bodies = (-(a - b) / (2 * small * dt) for a, b in zip(there, back, strict=True))
+        assert np.abs(columns[k] - nodes).max() < 1e-5 * np.abs(nodes).max()
+        assert block[:, k] == pytest.approx(bodies, abs=1e-5 * np.abs(bodies).max())
+    for _ in range(2):
+        direction = rng.normal(0.0, 1.0, len(v))
+        there, back = (balances(v + sign * small * direction, w)[1] for sign in (1, -1))
+        expected = -(there - back) / (2 * small * dt)
+        assert rows @ direction == pytest.approx(expected, abs=1e-5 * np.abs(rows).max())
+
+
+def loaded_layer(body, *, weight=0.0, velocity=None):
+    """A layer of 0.3 by 0.5 m between rollers on a fixed base, and a plate on it."""
+    model = mpm.Model(box((6, 30), (0.3, 1.5)), ELASTIC)
+    points = 0.025 * (np.indices((12, 20)).reshape(2, -1).T + 0.5)
+    model.seed_points(points, np.full(len(points), 0.025**2), density=2000.0)
+    rollers(model, axes=[0])
+    model.fix(3)
+    if weight:
+        model.set_gravity((0.0, -weight))
+    return model, model.add_contact(mpm.Box((-0.1, 0.5), (0.4, 0.6)), body=body, velocity=velocity)
+
+
+def test_a_load_settles_as_far_as_the_plate_that_it_moves_must():
+    # The way of the plate under a load is that at which a plate with this way feels the load.
+    load = 1500.0
+    model, plate = loaded_layer(mpm.Servo(force=(0.0, -load), speed=1.0))
+    *_, report = model.implicit(1.0, dt=1.0, quasi_static=True)
+    assert plate.force == pytest.approx([0, load], rel=1e-7)
+    settled = -plate.displacement[1]
+    assert settled == pytest.approx(
+        load / 0.3 / (1e6 * 0.7 / (1.3 * 0.4)) * 0.5, rel=0.03
+    )  # stress over M, times the height
+    assert report.iterations <= 8
+    other, plate = loaded_layer(None, velocity=(0.0, -settled))
+    list(other.implicit(1.0, dt=1.0, quasi_static=True))
+    assert plate.force[1] == pytest.approx(load, rel=1e-6)
+
+
+def test_a_weight_rests_on_soil_and_falls_before_it_does():
+    mass, dt, steps = 50.0, 0.01, 5
+    model, plate = loaded_layer(mpm.FreeBody(mass=mass, axes=(False, True), rotates=False), weight=G)
+    list(model.implicit(1.0, dt=0.5, quasi_static=True))
+    assert plate.force[1] == pytest.approx(mass * G, rel=1e-6)
+    # Backward Euler under a constant acceleration: g dt^2 n (n + 1) / 2.
+    model = mpm.Model(box((4, 8), (1.0, 2.0)), ELASTIC)
+    model.seed_points([(0.5, 0.1)], [1e-4], density=2000.0)
+    model.fix(3)
+    model.set_gravity((0.0, -G))
+    stone = model.add_contact(mpm.Disc((0.5, 1.5), 0.1), body=mpm.FreeBody(mass=3.0, axes=(False, True), rotates=False))
+    list(model.implicit(steps * dt, dt=dt))
+    assert -stone.displacement[1] == pytest.approx(G * dt**2 * steps * (steps + 1) / 2, rel=1e-9)
+    assert -stone.velocity[1] == pytest.approx(G * dt * steps, rel=1e-9)
+    with pytest.raises(mpm.RunError, match="nothing holds a rigid body"):
+        list(model.implicit(1.0, dt=0.5, quasi_static=True))
+
+
+def test_a_footing_under_load_converges_quadratically_on_clay():
+    model = mpm.Model(box((24, 16), (3.0, 2.0)), CLAY)
+    x = 0.0625 * (np.indices((48, 24)).reshape(2, -1).T + 0.5)
+    model.seed_points(x, np.full(len(x), 0.0625**2), density=1800.0)
+    rollers(model, axes=[0])
+    model.fix(3)
+    load = 35e3  # 3.5 of the 5.14 times the strength that the clay carries
+    footing = model.add_contact(
+        mpm.Box((1.0, 1.5), (2.0, 1.7)), friction=0.5, body=mpm.Servo(force=(0.0, -load), speed=1.0)
+    )
+    step = started(model, 1.0, quasi_static=True, nmd=True)
+    solution = mpm.Newton(tolerance=1e-10).solver(MPI.COMM_SELF, 2).solve(step, 1.0, True)
+    assert solution.converged
+    before, after = solution.residuals[-2:]
+    assert solution.iterations <= 8 and after < 100 * before**2 + 1e-10
+    assert step.finish() == ""
+    assert footing.force[1] == pytest.approx(load, rel=1e-6)
+    assert 1e-3 < -footing.displacement[1] < 0.1
+
+
+def test_what_the_scheme_leaves_out_is_refused():
+    model, plate = loaded_layer(mpm.FreeBody(mass=3.0))
+    with pytest.raises(mpm.InputError, match="Box that rotates freely, expected rotates=False"):
+        model.implicit(1.0, dt=0.1)
+    model, plate = loaded_layer(mpm.FreeBody(mass=3.0, rotates=False))
+    with pytest.raises(mpm.InputError, match="second_order is True, expected False with a Box"):
+        model.implicit(1.0, dt=0.1, second_order=True)
+    ball = model.add_contact(mpm.Disc((0.1, 0.9), 0.1))
+    ball.add_collision(plate)
+    with pytest.raises(mpm.InputError, match="Box that collides with other bodies"):
+        model.implicit(1.0, dt=0.1)
