@@ -83,7 +83,8 @@ def test_what_comes_back_is_less_than_a_hundredth_and_of_second_order(dim, along
     reflected = []
     for per_wave in (20, 40):
         ends, goes_on = (
-            velocities_behind_a_pulse(dim, along, per_wave, length, resting)[: int(1.7 * per_wave)] for length in (1.75, 3.25)
+            velocities_behind_a_pulse(dim, along, per_wave, length, resting)[: int(1.7 * per_wave)]
+            for length in (1.75, 3.25)
         )
         reflected.append(np.abs(ends - goes_on).max())
     assert reflected[0] < 0.01 and reflected[0] / reflected[1] > 3
