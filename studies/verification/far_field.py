@@ -1,6 +1,6 @@
-"""Strip load on deep elastic ground: the ground beyond the particles as a stiffness of their border.
+"""Load on deep elastic ground: the ground beyond the particles as a stiffness of their border.
 
-Half of a strip load of 1 m on ground 20 m wide and 10 m deep. Particles everywhere are compared with particles in the
+Half of a strip load, or of a circular one, of 1 m on ground 20 m wide and 10 m deep. Particles everywhere are compared with particles in the
 5 m by 4 m under the load, whose mesh is the same, and linear or quadratic elements beyond, with the same nodes and with
 others. Large linear elements are stiffer than the cells that they stand for, and quadratic ones softer.
 """
@@ -28,8 +28,9 @@ def ground(size, far_size, soil):
     return bridge.soil_mesh(*bridge.read_mesh(ROOT / "meshes" / "deep_ground.geo", COMM, parameters=parameters), soil)
 
 
-def particles(parts):
-    model = mpm.Model(bridge.background_mesh(*parts), mpm.LinearElastic(young=YOUNG, poisson=POISSON))
+def particles(parts, geometry):
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    model = mpm.Model(bridge.background_mesh(*parts), law, geometry=geometry)
     model.seed(density=DENSITY, per_cell=3)
     model.roller("axis", (1, 0))
     return model
@@ -69,34 +70,58 @@ def save_meshes(path, model, far, scale):
         save_figure(figure, path)
 
 
+def particles_everywhere(size, geometry):
+    """What `step` returns without a far field."""
+    whole = particles(ground(size, size, ["near", "far"]), geometry)
+    whole.roller("side", (1, 0))
+    whole.fix("base")
+    return step(whole)
+
+
+def beyond(parts, geometry, degree):
+    """The far field of these elements, with the geometry of the particles."""
+    body, _, facets = parts
+    return bridge.FarField(
+        body, facets, border="border", supports=SIDES, young=YOUNG, poisson=POISSON, degree=degree, geometry=geometry
+    )
+
+
+def difference(kind, moved, expected, tolerance):
+    error = np.abs(moved - expected).max() / np.abs(expected).max()
+    name = f"displacement of the surface, {kind}: largest difference"
+    return Check(name, 0.0, "particles everywhere", error, tolerance, scale=1.0)
+
+
 def run(quick: bool, folder) -> Result:
     # --- 1. Particles everywhere -------------------------------------------------------------------------------------
     size = 0.5 if quick else 0.25
-    whole = particles(ground(size, size, ["near", "far"]))
-    whole.roller("side", (1, 0))
-    whole.fix("base")
-    places, expected = step(whole)
-    largest, curves, checks = np.abs(expected).max(), {}, []
+    strip, circle = mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC
+    places, expected = particles_everywhere(size, strip)
+    curves, checks = {}, []
 
     # --- 2. Particles near the load, elements of some kinds beyond ---------------------------------------------------
     near = ground(size, size, "near")
     for degree, far_size, tolerance in ((1, size, 1e-8), (1, 2.0, 0.02), (2, 2.0, 5e-3)):
-        model = particles(near)
-        body, _, facets = ground(size if degree == 1 and far_size == size else 2 * size, far_size, "far")
-        far = bridge.FarField(
-            body, facets, border="border", supports=SIDES, young=YOUNG, poisson=POISSON, degree=degree
-        )
+        model = particles(near, strip)
+        far = beyond(ground(size if far_size == size else 2 * size, far_size, "far"), strip, degree)
         far.attach(model, "border")
         there, moved = step(model)
-        error = np.abs(moved - expected).max() / largest
         kind = ("linear elements, " if degree == 1 else "quadratic elements, ") + (
             "the same nodes" if far_size == size else f"to {far_size:g} m"
         )
-        checks.append(Check(f"displacement of the surface, {kind}: largest difference", 0.0, "particles everywhere", error,
-                            tolerance, scale=1.0))  # fmt: skip
+        checks.append(difference(kind, moved, expected, tolerance))
         curves[kind] = (there, -1e3 * moved[:, 1])
 
-    # --- 3. Pictures -------------------------------------------------------------------------------------------------
+    # --- 3. The circular load ----------------------------------------------------------------------------------------
+    footing = particles(near, circle)
+    beyond(ground(2 * size, 2.0, "far"), circle, 2).attach(footing, "border")
+    checks.append(
+        difference(
+            "circular load, quadratic elements, to 2 m", step(footing)[1], particles_everywhere(size, circle)[1], 5e-3
+        )
+    )
+
+    # --- 4. Pictures -------------------------------------------------------------------------------------------------
     if COMM.rank == 0:
         save_comparison(folder / "surface.png", curves, {"particles everywhere": (places, -1e3 * expected[:, 1])},
                         ("Distance from the axis [m]", "Settlement of the surface [mm]"))  # fmt: skip
