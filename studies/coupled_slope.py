@@ -131,8 +131,7 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> 
     places = {"crest": np.array([level, a.height]), "toe": np.array([level + run, 0.0])}
     reach = max(FOLLOWED * a.height, a.cell_size)  # the same soil on all meshes, whose results can then be compared
     followed = {
-        name: numbers_in(model, cells_near(model, place, reach, [bridge.SOIL]))
-        for name, place in places.items()
+        name: numbers_in(model, cells_near(model, place, reach, [bridge.SOIL])) for name, place in places.items()
     }
     conversion = mpm.Conversion(plastic_strain=a.plastic_strain, displacement=a.displacement)
     rows, seconds, started = [(0.0, 0.0, 0.0, 0.0)], 0.0, process_time()
