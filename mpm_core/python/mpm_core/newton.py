@@ -16,6 +16,11 @@ EASY_ITERATIONS = 8
 """Iterations of a step up to which the next one may be twice as long, at most dt"""
 
 
+NOT_HELD = (
+    "nothing holds a rigid body that forces move: without inertia it must touch the soil from the start; Model.gap says how far "
+    "it is, and explicit steps bring a Servo there"
+)
+
 FLOATING = 1e12
 """Stiffness of a rigid body in contact, over that with the soil around it, beyond which nothing holds it"""
 
@@ -270,10 +275,7 @@ class _StepSystem:
             return False
         found = self._solver.with_bodies(self._step, tangent, du)
         if found is None:
-            self.reason = (
-                tangent.failure
-                or "nothing holds a rigid body that forces move: it must touch the soil, or have inertia"
-            )
+            self.reason = tangent.failure or NOT_HELD
             return False
         self._correction, self._body_correction = (change / self._dt for change in found)
         return True
