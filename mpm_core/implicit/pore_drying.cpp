@@ -10,15 +10,15 @@ namespace
 /// What a particle has, and what it gets over the step.
 struct DryingParticle
 {
-  double volume, porosity, storage;           ///< V, n, n / K_w
-  double growth;                              ///< volumetric strain
-  double start, end;                          ///< pressures [Pa]
-  double standing;                            ///< pressure of water that stands above it [Pa]
+  double volume, porosity, storage; ///< V, n, n / K_w
+  double growth;                    ///< volumetric strain
+  double start, end;                ///< pressures [Pa]
+  double standing;                  ///< pressure of water that stands above it [Pa]
 };
 
 template <int D>
-void add_particle(const DryingParticle& particle, const Vector<D>& mobility, const Retention& retention, const std::array<double, D + 1>& n,
-                  DryingCell<D>& cell)
+void add_particle(const DryingParticle& particle, const Vector<D>& mobility, const Retention& retention,
+                  const std::array<double, D + 1>& n, DryingCell<D>& cell)
 {
   const Wetness before = wetness_at(retention, particle.start), after = wetness_at(retention, particle.end);
   const double volume = particle.volume;

@@ -131,8 +131,8 @@ double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<
     if (water.may_dry())
     {
       before = particles.saturation[0][p];
-      after = wetness_at(water.retention[static_cast<std::size_t>(run.material)], particles.pore_pressure[0][p])
-                  .saturation;
+      after =
+          wetness_at(water.retention[static_cast<std::size_t>(run.material)], particles.pore_pressure[0][p]).saturation;
       particles.saturation[0][p] = after;
     }
     const double gained = after * (growth + porosity / water.modulus * increment) + (after - before) * porosity;
@@ -165,8 +165,8 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       const auto pressure = cell_pressure(mesh, field, step, run.cell);
       model.energy.stress_work +=
           add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
-      const double growth = step.options.nmd ? step.strains[run.cell].volumetric
-                                             : volume_strain(mesh, field, step.dt, run.cell);
+      const double growth =
+          step.options.nmd ? step.strains[run.cell].volumetric : volume_strain(mesh, field, step.dt, run.cell);
       if (changes_masses(*model.water, step.options))
         model.energy.outflow_kinetic +=
             take_up_water(run, *model.water, step, growth, pressure, centre, model.particles);

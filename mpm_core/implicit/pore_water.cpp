@@ -178,9 +178,9 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   const double unit = pore.unit;
   const double volume = volume_of(cell);
   const Vector<D>& flux = flux_of(pore, c);
-  const double inertia = step.options.quasi_static ? 0
-                                                   : pore.density * cell.mean[l] /
-                                                         (volume * step.stage.weight * step.stage.dt * step.dt);
+  const double inertia = step.options.quasi_static
+                             ? 0
+                             : pore.density * cell.mean[l] / (volume * step.stage.weight * step.stage.dt * step.dt);
   Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
   for (int a = 0; a < D; ++a)
   {

@@ -83,7 +83,9 @@ class ConsolidationSite:
         model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
         for k, (soil, weight) in enumerate(self.unit_weight.items()):
             if np.ndim(self.soils[soil].conductivity) > 1:
-                raise mpm.InputError(f"soils.{soil}: conductivity: is a tensor, expected one along each axis for particles")
+                raise mpm.InputError(
+                    f"soils.{soil}: conductivity: is a tensor, expected one along each axis for particles"
+                )
             for tag in model.mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=k)
         bridge.apply_supports(model, self.supports)

@@ -117,9 +117,7 @@ def sliding_layer(method, length, cells_high):
     angle = np.radians(20.0)
     weight = WATER * np.cos(angle) ** 2 / RATIO
     friction = np.degrees(np.arcsin(np.tan(np.radians(30.0))))
-    law = mpm.MohrCoulomb(
-        young=10e6, poisson=0.3, cohesion=0.0, friction_angle=friction, dilation_angle=0.0
-    )
+    law = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=0.0, friction_angle=friction, dilation_angle=0.0)
     mesh = bridge.box_mesh(comm, (length, 1.0), (int(length) * cells_high, cells_high))
     model = mpm.Model(bridge.background_mesh(*mesh), law)
     model.seed(density=weight / GRAVITY, per_cell=3)

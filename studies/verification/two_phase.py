@@ -3,8 +3,8 @@
 A saturated column on a fixed base between rollers. Without drag it oscillates in its first mode by either of the two
 compression waves (Verruijt, Soil Dynamics, 2010, section 5): det(K - c² M) = 0 with K = [E + (1-n)² K_w/n, (1-n) K_w;
 (1-n) K_w, n K_w] and M = diag((1-n) rho_s, n rho_w). With large drag soil and water move together, and a load travels
-through the column as one front; implicit particles, of which water and soil have one velocity, have this wave too. Slow consolidation is that of Terzaghi; c_v is that with compressible water, k /
-gamma_w / (1/E + n/K_w).
+through the column as one front; implicit particles, of which water and soil have one velocity, have this wave too. Slow
+consolidation is that of Terzaghi; c_v is that with compressible water, k / gamma_w / (1/E + n/K_w).
 """
 
 import numpy as np
@@ -70,7 +70,7 @@ def speed_of_swing(cells, modulus, which):
 
 
 def implicit_waves(speed, quick):
-    """By implicit particles: the first mode's speed without the error of backward Euler, and the pressure behind a front over q."""
+    """By implicit particles: speed of the first mode, without the error of backward Euler; pressure behind a front over q."""
     model = column(20, 1e-12, 2.2e8)
     height = model.particles.position[:, 1]
     model.particles.set("velocity", np.column_stack([0 * height, 1e-4 * np.sin(0.5 * np.pi * height / HEIGHT)]))

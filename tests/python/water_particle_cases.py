@@ -76,7 +76,8 @@ def layer(law, water_modulus, weight=20e3, anisotropy=None):
     supports = [bridge.roller(LEFT, (1, 0)), bridge.fixed(BASE)]
     conductivity = 1e-6 if anisotropy is None else 1e-6 * np.asarray(anisotropy)
     fem = water.Consolidation(
-        domain, law, water.PorousSoil(conductivity, porosity=0.4), facet_tags, supports, [water.Head(TOP, 1.0), water.Head(RIGHT, 1.0)],
+        domain, law, water.PorousSoil(conductivity, porosity=0.4), facet_tags, supports,
+        [water.Head(TOP, 1.0), water.Head(RIGHT, 1.0)],
         load=bridge.Load(unit_weight=weight), element=water.Element.STABILISED, water_modulus=water_modulus,
     )  # fmt: skip
     model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law)

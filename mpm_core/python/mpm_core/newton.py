@@ -185,7 +185,7 @@ class NewtonSolver:
         )
 
     def _with_surface(self, system: _StepSystem, step: Any, tolerance: float) -> tuple[NewtonReport, bool, int]:
-        """Solve, with guesses of where water leaves; returns the last course, whether the guess is still wrong, and iterations."""
+        """Solve, with guesses of where water leaves; returns the last course, whether the guess is wrong, and all iterations."""
         o, iterations = self._options, 0
         for _ in range(MOST_SURFACES):
             report = newton(system, tolerance, o.max_iterations, o.max_halvings, min_iterations=0)

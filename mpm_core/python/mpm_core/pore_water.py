@@ -85,8 +85,8 @@ class PoreWater(Conditions):
                 where soil stays saturated): an object with functions ``saturation``, ``effective`` and
                 ``relative_permeability`` of the suction [Pa], such as `fenics_bridge.water.VanGenuchten`. Effective stress is
                 Bishop's, with the effective saturation; particles become lighter as they dry.
-            anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, in implicit runs; or a list with those
-                of each law (None for 1 along all). Axes are fixed in space.
+            anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, in implicit runs; or a list with
+                those of each law (None for 1 along all). Axes are fixed in space.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
@@ -402,7 +402,9 @@ def factors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[tuple[float, f
     one_each = isinstance(anisotropy, (list, tuple)) and any(part is None or np.ndim(part) for part in anisotropy)
     given = list(anisotropy) if one_each else [anisotropy] * laws
     if len(given) != laws:
-        raise InputError(f"anisotropy has {len(given)} entries, expected {dim} factors, or an entry for each of the {laws} laws")
+        raise InputError(
+            f"anisotropy has {len(given)} entries, expected {dim} factors, or an entry for each of the {laws} laws"
+        )
     factors = []
     for entry in given:
         try:

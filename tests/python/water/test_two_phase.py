@@ -244,13 +244,17 @@ def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_
     model.roller(2, (1, 0))
     model.fix(BASE)
     model.set_gravity((0.0, -9.81))
-    model.add_water(porosity=POROSITY, conductivity=1e-3, modulus=2.2e7, drained_surface=True, suction_limit=suction_limit)
+    model.add_water(
+        porosity=POROSITY, conductivity=1e-3, modulus=2.2e7, drained_surface=True, suction_limit=suction_limit
+    )
     model.set_pore_pressure(lambda x: 9810.0 * (1.5 - x[:, 1]))
     model.stand_water(1.5)
     report = model.explicit(0.3, nmd=True).last()
     p = model.particles
     assert np.abs(p.stress).max() < 0.02 * 9810.0 and np.linalg.norm(p.displacement, axis=1).max() < 1e-5
-    np.testing.assert_allclose(p.pore_pressure, 9810.0 * (1.5 - p.position[:, 1]), atol=9810.0 / 7)  # one value in each cell
+    np.testing.assert_allclose(
+        p.pore_pressure, 9810.0 * (1.5 - p.position[:, 1]), atol=9810.0 / 7
+    )  # one value in each cell
     assert abs(model.water_inflow()) < 1e-4 * model.water_volume()
     assert report.unexplained_fraction == pytest.approx(0.0, abs=1e-5)
     model.stand_water(-1.0)  # without it the weight of the soil acts

@@ -78,7 +78,9 @@ def test_a_step_that_would_close_the_pores_is_refused():
 @pytest.mark.parametrize("nmd", [False, True])
 def test_pressed_soil_loses_the_weight_of_the_water_that_leaves_it(nmd):
     """A column under water that loses some 10 % of its height rests under its buoyant weight and its load: sum V s' = sum f y."""
-    model = mpm.Model(box([1, 16], [0.1, 4 / 3], body=([0, 0], [0.1, 1.0])), mpm.LinearElastic(young=100e3, poisson=0.3))
+    model = mpm.Model(
+        box([1, 16], [0.1, 4 / 3], body=([0, 0], [0.1, 1.0])), mpm.LinearElastic(young=100e3, poisson=0.3)
+    )
     model.seed(density=1800.0, per_cell=3, cell_tag=1)
     model.roller(1, (1, 0))
     model.roller(2, (1, 0))
