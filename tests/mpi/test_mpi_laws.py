@@ -75,6 +75,16 @@ def test_explicit_run_is_the_same_on_any_partition(comm, laws):
     assert_same(moved, expected, 1e-7)
 
 
+def test_a_reproducible_run_is_the_same_to_the_last_bit(comm, laws):
+    models = slope(comm, scattered, laws), slope(MPI.COMM_SELF, scattered, laws)
+    for model in models:
+        model.explicit(0.2, dt=4e-4, pic=0.01, nmd=True, reproducible=True).last()
+    moved, expected = map(all_by_id, models)
+    assert expected["state"][:, 0].max() > 1e-3
+    for name, values in expected.items():
+        np.testing.assert_array_equal(moved[name], values, err_msg=name)
+
+
 def test_implicit_run_is_the_same_on_any_partition(comm, laws):
     model, alone = slope(comm, scattered, laws), slope(MPI.COMM_SELF, scattered, laws)
     for each in (model, alone):

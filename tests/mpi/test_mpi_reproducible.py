@@ -39,7 +39,14 @@ RESIDUAL = dict(residual_cohesion=300.0, residual_friction_angle=0.0, softening_
 
 
 @pytest.mark.parametrize(
-    "law", [CLAY, mpm.SofteningMohrCoulomb(CLAY, **RESIDUAL), mpm.Hencky(CLAY)], ids=["clay", "softening", "hencky"]
+    "law",
+    [
+        CLAY,
+        mpm.SofteningMohrCoulomb(CLAY, **RESIDUAL),
+        mpm.Hencky(CLAY),
+        mpm.DruckerPrager(young=4e6, poisson=0.3, strength=1.2e3, friction=0.5),
+    ],
+    ids=["clay", "softening", "hencky", "drucker-prager"],
 )
 def test_other_laws_are_the_same_to_the_last_bit(comm, law):
     models = [sliding_slope(of, scattered, laws=law) for of in (comm, MPI.COMM_SELF)]
@@ -60,6 +67,21 @@ def test_a_heap_in_space_is_the_same_to_the_last_bit_though_it_is_rebalanced(com
         model.explicit(until=0.15, reproducible=True, integration=mpm.Integration.MIXED, rebalance=1.2).last()
         models.append(model)
     assert np.abs(models[1].particles.displacement).max() > 0.02
+    assert_identical(*map(all_by_id, models))
+
+
+def test_an_axisymmetric_slump_is_the_same_to_the_last_bit(comm):
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=200.0, friction_angle=20.0)
+    models = []
+    for of, owners_of in ((comm, scattered), (MPI.COMM_SELF, bands)):
+        mesh = spread_box((12, 8), (1.5, 1.0), of, owners_of, body=((-1.0, -1.0), (0.75, 0.75)))
+        model = mpm.Model(mesh, soil, geometry=mpm.Geometry.AXISYMMETRIC)
+        model.seed(density=2000.0, per_cell=6, cell_tag=1)
+        model.fix(3)
+        model.set_gravity((0.0, -9.81))
+        model.explicit(0.2, reproducible=True, nmd=True, integration=mpm.Integration.MIXED).last()
+        models.append(model)
+    assert models[1].particles.displacement[:, 0].max() > 0.02
     assert_identical(*map(all_by_id, models))
 
 
