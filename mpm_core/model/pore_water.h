@@ -45,11 +45,11 @@ struct PoreWater
   bool drained_surface = false; ///< whether the pressure is zero at the free surface, wherever that is
   std::vector<PressureCondition> conditions;
   std::vector<std::array<double, 3>> anisotropy; ///< of each law: conductivities along the axes over k; none where one
-  std::vector<Retention> retention; ///< of the soil of each law; none where all soil stays saturated
-  TimeTable standing;               ///< level of water that stands over the free surface [m]; none without such water
-  TimeTable rain;                   ///< on the free surface above that water, per horizontal area [m/s]; likewise
-  double inflow = 0;                ///< water that has entered at the nodes of this rank since the start [m3]
-  double time = 0;                  ///< for which loads and levels are wanted: the end of an implicit step [s]
+  std::vector<Retention> retention;              ///< of the soil of each law; none where all soil stays saturated
+  TimeTable standing; ///< level of water that stands over the free surface [m]; none without such water
+  TimeTable rain;     ///< on the free surface above that water, per horizontal area [m/s]; likewise
+  double inflow = 0;  ///< water that has entered at the nodes of this rank since the start [m3]
+  double time = 0;    ///< for which loads and levels are wanted: the end of an implicit step [s]
 
   bool may_dry() const { return !retention.empty(); }
 };

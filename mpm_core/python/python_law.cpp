@@ -200,12 +200,12 @@ ExternalLaw python_law(const py::object& law)
       py::module_::import("inspect").attr("signature")(law.attr("update")).attr("parameters").contains("increment");
   const PythonObject object{law, states, takes_increment};
   ExternalLaw made{"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(),
-          std::move(names),
-          law.attr("p_wave_modulus").cast<double>(),
-          [object](const PointBatch<2>& points) { return called(object, points); },
-          [object](const PointBatch<3>& points) { return called(object, points); },
-          law.ptr(),
-          {takes_increment, takes_increment}};
+                   std::move(names),
+                   law.attr("p_wave_modulus").cast<double>(),
+                   [object](const PointBatch<2>& points) { return called(object, points); },
+                   [object](const PointBatch<3>& points) { return called(object, points); },
+                   law.ptr(),
+                   {takes_increment, takes_increment}};
   add_strength(law, made);
   return made;
 }

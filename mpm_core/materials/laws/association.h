@@ -7,8 +7,8 @@
 namespace mpm::materials
 {
 /// Dilation of a law over that of associated flow, tan(psi) / tan(phi): 1 where the strength does not depend on the
-/// mean stress that the law gives, as in elastic and undrained soil; NaN for laws written in Python and UMATs that do not
-/// name their dilation angle.
+/// mean stress that the law gives, as in elastic and undrained soil; NaN for laws written in Python and UMATs that do
+/// not name their dilation angle.
 double associated_fraction(const Law& law);
 
 /// Whether the strength of a law depends on the mean stress that it gives, while its flow dilates less than associated

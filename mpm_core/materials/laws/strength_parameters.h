@@ -26,7 +26,8 @@ StrengthKind strength_kind(std::string_view name);
 /// Throws InputError where a dilation angle is named before any friction angle.
 void check(const std::vector<StrengthKind>& kinds);
 
-/// Least tan(psi) / tan(phi) of the dilation angles and the friction angles before them; NaN where no dilation angle is named.
+/// Least tan(psi) / tan(phi) of the dilation angles and the friction angles before them; NaN where no dilation angle is
+/// named.
 double associated_fraction(const std::vector<StrengthKind>& kinds, const std::vector<double>& values);
 
 /// Values of parameters with the strength divided by a factor.
