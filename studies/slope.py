@@ -62,8 +62,8 @@ COLUMNS = [
     "unbalanced_ratio", "plastic_fraction", "dt_s",
 ]  # fmt: skip
 MAY_CHANGE = {
-    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "transfer", "frames", "frame-steps", "rebalance",
-    "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
+    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "transfer", "frames", "frame-steps",
+    "rebalance", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
 

@@ -43,7 +43,7 @@ class AveragedKinematics:
         constraints: the boundary conditions.
         laws: the laws, by number; see `follow`.
         geometry: plane strain, axial symmetry or a solid.
-        assembled: whether `stiffness` is a matrix of PETSc, for a direct solver; else it is kept in factors, for an iterative one.
+        assembled: whether `stiffness` is a matrix of PETSc, for a direct solver; else it stays in factors, for an iterative one.
     """
 
     def __init__(

@@ -13,8 +13,8 @@ from petsc4py import PETSc
 class AveragedStrain:
     """The strain of `AveragedKinematics` as an operator on displacements, and forces by its transpose.
 
-    It is B + m (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components and the means M over nodes and back
-    over cells. Multiplied out, its rows reach over two rings of cells (60 times d entries in three dimensions); B and the
+    It is B + m (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components and the means M over nodes and
+    back over cells. Multiplied out, its rows reach over two rings of cells (60 times d entries in three dimensions); B and the
     two factors of M have 3 to 12.
 
     Args:

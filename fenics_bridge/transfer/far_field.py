@@ -53,8 +53,8 @@ class FarField:
         poisson: Poisson's ratio [-].
         density: [kg/m3]; without weight by default.
         degree: of the elements, from 1 on.
-        geometry: `Geometry.AXISYMMETRIC` for a half section of a body of revolution, with x the radius; by default plane strain in two
-            dimensions and a solid in three.
+        geometry: `Geometry.AXISYMMETRIC` for a half section of a body of revolution, with x the radius; by default plane strain
+            in two dimensions and a solid in three.
         options_prefix: prefix of the PETSc options of the linear solver.
 
     Raises:

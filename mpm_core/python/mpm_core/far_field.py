@@ -46,7 +46,8 @@ class FarFields:
 
         Args:
             nodes: numbers over all ranks of the nodes on the border, shape (n,), with soil around each.
-            stiffness: K [N/m], shape (n D, n D); per metre in plane strain, per radian in axial symmetry. Each rank keeps it: (n D)^2 numbers.
+            stiffness: K [N/m], shape (n D, n D); per metre in plane strain, per radian in axial symmetry. Each rank keeps it:
+                (n D)^2 numbers.
             mass: W [kg], shape (n, D, D): the force of a node by gravity; none by default.
             balanced: whether f_0 holds the soil as it is now, in equilibrium with the ground beyond, with its weight.
                 By default f_0 is zero.

@@ -307,8 +307,8 @@ class Model(Body):
                 program on the same kind of processor; sums in reports differ by round-off.
 
         Raises:
-            InputError: an argument out of its range; ``reproducible`` or ``transfer`` with what it does not cover; ``dt`` above the
-                critical time step, with both numbers.
+            InputError: an argument out of its range; ``reproducible`` or ``transfer`` with what it does not cover; ``dt``
+                above the critical time step, with both numbers.
             RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; or the unexplained
                 energy reached its limit.
         """

@@ -23,7 +23,8 @@ Velocity: TypeAlias = ArrayLike | tuple[Sequence[float], ArrayLike] | None
 class FreeBody:
     """A rigid body that gravity, contact and an applied force move: three degrees of freedom in two dimensions, six in three.
 
-    The model's gravity acts on it; local damping of an explicit run does not. Implicit steps know bodies that do not rotate freely.
+    The model's gravity acts on it; local damping of an explicit run does not. Implicit steps know bodies that do not rotate
+    freely.
 
     Args:
         mass: [kg]; per metre in plane strain, per radian in axial symmetry.
@@ -47,8 +48,8 @@ class Servo:
     """Control of a load: along its axes the body moves so that contact balances the applied force, without inertia and weight.
 
     The velocity is the difference of both over m/dt, with the mass m of the particles in contact and the time step dt: a dashpot
-    about as strong as sound waves in the soil. It does not oscillate, and approaches the load as fast as the soil does. Implicit steps
-    end with the load of their end on the soil, whatever the speed.
+    about as strong as sound waves in the soil. It does not oscillate, and approaches the load as fast as the soil does. Implicit
+    steps end with the load of their end on the soil, whatever the speed.
 
     Args:
         force: that the body passes on to the soil [N], shape (D,); or (times [s], forces (n, D)). Entries of other axes are zero.

@@ -71,7 +71,8 @@ def test_constant_stress_passes_the_border_of_a_body_of_revolution(degree, squar
     counts, lengths = BLOCK[2]
     domain, _, facets = part_of_box(COMM, counts, lengths, everywhere, shake=0.2)
     far = bridge.FarField(
-        domain, facets, border=np.intersect1d(SIDES, facets.values), supports=[bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1))],
+        domain, facets, border=np.intersect1d(SIDES, facets.values),
+        supports=[bridge.roller(1, (1, 0)), bridge.roller(3, (0, 1))],
         young=YOUNG, poisson=POISSON, density=DENSITY, degree=degree, geometry=mpm.Geometry.AXISYMMETRIC,
     )  # fmt: skip
     parts = part_of_box(COMM, squares, lengths, everywhere)

@@ -65,8 +65,8 @@ def exact_reflection(ratio, averaged, per_wave=PER_WAVE):
     """|R| of a wave of one frequency where an infinite chain of elements h becomes one of elements ratio h.
 
     The nodal values obey M_L U'' = -K A U, with the averages A = M_L^-1 M, or 1 of a lumped chain. On either side U is a sum of
-    z^j over the nodes j with (4 / h^2) s (1 - 2 s / 3) = w^2, s = (2 - z - 1/z) / 4: a wave, and with averages a part that dies out
-    within some cells. Equations of the nodes around the border give their amplitudes.
+    z^j over the nodes j with (4 / h^2) s (1 - 2 s / 3) = w^2, s = (2 - z - 1/z) / 4: a wave, and with averages a part that dies
+    out within some cells. Equations of the nodes around the border give their amplitudes.
     """
     sizes, part, reach = (1.0, float(ratio)), 2 / 3 if averaged else 0.0, 4
     s = np.sin(np.pi / per_wave) ** 2
