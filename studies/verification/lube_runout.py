@@ -10,8 +10,8 @@ arcsin(tan 31°) = 36.9°. With φ = 31° it would slide as sand of 27° and run
 
 There is no damping except the PIC fraction, 0.6 % in a critical time step, which is a rate: the run-out is the same for
 Courant numbers from 0.1 to 0.5. Without any, grains that fall apart do not come to rest; with 2 %, columns run out a
-sixth less, and with smaller cells, in which such a fraction has less influence, somewhat farther (picture). These run-outs are therefore not accurate to a few per cent. Kumar (2015, Multi-scale
-multiphase modelling of granular flows, Cambridge, ch. 4) found particles of Mohr-Coulomb soil to run out farther than
+sixth less, and with smaller cells, in which such a fraction has less influence, somewhat farther (picture). These run-outs are
+therefore not accurate to a few per cent. Kumar (2015, Multi-scale multiphase modelling of granular flows, Cambridge, ch. 4) found particles of Mohr-Coulomb soil to run out farther than
 discrete elements above a = 1.7: friction alone loses less energy than grains that collide where a column first falls
 freely.
 """

@@ -4,7 +4,8 @@ The study footing_push with stiff clay, so that the soil has yielded all around 
 over area and shear strength at settlements of 0.6 to 1.2 % of the width for a strip, and of half of that for a circular
 footing. Cells at the edge make the footing wider by about half of their size: 1 % of the width, and of the area of a
 circle, which has cells half as large. The rest comes from the cells below it and from the settlement: a strip gains
-about 1 % when it is embedded by 1 % of its width. The factors therefore converge from above, and the error decreases with the cell size.
+about 1 % when it is embedded by 1 % of its width. The factors therefore converge from above, and the error decreases
+with the cell size.
 """
 
 import footing_push
