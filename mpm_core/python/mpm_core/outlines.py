@@ -105,14 +105,16 @@ def _revolved(start: NDArray[np.float64], end: NDArray[np.float64], first: float
     u /= np.linalg.norm(u)
     angle = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
     circle = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.cross(axis, u)
-    points = np.concatenate([[start, end], start + first * radius * circle, end + radius * circle])
-    low = 2 + np.arange(SEGMENTS)
-    low_next, high = 2 + (low - 1) % SEGMENTS, low + SEGMENTS
-    high_next = low_next + SEGMENTS
-    fans = [(np.ones_like(low), high, high_next), (low, high_next, high)]
+    far = 2 + np.arange(SEGMENTS)
+    far_next = 2 + (far - 1) % SEGMENTS
+    points, fans = [[start, end], end + radius * circle], [(np.ones_like(far), far, far_next)]
     if first > 0:
-        fans += [(np.zeros_like(low), low_next, low), (low, low_next, high_next)]
-    return points, np.concatenate([np.stack(fan, axis=1) for fan in fans]).astype(np.int32)
+        points.append(start + first * radius * circle)
+        near, near_next = far + SEGMENTS, far_next + SEGMENTS
+        fans += [(near, far_next, far), (near, near_next, far_next), (np.zeros_like(near), near_next, near)]
+    else:  # one point is the tip of all triangles, so that they close the surface
+        fans.append((np.zeros_like(far), far_next, far))
+    return np.concatenate(points), np.concatenate([np.stack(fan, axis=1) for fan in fans]).astype(np.int32)
 
 
 def _outward(points: NDArray[np.float64], cells: NDArray, directions: NDArray[np.float64]) -> NDArray[np.int32]:
