@@ -35,7 +35,8 @@ inline void add(double factor, const ByVertex<D>& gradients, ByVertex<D>& sums)
 
 /// sum over particles of q_p N_k(x_p) for all vertices k, from its zeroth and first moment
 template <int D>
-inline ByVertex<D> at_vertices(double zeroth, const Vector<D>& first, const std::array<ByVertex<D>, D>& gradients)
+[[gnu::always_inline]] inline ByVertex<D> at_vertices(double zeroth, const Vector<D>& first,
+                                                      const std::array<ByVertex<D>, D>& gradients)
 {
   ByVertex<D> sums;
   for (int k = 0; k <= D; ++k)
