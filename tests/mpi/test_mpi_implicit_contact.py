@@ -42,7 +42,8 @@ def test_a_load_settles_alike_on_any_partition(comm, owners_of):
     for ranks in (comm, MPI.COMM_SELF):
         mesh = spread_box((12, 8), (1.2, 0.8), ranks, owners_of)
         model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.45))
-        grid = 0.05 * (np.indices((24, 8)).reshape(2, -1).T + 0.5) + (0.0037, 0.0)  # no point on a diagonal, in two cells
+        # No point on a diagonal, where it would be in either cell.
+        grid = 0.05 * (np.indices((24, 8)).reshape(2, -1).T + 0.5) + (0.0037, 0.0)
         model.seed_points(grid, np.full(len(grid), 0.05**2), density=1000.0)
         model.fix(3)
         servo = mpm.Servo(force=(150.0, -900.0), speed=1.0)
