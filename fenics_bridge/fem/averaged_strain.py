@@ -59,15 +59,17 @@ class AveragedStrain:
         to_nodes.diagonalScale(L=around)
         self.means = matrix(comm, (n, n_nodes), nodes, 1 / corners), to_nodes
         """The mean over a cell's nodes, and that over the cells around a node by volume, which is taken first"""
+        self._strain_of = _Product(self.plain)
+        self._mean_over_nodes, self._mean_around_nodes = (_Product(factor) for factor in self.means)
         # Products with PETSc's own transposes would add up what ranks send in the order in which it arrives.
-        self._means_transposed = tuple(factor.transpose(PETSc.Mat()) for factor in self.means)
-        self._plain_transposed = self.plain.transpose(PETSc.Mat())
+        self._forces_of = _Product(self.plain.transpose(PETSc.Mat()))
+        self._to_nodes, self._to_cells = (_Product(factor.transpose(PETSc.Mat())) for factor in self.means)
 
     def of(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Averaged strain of a displacement of this rank's own dofs: (n, S). Collective."""
-        strain = _product(self.plain, displacement).reshape(-1, self.size)
+        strain = self._strain_of(displacement).reshape(-1, self.size)
         volumetric = strain[:, : self.normal].sum(axis=1)
-        mean = _product(self.means[0], _product(self.means[1], volumetric))
+        mean = self._mean_over_nodes(self._mean_around_nodes(volumetric))
         strain[:, : self.normal] += (mean - volumetric)[:, None] / self.normal
         return strain
 
@@ -75,17 +77,24 @@ class AveragedStrain:
         """Forces on this rank's own dofs of a stress (n, S). Collective."""
         forces = self.volumes[:, None] * stress
         pressure = self.averages_forces * forces[:, : self.normal].sum(axis=1) / self.normal
-        mean = _product(self._means_transposed[0], pressure)
-        forces[:, : self.normal] += (_product(self._means_transposed[1], mean) - pressure)[:, None]
-        return _product(self._plain_transposed, forces.ravel())
+        forces[:, : self.normal] += (self._to_cells(self._to_nodes(pressure)) - pressure)[:, None]
+        return self._forces_of(forces.ravel())
 
 
-def _product(operator: PETSc.Mat, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix times vector, of this rank's own entries."""
-    right, left = operator.createVecs()
-    right.array[:] = values
-    operator.mult(right, left)
-    return np.array(left.array_r)
+class _Product:
+    """Matrix times vector, of this rank's own entries.
+
+    The vectors are kept: PETSc holds those that Python drops until it collects garbage, which is after the solution of a system.
+    """
+
+    def __init__(self, operator: PETSc.Mat) -> None:
+        self._operator = operator
+        self._right, self._left = operator.createVecs()
+
+    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        self._right.array[:] = values
+        self._operator.mult(self._right, self._left)
+        return np.array(self._left.array_r)
 
 
 def _strain_rows(gradients: NDArray[np.float64], radii: NDArray[np.float64] | None) -> NDArray[np.float64]:
@@ -115,7 +124,7 @@ def matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values
     return made
 
 
-def compressed(columns: NDArray[np.integer], values: NDArray[np.float64]) -> tuple[Any, ...]:
+def compressed(columns: NDArray[np.integer], values: Any) -> tuple[Any, ...]:
     """Compressed rows of equal length."""
     start = np.arange(0, columns.size + 1, columns.shape[1]) if columns.size else np.zeros(len(columns) + 1)
     values = np.broadcast_to(values, columns.shape)
