@@ -115,11 +115,14 @@ def _strain_rows(gradients: NDArray[np.float64], radii: NDArray[np.float64] | No
 
 
 def matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values: Any) -> Any:
-    """Sparse matrix of this rank's rows, each with k entries: global columns and values, both (rows, k)."""
+    """Sparse matrix of this rank's rows, each with up to k entries that are not zero: global columns and values, both (rows, k)."""
     made = PETSc.Mat().create(comm)
     made.setSizes([(n, None) for n in local_size])
     made.setType("aij")
-    made.setPreallocationCSR(compressed(columns, values))
+    values = np.broadcast_to(values, columns.shape)
+    kept = values != 0
+    start = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
+    made.setPreallocationCSR((start.astype(np.int32), columns[kept].astype(np.int32), values[kept]))
     made.assemble()
     return made
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from dolfinx import fem
 from mpm_core.petsc import (
     ALONE_LIMIT,
@@ -27,6 +28,9 @@ LOOSEST, TIGHTEST = 1e-2, 1e-6
 
 PARTS = (0.01, 0.1)
 """Fractions of the first matrix, in most cases the elastic one, that are added to a tangent that cannot be solved"""
+
+CONVERGING = 0.1
+"""Reduction of the residual in an iteration of Newton's method below which it converges fast"""
 
 MOST_ITERATIONS = 100
 """Krylov iterations in an iteration of Newton's method; a tangent that needs more is close to singular"""
@@ -68,6 +72,7 @@ class LinearSolver:
         self._options_prefix, self._newton = options_prefix, newton
         self._last: float | None = None
         self._first: PETSc.Mat | None = None
+        self._part = 0.0  # of the first matrix, that the last system needed
         self._rigid = None
         if displacements:
             points = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
@@ -99,14 +104,23 @@ class LinearSolver:
         solution, right = matrix.createVecs()
         right.array[:] = residual.array[: self._n_owned]
         options = dict(self._options)
-        if self._newton and "ksp_rtol" in options:
-            options["ksp_rtol"] = self._tolerance(right.norm())
+        if self._newton:
+            tolerance = self._follow(right.norm())
+            if "ksp_rtol" in options:
+                options["ksp_rtol"] = tolerance
         self.iterations.append(0)
-        failure = self._solved(matrix, right, solution, options)
+        failure, added = "", 0.0
+        for part in [p for p in (0.0, *PARTS) if p >= self._part]:
+            if part > added:
+                matrix.axpy(part - added, self._first, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+                added = part
+            solution.set(0.0)
+            failure = self._solved(matrix, right, solution, options)
+            if not failure or self._first is None:
+                break
+        self._part = 0.0 if failure else added
         if self._newton and not failure and self._first is None:
             self._first = matrix.copy()
-        if failure and self._first is not None:
-            failure = self._solved_stiffer(matrix, right, solution, options)
         if not failure:
             increment.x.array[: self._n_owned] = solution.array_r
             increment.x.scatter_forward()
@@ -125,24 +139,15 @@ class LinearSolver:
             self._ksp = new_solver(self._comm, self._options_prefix)
         return failure
 
-    def _solved_stiffer(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> Any:
-        """Solution with a matrix to which parts of the first one are added."""
-        failure, before = "", 0.0
-        for part in PARTS:
-            matrix.axpy(part - before, self._first, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            before = part
-            solution.set(0.0)
-            failure = self._solved(matrix, right, solution, options)
-            if not failure:
-                break
-        return failure
-
-    def _tolerance(self, size: float) -> float:
-        """Relative tolerance for a residual of Newton's method, from the reduction of the last ones.
+    def _follow(self, size: float) -> float:
+        """Follow the residuals of Newton's method; returns the relative tolerance of the next system, from the last reduction.
 
         Choice 2 of Eisenstat and Walker (1996, SIAM J. Sci. Comput. 17, 16-32), 0.9 of the square of the reduction, keeps
-        convergence quadratic. A residual that has grown begins a new step.
+        convergence quadratic. A residual that has grown begins a new step. As long as the residual falls slowly, a part of
+        the first matrix that a system needed is added to the next one at once, which most likely needs it too.
         """
-        tolerance = LOOSEST if self._last is None else min(LOOSEST, 0.9 * (size / self._last) ** 2)
+        reduction = np.inf if self._last is None else size / self._last
+        if not CONVERGING < reduction < 1:
+            self._part = 0.0
         self._last = size if size > 0 else None
-        return max(TIGHTEST, tolerance)
+        return max(TIGHTEST, min(LOOSEST, 0.9 * reduction**2))
