@@ -87,15 +87,34 @@ def part_of(function: fem.Function, collapsed: tuple[Any, Any], name: str) -> fe
     return part
 
 
-def force_on(
-    space: Any, forces: NDArray[np.float64], facet_tags: MeshTags, facet_tag: int | str
-) -> NDArray[np.float64]:
-    """Sum of nodal forces (local dofs of a displacement space) over the nodes on the facets of a tag: (D,). Collective."""
-    dim = space.mesh.geometry.dim
-    facets = tagged_facets(space.mesh.comm, facet_tags, facet_tag, "facet_tag")
-    nodes = fem.locate_dofs_topological(space, dim - 1, facets)
-    mine = nodes[nodes < space.dofmap.index_map.size_local]
-    return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))
+class SupportedBody:
+    """A body in equilibrium on its supports, which asks for the forces on these."""
+
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
+        """The space of displacements, external less internal forces at its local dofs, and the tags of the boundary."""
+        raise NotImplementedError
+
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """Force of the body, including its pore water, on its support at the facets of a tag, summed over them.
+
+        Args:
+            facet_tag: number or name of the tag.
+
+        Returns:
+            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
+
+        Raises:
+            InputError: no facet has the tag. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        space, forces, facet_tags = self._nodal_reactions()
+        dim = space.mesh.geometry.dim
+        facets = tagged_facets(space.mesh.comm, facet_tags, facet_tag, "facet_tag")
+        nodes = fem.locate_dofs_topological(space, dim - 1, facets)
+        mine = nodes[nodes < space.dofmap.index_map.size_local]
+        return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))
 
 
 def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:

@@ -18,7 +18,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.fields import dilation, force_on, part_of
+from fenics_bridge.fem.fields import SupportedBody, dilation, part_of
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, weighted
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
@@ -33,7 +33,7 @@ from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
-class MixedQuasiStatic:
+class MixedQuasiStatic(SupportedBody):
     """Small-strain equilibrium of undrained soil: quadratic displacement, linear pressure (Taylor-Hood).
 
     The law gives the deviatoric stress of the deviatoric strain; the pressure p = -K div u is an unknown of its own. That
@@ -162,25 +162,11 @@ class MixedQuasiStatic:
         """
         return raise_load(self, load, first_step, tolerance, progress)
 
-    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
-        """Force of the body on its support at the facets of a tag, summed over them.
-
-        Args:
-            facet_tag: number or name of the tag.
-
-        Returns:
-            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
-
-        Raises:
-            InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
-        """
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         space, dofs = self._displacements
-        return force_on(space, forces[dofs], self._facet_tags, facet_tag)
+        return space, forces[dofs], self._facet_tags
 
     def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
         """Pressure at points, whichever ranks have the points and their cells; compression positive.

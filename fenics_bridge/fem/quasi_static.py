@@ -20,7 +20,7 @@ from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.failure import explained
-from fenics_bridge.fem.fields import force_on, nodal_average
+from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
@@ -38,7 +38,7 @@ from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
-class QuasiStatic(PointFunctions):
+class QuasiStatic(SupportedBody, PointFunctions):
     """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
     Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium.
@@ -314,23 +314,9 @@ class QuasiStatic(PointFunctions):
         """
         return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
 
-    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
-        """Force of the body on its support at the facets of a tag, summed over them.
-
-        Args:
-            facet_tag: number or name of the tag.
-
-        Returns:
-            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
-
-        Raises:
-            InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
-        """
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        return force_on(self.displacement.function_space, out_of_balance, self.facet_tags, facet_tag)
+        return self.displacement.function_space, out_of_balance, self.facet_tags
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_bridge import compat
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.fields import force_on, nodal_average, part_of
+from fenics_bridge.fem.fields import SupportedBody, nodal_average, part_of
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
@@ -21,7 +21,7 @@ from fenics_bridge.water.motion import Motion
 from fenics_bridge.water.positions import at_positions
 
 
-class ConsolidationResults(PointFunctions):
+class ConsolidationResults(SupportedBody, PointFunctions):
     """The results of `Consolidation`, whose constructor sets these attributes."""
 
     domain: Mesh
@@ -127,24 +127,10 @@ class ConsolidationResults(PointFunctions):
         """
         return self._applied.inflow(facet_tag, self._inflow)
 
-    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
-        """Force of the body, soil and water, on its support at the facets of a tag, summed over them.
-
-        Args:
-            facet_tag: number or name of the tag.
-
-        Returns:
-            Shape (D,) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
-
-        Raises:
-            InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
-        """
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         self._body.increment.x.array[:] = 0.0
         if self.motion is not None:
             self.motion.rest_on()
         forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
         space, dofs = self._displacements
-        return force_on(space, forces[dofs], self._facet_tags, facet_tag)
+        return space, forces[dofs], self._facet_tags
