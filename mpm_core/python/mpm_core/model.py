@@ -12,7 +12,8 @@ from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import positive
 from .collective import collectively
-from .contact import RigidContact, add_contact, refuse_contacts, refuse_driven_bodies, smallest_gap
+from .contact import refuse_contacts, refuse_driven_bodies
+from .contact_methods import ContactMethods
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
     explicit_options,
@@ -23,7 +24,6 @@ from .explicit import (
     steps_between,
 )
 from .far_field import refuse_far_field
-from .field_contact import FieldContact, add_field_contact
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
 from .mesh import floats
@@ -35,9 +35,7 @@ from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
 from .resting import Conversion, checked_conversion, refuse_drying
-from .rigid_body import FreeBody, Servo, Velocity
 from .setup_warnings import warn_of_setup
-from .surfaces import Surface
 from .two_phase import begin_two_phases, refuse_two_phases
 from .views import model_text
 
@@ -45,7 +43,7 @@ CONVERSION = Conversion()
 """When resting cells turn into particles, unless a run is given other criteria"""
 
 
-class Model(Body):
+class Model(ContactMethods, Body):
     """Soil as particles on a background mesh.
 
     Args:
@@ -107,114 +105,6 @@ class Model(Body):
     def resumed_dt(self) -> float | None:
         """Largest time step [s] of the implicit run that saved the restored checkpoint; None if there was no implicit run."""
         return None if self._resumed is None else self._resumed.longest
-
-    # --- rigid surfaces ------------------------------------------------------------------------------------------
-
-    def add_contact(
-        self,
-        surface: Surface,
-        *,
-        friction: float = 0.0,
-        adhesion: float = 0.0,
-        velocity: Velocity = None,
-        spin: Velocity = None,
-        body: FreeBody | Servo | None = None,
-        centre: ArrayLike | None = None,
-        penalty: float = 0.2,
-        bonded: bool = False,
-    ) -> RigidContact:
-        """Add contact of the particles with a rigid surface, which does not depend on the mesh.
-
-        The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without tension, and resists
-        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or, in explicit
-        steps, moves as a rigid body under the forces on it. With ``bonded`` the soil beside it is tied to it instead: a
-        prescribed displacement on a boundary that cuts cells.
-
-        Args:
-            surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Cylinder`, `Cone`, `Wedge`, `Polyline` or `Triangles` at its present
-                position, outside all particles.
-            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
-            adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
-                it acts only where the soil touches the surface, and does not resist tension.
-            velocity: of the centre [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
-                before and after; at rest by default. Along axes in which a body is free, its initial velocity.
-            spin: angular velocity about the centre [rad/s], counterclockwise in two dimensions and shape (3,) in three; or
-                (times [s], spins (n,) or (n, 3)). Of a body that rotates freely, its initial spin.
-            body: a `FreeBody`, which forces move, or a `Servo`, which keeps a load; by default all motion is prescribed.
-            centre: centre of mass of a free body; the point about which the surface rotates and moments count [m], shape
-                (D,). By default the centre of a Disc, Sphere, Box, Cylinder, Cone or Wedge, the middle of the extent of
-                Triangles, and the first point of the other surfaces.
-            penalty: stiffness beta of the contact in (0, 1], relative to the largest one that the time step allows; with a
-                larger one particles penetrate less. In implicit steps its stiffness is 50 beta times that of
-                the particles, ten times with 0.2.
-            bonded: tie the particles that are now within 1.5 of their radii of the surface to it, in tension too.
-
-        Returns:
-            Motion of the surface and forces on it, which follow the model.
-
-        Raises:
-            InputError: an argument out of its range, a surface of another dimension, or one that overlaps the soil, with the
-                depth; a model without particles; a free body without inertia, or one that rotates in axial symmetry.
-
-        Example:
-            >>> ground = model.add_contact(mpm.Plane((0, 0), normal=(0, 1)), friction=0.3)
-            >>> *_, report = model.explicit(until=1.0)
-            >>> ground.force
-        """
-        return add_contact(self, surface, friction, adhesion, penalty, centre, velocity, spin, body, bonded)
-
-    def gap(self, surface: Surface) -> float:
-        """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap."""
-        return smallest_gap(self, surface)
-
-    @property
-    def contacts(self) -> list[RigidContact]:
-        """The rigid surfaces in the order in which they were added. Not collective."""
-        return [RigidContact(self, number) for number in range(len(self._contacts))]
-
-    # --- several bodies of soil ----------------------------------------------------------------------------------
-
-    def add_field_contact(
-        self,
-        interface: Surface | ArrayLike,
-        *,
-        first: int = 0,
-        second: int = 1,
-        friction: float = 0.0,
-        adhesion: float = 0.0,
-    ) -> FieldContact:
-        """Let the bodies of two velocity fields touch along an interface, with friction and adhesion; explicit scheme only.
-
-        Without this, bodies in different velocity fields pass through one another. Where both have mass at a node and their
-        particles, each as wide as the side of a square or cube of its volume, touch, they do not approach any further, slide
-        against Coulomb friction, and separate without tension (Bardenhagen et al. 2000; docs/contact.md).
-
-        Args:
-            interface: direction from the first body to the second, shape (D,), where they touch along a plane; else a `Plane`,
-                `Polyline`, `Triangles` or other surface that does not move, with the second body on the side where soil
-                would be that touches it. Only its normals count.
-            first: number of a velocity field; the constructor's `velocity_fields` has that of each law.
-            second: number of another one.
-            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
-            adhesion: shear strength of the interface without pressure [Pa]; it acts only where the bodies touch, and does
-                not resist tension.
-
-        Returns:
-            Forces between the bodies, which follow the model.
-
-        Raises:
-            InputError: an argument out of its range, or fields that are in contact already.
-
-        Example:
-            >>> model = mpm.Model(mesh, [bedrock, soil], velocity_fields=[0, 1])
-            >>> weak = model.add_field_contact(interface=(0.0, 1.0), friction=np.tan(np.radians(12.0)))
-        """
-        return add_field_contact(self, interface, first, second, friction, adhesion)
-
-    @property
-    def field_contacts(self) -> list[FieldContact]:
-        """The contacts between velocity fields in the order in which they were added. Not collective."""
-        return [FieldContact(self, number) for number in range(len(self._field_contacts))]
 
     # --- runs ----------------------------------------------------------------------------------------------------
 
