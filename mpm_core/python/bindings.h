@@ -12,6 +12,8 @@ namespace mpm::python
 void bind_laws(pybind11::module_& m);
 /// Laws written in Python
 void bind_python_law(pybind11::module_& m);
+/// Meshes, and what ranks find of each other's
+void bind_meshes(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_contacts(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
