@@ -30,5 +30,6 @@ Physical Surface("air") = {all[]};
 Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, width + e, e, e}};
 Physical Curve("axis") = {Curve In BoundingBox{-e, -e, -e, e, depth + height + headroom + e, e}};
 Physical Curve("right") = {Curve In BoundingBox{width - e, -e, -e, width + e, depth + height + headroom + e, e}};
+Physical Curve("ground") = {Curve In BoundingBox{-e, depth - e, -e, width + e, depth + e, e}};
 Mesh.MeshSizeMin = cell_size;
 Mesh.MeshSizeMax = cell_size;

@@ -37,16 +37,16 @@ def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress:
     """Apply the changes of `QuasiStatic.reconfigure`."""
     domain, points, before = model.domain, model.points, model.laws
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
-    there = _cells_there(model, off)
+    there = cells_there(domain, model.cell_tags, off)
     water = _nodal_pressure(domain, pore_pressure)
     law = law if law is not None else model.law
     laws = model._materials.laws(law)
     was_off = np.zeros(points.n, dtype=bool)
     was_off[points.off] = True
     new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
-    given = _given_stress(model, stress, new)
+    given = given_stress(model, stress, new)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
-    _take_over(model, new, laws, before, given)
+    take_over(model, new, laws, before, given)
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
     space = model.displacement.function_space
@@ -60,15 +60,15 @@ def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress:
     model.load = replace(old, held=1.0)
 
 
-def _cells_there(model: Any, off: Any) -> Any:
-    """Function that is 1 in active cells, including ghost cells; its dofs are numbered as the cells."""
-    there = fem.Function(compat.function_space(model.domain, "DG", 0), name="active")
-    values = tag_values(model.domain, model.cell_tags, model.domain.topology.dim)
+def cells_there(domain: Mesh, cell_tags: Any, off: Any) -> Any:
+    """Function that is 1 in active cells, including ghost cells, and 0 in those of the tags `off`."""
+    there = fem.Function(compat.function_space(domain, "DG", 0), name="active")
+    values = tag_values(domain, cell_tags, domain.topology.dim)
     there.x.array[compat.cell_dofs(there.function_space)[:, 0]] = ~np.isin(values, off)
     return there
 
 
-def _given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | None:
+def given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | None:
     """Initial stress of the new points: (k, S) [Pa]; None for none."""
     if stress is None:
         return None
@@ -79,7 +79,7 @@ def _given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | No
     return given
 
 
-def _take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: Any) -> None:
+def take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: Any) -> None:
     """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state."""
     points = model.points
     points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
@@ -98,13 +98,13 @@ def _take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: An
 def _support(model: Any, supports: Any, there: Any) -> None:
     """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement."""
     space = model.displacement.function_space
-    constraints = Constraints(space, model.facet_tags, supports, _lonely_nodes(space, there))
+    constraints = Constraints(space, model.facet_tags, supports, lonely_nodes(space, there))
     constraints.origin[:] = model.displacement.x.array[constraints.dofs]
     model.supports = supports
     model._assemble(constraints)
 
 
-def _lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:
+def lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:
     """Blocked dofs, including ghosts, that belong to no active cell: (k,) int32. Collective."""
     count = la.vector(space.dofmap.index_map, 1)
     count.array[:] = 0.0

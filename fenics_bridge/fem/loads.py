@@ -89,6 +89,26 @@ def _weight_by_tag(unit_weight: Any) -> Any:
     return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
 
 
+def pressing(domain: Mesh, pressure: Any, test: Any, facet_tags: MeshTags, tags: Any, there: Any) -> Any:
+    """Work of a pressure against the surface of the soil that is there, as a UFL form.
+
+    Args:
+        domain: the mesh.
+        pressure: pressure [Pa], UFL, times the radius in axisymmetric bodies.
+        test: test function of the displacement, continuous.
+        facet_tags: tags of the facets.
+        tags: numbers of those that it presses on; where soil ends inside of the mesh, facets in there too.
+        there: function that is 1 in cells that are there and 0 in those that are not; None where all are.
+    """
+    normal, ds = ufl.FacetNormal(domain), ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
+    if there is None:
+        return -pressure * ufl.inner(normal, test) * ds(tags)
+    outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels
+    inside = ufl.Measure("dS", domain=domain, subdomain_data=facet_tags)
+    within = pressure("+") * ufl.inner(outward, test("+")) * inside(tags)
+    return -there * pressure * ufl.inner(normal, test) * ds(tags) - within
+
+
 class LoadVectors:
     """Nodal forces of loads on a displacement space; each kind of load is assembled once.
 
@@ -194,15 +214,8 @@ class LoadVectors:
     def _unit_pressure(self, tag: Any) -> Any:
         if tag not in self._pressure:
             domain = self._space.mesh
-            ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
-            normal, test, active = ufl.FacetNormal(domain), self._test, self._active
-            if active is None:
-                form = -weighted(ufl.inner(normal, test), self._radius) * ds(tag)
-            else:  # also where what is there ends inside of the mesh; between two cells that are there it cancels
-                dS = ufl.Measure("dS", domain=domain, subdomain_data=self._facet_tags)
-                inside = ufl.inner(active("+") * normal("+") + active("-") * normal("-"), test("+"))
-                form = -weighted(active * ufl.inner(normal, test), self._radius) * ds(tag)
-                form -= weighted(inside, self._radius) * dS(tag)
+            unit = weighted(fem.Constant(domain, 1.0), self._radius)
+            form = pressing(domain, unit, self._test, self._facet_tags, tag, self._active)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
 

@@ -31,8 +31,6 @@ class _Held(NamedTuple):
     """Prescribed inflow over the unit [-] as a constant; None where there is none"""
     density: Any = None
     """That inflow per area, UFL"""
-    ds: Any = None
-    """Measure over the facets"""
     total: Any = None
     """Compiled form of the integral of the inflow"""
 
@@ -45,10 +43,12 @@ class AppliedBoundary:
         facet_tags: tags of the boundary.
         unit: unit of prescribed inflows in forms [m/s].
         radius: radius of an axisymmetric body, a UFL expression.
+        there: function that is 1 in cells that are there and 0 in those that are not; None where all are.
     """
 
-    def __init__(self, space: Any, facet_tags: MeshTags, unit: float, radius: Any = None) -> None:
+    def __init__(self, space: Any, facet_tags: MeshTags, unit: float, radius: Any = None, there: Any = None) -> None:
         self._space, self._facet_tags, self.unit, self._radius = space, facet_tags, unit, radius
+        self._there = there
         self._dim = space.mesh.geometry.dim
         self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
         """Elevation of the dofs of this rank [m], ghosts included, shape (m,)"""
@@ -92,12 +92,19 @@ class AppliedBoundary:
         rate = fem.Constant(domain, 0.0)
         level = abs(ufl.FacetNormal(domain)[dim - 1]) if isinstance(condition, Rain) else 1.0
         density = weighted(rate * level, self._radius)
-        ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)(tags)
-        return _Held(condition, tags, dofs, rate, density, ds, fem.form(density * ds))
+        return _Held(condition, tags, dofs, rate, density, fem.form(self._over(density, tags)))
+
+    def _over(self, density: Any, tags: Any) -> Any:
+        """Integral over facets at the surface of the soil that is there, inside of the mesh too, as a UFL form."""
+        domain, there = self._space.mesh, self._there
+        ds, inside = (ufl.Measure(kind, domain=domain, subdomain_data=self._facet_tags)(tags) for kind in ("ds", "dS"))
+        if there is None:
+            return density * ds
+        return there * density * ds + (there("+") - there("-")) ** 2 * density("+") * inside
 
     def inflow_form(self, test: Any) -> Any:
         """Prescribed inflows over their unit against a test function, as a UFL form; 0 where there are none."""
-        return sum(held.density * test * held.ds for held in self.held if held.rate is not None)
+        return sum(self._over(held.density * test, held.tags) for held in self.held if held.rate is not None)
 
     def set_time(self, time: float) -> None:
         """Give the prescribed inflows their values at a time [s]."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
+from fenics_bridge.fem.active_cells import cells_there
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
@@ -29,6 +30,7 @@ from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary
 from fenics_bridge.water.consolidation_results import ConsolidationResults
 from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, collapsed, solve_step
+from fenics_bridge.water.construction import lonely_dofs, reconfigure
 from fenics_bridge.water.coupled import (
     CoupledConstraints,
     Element,
@@ -53,7 +55,9 @@ class Consolidation(ConsolidationResults):
         domain: mesh of the body.
         law: law of `mpm_core` for effective stresses, or laws by cell tag or name.
         soil: soil, or soils by cell tag or name; its compressibility does not count. With a retention curve it is unsaturated
-            under suction; in axisymmetric bodies it must be AlwaysSaturated.
+            under suction; in axisymmetric bodies it must be AlwaysSaturated. None, by cell tag, for soil without pore water,
+            such as a fill that drains at once: its stresses are total ones, and its surface on other soil is a boundary of the
+            water.
         facet_tags: tags of the boundary.
         supports: boundary conditions of the displacement, from `fixed`, `roller` and `prescribed`.
         boundary: boundary conditions of the water, as for `Seepage`; a Reservoir also presses on the soil.
@@ -80,7 +84,7 @@ class Consolidation(ConsolidationResults):
         self,
         domain: Mesh,
         law: Laws,
-        soil: PorousSoil | dict[int | str, PorousSoil],
+        soil: PorousSoil | dict[int | str, PorousSoil | None],
         facet_tags: MeshTags,
         supports: Sequence[Support],
         boundary: Iterable[WaterBoundary],
@@ -114,28 +118,30 @@ class Consolidation(ConsolidationResults):
         self._displacements, self._pressures = ((part, np.asarray(dofs)) for part, dofs in _parts(space))
         self._supports = Constraints(space.sub(0), facet_tags, supports)
         require_axis_held(space.sub(0), self.geometry, self._supports)
-        materials, self._soils = Materials(domain, law, cell_tags), soils_by_tag(domain, soil, cell_tags)
-        self._laws = materials.laws(law)
-        degree = max(1, 2 * (element.value - 1))
-        self.points = QuadraturePoints(domain, self._laws, materials.number, degree, self.radius is not None)
-        """Quadrature points, with effective stress and state"""
-        self._unit = max(one.p_wave_modulus for one in self._laws)
-        self._loads = LoadVectors(space, facet_tags, cell_tags, test=ufl.TestFunctions(space)[0], radius=self.radius)
-        self._external = self._loads.forces(Load())
-        self._projection = None
-        if element == Element.STABILISED:
-            self._projection = PressureProjection(
-                domain, self.points, self._laws, self._soils[0], self._soils[2], self._weights
-            )
-        self._applied = AppliedBoundary(
-            self._pressures[0], facet_tags, _largest_conductivity(self._soils[0]), self.radius
+        self._materials, self._soils = Materials(domain, law, cell_tags), soils_by_tag(
+            domain, soil, cell_tags, dry=True
         )
+        self._laws = self._materials.laws(law)
+        degree = max(1, 2 * (element.value - 1))
+        self.points = QuadraturePoints(domain, self._laws, self._materials.number, degree, self.radius is not None)
+        """Quadrature points, with effective stress and state"""
+        self.cell_tags = cell_tags
+        """Tags of the cells"""
+        self.off: Sequence[int] = ()
+        """Tags of the cells that are not there"""
+        self._unit = max(one.p_wave_modulus for one in self._laws)
+        self._there = cells_there(domain, cell_tags, ())
+        self._wet = cells_there(domain, cell_tags, ())
+        self._wet.x.array[np.setdiff1d(np.arange(len(self._wet.x.array)), np.concatenate(self._soils[2]))] = 0.0
+        self._held, self._holding = 0.0, (0.0, 0.0)
+        self._element = element
         self.pressure = fem.Function(self._pressures[0], name="pore_pressure")
         """Pore pressure [Pa], a function that is linear in each cell, compression positive"""
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
         self._assemble(options_prefix, inertia)
+        self._external = self._loads.forces(Load())
 
     def __repr__(self) -> str:
         laws = map(repr, self._laws)
@@ -144,9 +150,8 @@ class Consolidation(ConsolidationResults):
     def _assemble(self, options_prefix: str, inertia: Newmark | None) -> None:
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
-        constraints = CoupledConstraints(self._supports, self._space, self._pressures[1])
         linear = LinearSolver(self._space, options_prefix, newton=True)
-        self._body = Body(solution, increment, self.points, None, constraints, linear)
+        self._body = Body(solution, increment, self.points, None, None, linear)
         maps = [(part.dofmap, dofs) for part, dofs in (self._displacements, self._pressures)]
         self._owned = [dofs[: m.index_map.size_local * m.index_map_bs] for m, dofs in maps]
         # Stabilised elements take one point for all: FFCx 0.5 mixes up the radii of integrals of degree 1 and others.
@@ -162,9 +167,32 @@ class Consolidation(ConsolidationResults):
             self._unit,
             self.radius,
             degree,
+            self._wet,
             self.motion,
         )
-        self._gravity = self._terms.gravity_flow(self._space)
+        self._configure()
+
+    def _configure(self) -> None:
+        """Put together what depends on the cells that are there, on the laws and on the supports. Collective."""
+        domain, space, whole = self.domain, self._space, not len(self.off)
+        lonely, self._waterless = lonely_dofs(self)
+        self._body.constraints = CoupledConstraints(
+            self._supports, space, self._pressures[1], lonely, self._body.solution
+        )
+        self._loads = LoadVectors(
+            space, self._facet_tags, self.cell_tags, test=ufl.TestFunctions(space)[0],
+            active=None if whole else self._there, radius=self.radius,
+        )  # fmt: skip
+        self._projection = None
+        if self._element == Element.STABILISED:
+            self._projection = PressureProjection(
+                domain, self.points, self._laws, self._soils[0], self._soils[2], self._weights
+            )
+        unit, dry = _largest_conductivity(self._soils[0]), len(self._waterless)
+        self._applied = AppliedBoundary(
+            self._pressures[0], self._facet_tags, unit, self.radius, self._wet if dry else None
+        )
+        self._gravity = self._terms.gravity_flow(space)
         self._take_boundary(first=True)
 
     def _take_boundary(self, first: bool = False) -> None:
@@ -172,14 +200,21 @@ class Consolidation(ConsolidationResults):
         if not (self._applied.take(self.boundary) or first):
             return
         held = any(not isinstance(condition, Flux) for condition in self.boundary)
-        free = not held and np.isinf(self._weights[1]) and pressure_is_free(self._space, self._supports, self.radius)
+        free = (
+            not held
+            and np.isinf(self._weights[1])
+            and pressure_is_free(self._space, self._supports, self.radius, self._wet)
+        )
         agree(self.domain.comm, "boundary: no head, reservoir, seepage face or rain, incompressible water and supports all "
               "around; the pressure is undetermined" if free else None)  # fmt: skip
         body = self._body
         body.kinematics = Kinematics(
             body.increment, self.points, body.constraints, self.geometry, self._terms.forms(self._applied)
         )
-        self._reservoirs = ReservoirLoads(self._space, self._facet_tags, self._applied, self._weights[0], self.radius)
+        there = self._there if len(self.off) else None
+        self._reservoirs = ReservoirLoads(
+            self._space, self._facet_tags, self._applied, self._weights[0], self.radius, there
+        )
 
     def initialise(
         self, stress: ArrayLike | QuasiStatic | None = None, pore_pressure: OfPosition | Seepage | None = None
@@ -198,6 +233,39 @@ class Consolidation(ConsolidationResults):
             Collective.
         """
         set_initial_state(self, stress, pore_pressure)
+
+    def reconfigure(
+        self,
+        off: Sequence[int | str] = (),
+        supports: Sequence[Support] | None = None,
+        pore_pressure: OfPosition | None = None,
+        stress: OfPosition | None = None,
+        law: Laws | None = None,
+        duration: float = 0.0,
+    ) -> None:
+        """Place and remove soil, or change laws and supports, between steps.
+
+        The steps that follow release what is then out of balance, such as the weight of soil that is placed, while the water
+        flows: in equal parts per time over `duration`, or in the next step. `load` and `boundary` hold for the soil that is
+        there: give the latter its new surfaces.
+
+        Args:
+            off: cell tags or names of the soils that are not there; all others are.
+            supports: boundary conditions, as for the constructor, from where the nodes are now; None for the present ones.
+            pore_pressure: function of positions (n, D) [m] that returns the pressures (n,) [Pa] with which nodes come that have
+                had none; None for zero.
+            stress: function of positions (n, D) [m] that returns the effective stresses (n, S) [Pa] with which soil comes; None
+                for none.
+            law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
+            duration: time over which what is out of balance is released [s].
+
+        Raises:
+            InputError: an unknown tag, or a value out of range. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        reconfigure(self, off, supports, pore_pressure, stress, law, duration)
 
     # --- steps -------------------------------------------------------------------------------------------------------
 
@@ -220,8 +288,8 @@ class Consolidation(ConsolidationResults):
         agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
         self._take_boundary()
         end, stored = self.time + dt, self.stored_water()
-        load = self.load(end) if callable(self.load) else self.load
-        external = self._loads.forces(load) + self._reservoirs.forces(end)
+        load = self.load_at(end)
+        external = self._external_at(end)
         self._applied.set_time(end)
         self._terms.dt.value = self.points.duration = dt
         if self._projection is not None:
@@ -273,6 +341,16 @@ class Consolidation(ConsolidationResults):
         """
         return run(self, until, first_step, growth, longest, progress)
 
+    def load_at(self, time: float) -> Load:
+        """The load at a time [s]."""
+        return self.load(time) if callable(self.load) else self.load
+
+    def _external_at(self, time: float) -> Any:
+        """Nodal forces at a time [s]: of loads, standing water, and what `reconfigure` holds. Collective."""
+        start, duration = self._holding
+        held = max(0.0, 1 - (time - start) / duration) if duration > 0 else 0.0
+        return self._loads.forces(self.load_at(time)) + self._reservoirs.forces(time) + held * self._held
+
     def _moved(self) -> NDArray[np.float64]:
         """Displacements at the end of the step under trial [m], shape (m,)."""
         body, dofs = self._body, self._displacements[1]
@@ -284,6 +362,7 @@ class Consolidation(ConsolidationResults):
     def _solved(self, external: Any, displacement: Any, end: Any, dt: float) -> Any:
         """What `solve_step` returns for the step under way."""
         fixed, heads, upper = self._applied.bounds(end)
+        fixed[self._waterless], heads[self._waterless] = True, 0.0
         unit = self._weights[0] / self._unit
 
         def step() -> Any:
@@ -327,7 +406,7 @@ def _first_mistake(
         retention = getattr(one, "retention", None)
         if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):
             return f"soil: it has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
-        if inertia is not None and getattr(one, "density", 1.0) is None:
+        if inertia is not None and getattr(one, "density", None) is None:
             return f"soil: {one!r} has no density, expected one for steps with inertia"
     if not isinstance(inertia, (Newmark, type(None))):
         return f"inertia: got {inertia!r}, expected a Newmark, or None"

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
+from fenics_bridge.fem.loads import pressing
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
 from fenics_bridge.water.motion import STANDARD_GRAVITY, Motion
@@ -63,6 +64,7 @@ class WaterTerms:
         unit: unit of pressure [Pa].
         radius: radius of an axisymmetric body, a UFL expression.
         degree: degree of the quadrature.
+        there: function that is 1 in cells that are there and 0 in those that are not.
         motion: Motion of the body; None without inertia.
     """
 
@@ -76,12 +78,13 @@ class WaterTerms:
         unit: float,
         radius: Any,
         degree: int,
+        there: fem.Function,
         motion: Motion | None = None,
     ) -> None:
         domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
-        self._motion = motion
+        self._there, self._motion = there, motion
         self._driving = self._up + motion.at_end / STANDARD_GRAVITY if motion else self._up
         self._soils, (self._gamma, self._modulus) = soils, weights
         rule = {"quadrature_degree": degree}
@@ -92,6 +95,8 @@ class WaterTerms:
         """Length of the step [s], a constant of the forms"""
         self.projection = fem.Function(compat.function_space(domain, "DG", 0, self._dim**2))
         """Function of the pressure projection (D * D,) [m2/Pa], see `PressureProjection`"""
+        self.before = fem.Function(compat.function_space(domain, "DG", 1))
+        """Volumetric strain that soil had when it was placed [-], from which its own counts"""
         self._u, self._p = ufl.split(solution)
         self._du, self._dp = ufl.split(increment)
         content = lambda s: self._saturation(s, self._p) * self._pores(s)
@@ -136,7 +141,7 @@ class WaterTerms:
     def _sum(self, density: Callable[[PorousSoil], Any], measures: Any = None) -> Any:
         """Integral over the cells of all soils of a density that is a function of the soil."""
         pairs = zip(self._soils, measures or self._measures)
-        return sum(weighted(density(soil), self._radius) * dx for soil, dx in pairs)
+        return sum(weighted(self._there * density(soil), self._radius) * dx for soil, dx in pairs)
 
     def _saturation(self, soil: PorousSoil, pressure: Any) -> Any:
         return soil.retention.saturation(-self._unit * pressure) if _may_dry(soil) else 1.0
@@ -154,7 +159,7 @@ class WaterTerms:
 
     def _pores(self, soil: PorousSoil) -> Any:
         """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""
-        return soil.porosity + self._volume(self._u) + self._storage(soil) * self._p
+        return soil.porosity + self._volume(self._u) - self.before + self._storage(soil) * self._p
 
     def _stored(self, soil: PorousSoil) -> Any:
         """Water that a volume of soil takes up in the step; small differences are taken first, for the sake of round-off."""
@@ -171,10 +176,10 @@ class WaterTerms:
         return self._unit * soil.porosity / self._modulus
 
 
-def pressure_is_free(space: Any, constraints: Any, radius: Any) -> bool:
+def pressure_is_free(space: Any, constraints: Any, radius: Any, there: Any) -> bool:
     """Whether a uniform change of pressure does no work on the displacements that supports leave free. Collective."""
     v = ufl.TestFunctions(space)[0]
-    work = assembled(fem.form(weighted(dilation(v, radius), radius) * ufl.dx), space).array.copy()
+    work = assembled(fem.form(weighted(there * dilation(v, radius), radius) * ufl.dx), space).array.copy()
     largest = np.abs(work).max(initial=0.0)
     work[constraints.dofs] = 0.0
     most = np.max(space.mesh.comm.allgather([largest, np.abs(work).max(initial=0.0)]), axis=0)
@@ -190,11 +195,27 @@ class CoupledConstraints:
         supports: Constraints on the mixed space's displacement.
         space: the mixed space.
         pressure_dofs: dofs of that space for those of the pressure.
+        lonely: dofs of that space for displacements of nodes without soil, shape (m, D), which stay where they are.
+        solution: displacement and pressure, whose values these dofs keep.
     """
 
-    def __init__(self, supports: Any, space: Any, pressure_dofs: NDArray[np.integer]) -> None:
+    def __init__(
+        self,
+        supports: Any,
+        space: Any,
+        pressure_dofs: NDArray[np.integer],
+        lonely: NDArray[np.integer],
+        solution: fem.Function,
+    ) -> None:
         self._supports, self._space, self._pressure_dofs = supports, space, pressure_dofs
         self.comm = space.mesh.comm
+        displacement, columns = space.sub(0), lonely.astype(np.int32).T
+        self._lonely = np.setdiff1d(lonely.ravel(), supports.dofs).astype(np.int32)
+        self._resting = solution.x.array[self._lonely]
+        self._bcs = list(supports.bcs)
+        self._bcs += [
+            fem.dirichletbc(np.float64(0.0), dofs.copy(), displacement.sub(c)) for c, dofs in enumerate(columns)
+        ]
         self.hold(np.zeros(len(pressure_dofs), dtype=bool), np.zeros(len(pressure_dofs)))
 
     def hold(self, held: NDArray[np.bool_], pressures: NDArray[np.float64]) -> None:
@@ -206,28 +227,29 @@ class CoupledConstraints:
         """
         dofs = self._pressure_dofs[held].astype(np.int32)
         self._pressures = pressures[held]
-        self.dofs = np.concatenate([self._supports.dofs, dofs])
-        self.bcs = [*self._supports.bcs, fem.dirichletbc(np.float64(0.0), dofs, self._space.sub(1))]
+        self.dofs = np.concatenate([self._supports.dofs, dofs, self._lonely])
+        self.bcs = [*self._bcs, fem.dirichletbc(np.float64(0.0), dofs, self._space.sub(1))]
 
     def at(self, share: float) -> NDArray[np.float64]:
         """Values of the dofs at a fraction of the displacements that the supports prescribe."""
-        return np.concatenate([self._supports.at(share), self._pressures])
+        return np.concatenate([self._supports.at(share), self._pressures, self._resting])
 
 
 class ReservoirLoads:
-    """Forces of the water that stands against the soil: its pressure, along the normal, wherever a Reservoir is."""
+    """Forces of the water that stands against the soil that is there: its pressure, along the normal, at each Reservoir."""
 
-    def __init__(self, space: Any, facet_tags: MeshTags, applied: Any, unit_weight: Any, radius: Any) -> None:
+    def __init__(
+        self, space: Any, facet_tags: MeshTags, applied: Any, unit_weight: Any, radius: Any, there: Any
+    ) -> None:
         domain, dim = space.mesh, space.mesh.geometry.dim
         v, height = ufl.TestFunctions(space)[0], ufl.SpatialCoordinate(domain)[dim - 1]
-        normal, self._space, self._parts = ufl.FacetNormal(domain), space, []
-        ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
+        self._space, self._parts = space, []
         for held in applied.held:
             if isinstance(held.condition, Reservoir):
                 level = fem.Constant(domain, 0.0)
                 pressure = unit_weight * ufl.max_value(level - height, 0.0)
-                form = fem.form(-weighted(pressure * ufl.inner(normal, v), radius) * ds(held.tags))
-                self._parts.append((held.condition, level, form))
+                form = pressing(domain, weighted(pressure, radius), v, facet_tags, held.tags, there)
+                self._parts.append((held.condition, level, fem.form(form)))
 
     def forces(self, time: float) -> Any:
         """Nodal forces at a time [s], ghosts up to date: array over the local dofs, or 0 where there is none. Collective."""

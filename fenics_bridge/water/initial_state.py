@@ -24,12 +24,15 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     _require(comm, "state", state, points.state.shape)
     _require(comm, "pore_pressure", pressure, model.pressure.x.array.shape)
     points.stress[:] = 0.0 if stress is None else stress
+    points.stress[points.off] = 0.0
     points.reset_state(model._laws)
     if state is not None:
         points.state[:] = state
     solution.x.array[:] = 0.0
     if pressure is not None:
         solution.x.array[model._pressures[1]] = pressure / model._unit
+        solution.x.array[model._pressures[1][model._waterless]] = 0.0
+    model._held = 0.0
     model._read_pressure()
 
 

@@ -73,7 +73,7 @@ class PorousSoil:
 
 
 def soils_by_tag(
-    domain: Mesh, soil: PorousSoil | dict[int | str, PorousSoil], cell_tags: MeshTags | None
+    domain: Mesh, soil: Any, cell_tags: MeshTags | None, dry: bool = False
 ) -> tuple[list[PorousSoil], list[Any], list[NDArray[np.int32]]]:
     """The soils, the measure over the cells of each, and these cells, ghosts too.
 
@@ -81,6 +81,7 @@ def soils_by_tag(
         domain: mesh of the body.
         soil: soil, or soils by cell tag or name.
         cell_tags: tags of the cells.
+        dry: whether some may be None, which holds no water and is left out.
 
     Raises:
         InputError: a tag does not exist or has no soil, or a conductivity is of another dimension. Raised on all ranks alike.
@@ -91,8 +92,9 @@ def soils_by_tag(
     comm, dim = domain.comm, domain.geometry.dim
     by_tag: dict[Any, PorousSoil] = {None: soil} if not isinstance(soil, dict) else soil
     for key, one in by_tag.items():
-        agree(comm, None if isinstance(one, PorousSoil) else f"soil: got {one!r} for {key!r}, expected a PorousSoil")
-        shape = np.shape(one.conductivity)
+        allowed = isinstance(one, PorousSoil) or (dry and one is None and key is not None)
+        agree(comm, None if allowed else f"soil: got {one!r} for {key!r}, expected a PorousSoil")
+        shape = np.shape(getattr(one, "conductivity", 0.0))
         agree(comm, None if not shape or shape[0] == dim else f"conductivity: has shape {shape}, expected ({dim},) or "
               f"({dim}, {dim}) in {dim}D")  # fmt: skip
     if not isinstance(soil, dict):
@@ -105,5 +107,7 @@ def soils_by_tag(
     without = sorted(known - set(by_tag))
     agree(comm, f"soil: none for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None)
     dx = ufl.Measure("dx", domain=domain, subdomain_data=cell_tags)
-    cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in by_tag]
-    return list(by_tag.values()), [dx(tag) for tag in by_tag], cells
+    wet = [tag for tag, one in by_tag.items() if one is not None]
+    agree(comm, None if wet else "soil: got None for all cells, expected a PorousSoil for some")
+    cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in wet]
+    return [by_tag[tag] for tag in wet], [dx(tag) for tag in wet], cells

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from dolfinx.mesh import compute_midpoints, locate_entities, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -58,3 +59,36 @@ def test_a_bad_argument_is_refused_on_all_ranks():
     with pytest.raises(mpm.InputError, match="no facet has the tag 9"):
         model.boundary = [water.Head(9, 1.0)]
         model.advance(1.0)
+
+
+def test_soil_is_placed_and_removed_alike_on_any_number_of_ranks():
+    """Wet soil in a corner is dug away under water and replaced by a fill that drains; facets lie inside of the mesh."""
+    points, results = np.array([[0.5, 0.3], [1.2, 2.0], [3.9, 1.2]]), []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        domain, _, facets = bridge.box_mesh(comm, (4.0, 3.0), (8, 6))
+        cells = np.arange(
+            sum(getattr(domain.topology.index_map(2), n) for n in ("size_local", "num_ghosts")), dtype=np.int32
+        )
+        x, y = compute_midpoints(domain, 2, cells)[:, :2].T
+        tags = np.where(y < 2.0, 1, np.where(x < 2.0, 2, 3)).astype(np.int32)
+        bed = locate_entities(domain, 1, lambda p: np.abs(p[1] - 2.0) < 1e-9)
+        numbers = dict(zip(facets.indices.tolist(), facets.values.tolist())) | dict.fromkeys(bed.tolist(), 9)
+        facets = meshtags(domain, 1, np.array(sorted(numbers), dtype=np.int32),
+                          np.array([numbers[i] for i in sorted(numbers)], dtype=np.int32))  # fmt: skip
+        clay, sand = (mpm.LinearElastic(young=young, poisson=0.3) for young in (5e6, 2e7))
+        soil = water.PorousSoil(1e-8, porosity=0.4)
+        model = water.Consolidation(
+            domain, {1: clay, 2: clay, 3: sand}, {1: soil, 2: soil, 3: None}, facets,
+            [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)], [water.Reservoir(9, 3.0)],
+            load=bridge.Load(unit_weight={1: 18e3, 2: 18e3, 3: 20e3}), cell_tags=meshtags(domain, 2, cells, tags),
+        )  # fmt: skip
+        for off in ([3], [2, 3], [2]):
+            model.reconfigure(off=off, duration=1e3)
+            assert model.run(model.time + 3e4, 2e3, growth=2.0)[-1].converged
+        there = model.evaluate_at(points)
+        results.append(
+            [*(1e3 * there["displacement"]).ravel(), *(1e-3 * there["pressure"]).ravel(), *(1e-3 * there["stress"]).ravel(),
+             1e7 * model.inflow(9), *(1e-3 * model.reaction(BASE))]
+        )  # fmt: skip
+    assert np.abs(results[0]).max() > 1.0
+    assert results[1] == pytest.approx(results[0], rel=1e-6, abs=1e-6)

@@ -1,0 +1,121 @@
+"""Soil that is placed and removed while the ground consolidates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.active_cells import cells_there, given_stress, lonely_nodes, take_over
+from fenics_bridge.fem.fields import dilation
+from fenics_bridge.fem.supports import Constraints
+from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.mesh.tagged import owned_cells
+
+
+def reconfigure(
+    model: Any, off: Sequence[int | str], supports: Any, pore_pressure: Any, stress: Any, law: Any, duration: float
+) -> None:
+    """Apply the changes of `Consolidation.reconfigure`."""
+    domain, points, before = model.domain, model.points, model._laws
+    _check(model, off, duration)
+    off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
+    laws = before if law is None else model._materials.laws(law)
+    constraints = model._supports if supports is None else Constraints(model._space.sub(0), model._facet_tags, supports)
+    there = cells_there(domain, model.cell_tags, off)
+    was_there = model._there.x.array > 0
+    new = np.repeat((there.x.array > 0)[points.cells] & ~was_there[points.cells], points.per_cell)
+    pressures, given = _pressures(model, pore_pressure), given_stress(model, stress, new)
+    points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
+    take_over(model, new, laws, before, given)
+    model._laws, model.off = laws, off
+    if supports is not None:
+        constraints.origin[:] = model._body.solution.x.array[constraints.dofs]
+        model._supports = constraints
+    _place(model, there, was_there)
+    had_none = model._waterless
+    model._configure()
+    _fill_pores(model, had_none, pressures)
+    _hold(model, duration)
+
+
+def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Degrees of freedom of nodes without soil, of the displacement, and without wet soil, of the pressure.
+
+    Args:
+        model: the Consolidation.
+
+    Returns:
+        Those of the mixed space, shape (m, D), and of the pressure's own space, shape (k,), ghosts included.
+
+    Note:
+        Collective.
+    """
+    (displacements, dofs), dim = model._displacements, model.domain.geometry.dim
+    return dofs.reshape(-1, dim)[lonely_nodes(displacements, model._there)], lonely_nodes(
+        model._pressures[0], model._wet
+    )
+
+
+def _check(model: Any, off: Any, duration: float) -> None:
+    comm = model.domain.comm
+    agree(comm, "reconfigure: it has inertia, expected quasi-static steps" if model.motion is not None else None)
+    good = np.isfinite(duration) and duration >= 0
+    agree(comm, None if good else f"duration: got {duration!r} s, expected a number from 0 on")
+    missing = len(off) and model.cell_tags is None
+    agree(comm, "off: the model has no cell_tags, by which soils are known" if missing else None)
+
+
+def _place(model: Any, there: Any, was_there: NDArray[np.bool_]) -> None:
+    """Mark the cells that are there and wet; strains of new soil count from now on."""
+    domain = model.domain
+    wet = np.zeros_like(was_there)
+    for cells in model._soils[2]:
+        wet[cells] = True
+    new = np.flatnonzero((there.x.array > 0) & ~was_there).astype(np.int32)
+    model._there.x.array[:] = there.x.array
+    model._wet.x.array[:] = there.x.array * wet
+    if model.radius is None:
+        strain = dilation(ufl.split(model._body.solution)[0], None)
+        points = compat.interpolation_points(model._terms.before.function_space)
+        model._terms.before.interpolate(fem.Expression(strain, points), new)
+    agree(
+        domain.comm, None if domain.comm.allreduce(int(model._wet.x.array.sum())) else "off: no soil with water is left"
+    )
+
+
+def _pressures(model: Any, pore_pressure: Any) -> NDArray[np.float64]:
+    """Pressures [Pa] at all nodes with which new ones come: (m,)."""
+    x = model._pressures[0].tabulate_dof_coordinates()[:, : model.domain.geometry.dim]
+    given = np.zeros(len(x)) if pore_pressure is None else np.asarray(pore_pressure(x), dtype=float)
+    good = given.shape == (len(x),) and np.all(np.isfinite(given))
+    agree(model.domain.comm, None if good else f"pore_pressure: got shape {given.shape}, expected finite {(len(x),)}")
+    return given
+
+
+def _fill_pores(model: Any, had_none: NDArray[np.int32], pressures: NDArray[np.float64]) -> None:
+    """Give nodes that have come their pressures, and those that are gone none."""
+    dofs, solution = model._pressures[1], model._body.solution.x.array
+    come = np.setdiff1d(had_none, model._waterless)
+    solution[dofs[come]] = pressures[come] / model._unit
+    solution[dofs[model._waterless]] = 0.0
+    model._active[model._waterless] = False
+    model._read_pressure()
+
+
+def _hold(model: Any, duration: float) -> None:
+    """Hold what is out of balance now; the steps that follow release it."""
+    body, dofs = model._body, model._displacements[1]
+    body.increment.x.array[:] = 0.0
+    model._held, model._holding = 0.0, (model.time, duration)
+    external = model._external_at(model.time)
+    internal = body.kinematics.internal_forces(model.points.stress).array
+    model._held = np.zeros_like(internal)
+    model._held[dofs] = internal[dofs] - external[dofs]
+    model._external = external + model._held
