@@ -175,7 +175,8 @@ void find_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const N
       const bool open = standing > 0 || !water.may_dry();
       const double weight = area * outflow_per_area(mesh, step, nodes, c);
       SurfacePoint<D> point{c, cut.points[i], weight, standing, rain * plan, open, false};
-      point.takes_rain = !open && excess_pressure(mesh, step.pore, point, 0) < 0;
+      // where rain ponds, what enters has left the pressure a little below zero
+      point.takes_rain = !open && weight * excess_pressure(mesh, step.pore, point, 0) < -point.rain;
       if (has_soil)
         step.pore.surface.push_back(point);
       else if (!point.open)

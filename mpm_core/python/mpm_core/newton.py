@@ -56,7 +56,7 @@ class System(Protocol):
 MOST_SURFACES = 30
 """Guesses of where water leaves the surface of soil that may dry, in a step"""
 
-ROUGH = 1e-2
+ROUGH = 0.1
 """Residual at which such a guess can be judged; a solution is only wanted of the last one"""
 
 
