@@ -162,11 +162,14 @@ def other_laws(soil: mpm.MohrCoulomb) -> dict[str, object]:
     elastic = {"young": soil.young, "poisson": soil.poisson}
     clay = mpm.CamClay(compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.33, void_ratio=1.0,
                        preconsolidation=5e3, attraction=2e3)  # fmt: skip
+    tresca = mpm.tresca(**elastic, shear_strength=5e3)
     return {
-        "Tresca": mpm.tresca(**elastic, shear_strength=5e3), "von Mises": mpm.von_mises(**elastic, yield_stress=9e3),
+        "Tresca": tresca, "von Mises": mpm.von_mises(**elastic, yield_stress=9e3),
         "Drucker-Prager": mpm.matched_drucker_prager(**elastic, cohesion=1e3, friction_angle=25.0),
         "softening": mpm.SofteningMohrCoulomb(soil, residual_cohesion=500.0, residual_friction_angle=20.0,
                                               softening_strain=0.1, reference_length=0.05),
+        "softening Tresca": mpm.SofteningMohrCoulomb(tresca, residual_cohesion=2.5e3, residual_friction_angle=0.0,
+                                                     softening_strain=0.1, reference_length=0.05),
         "Cam-Clay": clay, "Hencky of Mohr-Coulomb": mpm.Hencky(soil),
         "undrained Mohr-Coulomb": mpm.Undrained(soil, water_modulus=1e6, porosity=0.4),
     }  # fmt: skip

@@ -15,11 +15,21 @@ namespace
 /// Candidates are filled up to a multiple of this, so that none is left to the scalar remainder of a vector loop.
 constexpr std::size_t lanes = 8;
 
-/// Accuracy of the plastic strain of a band over the softening strain, and so of the fraction of strength that is lost
-constexpr double accuracy = 1e-13;
+/// Candidates that are returned again together until the last of them is done. Few, so that the others do not wait for
+/// long.
+constexpr std::size_t group_size = 64;
 
-/// Steps of the secant method after which the roots that are left are bracketed
-constexpr int most_secants = 6;
+/// A group of candidates, from first to last
+struct Group
+{
+  std::size_t first, last;
+};
+
+/// Accuracy of the plastic strain of a band over the softening strain, and so of the fraction of strength that is lost
+constexpr double accuracy = 1e-10;
+
+/// Steps of Newton's method after which the roots that are left are bracketed
+constexpr int most_newton_steps = 6;
 
 /// The points of a block that may yield, side by side
 template <int D>
@@ -30,8 +40,9 @@ struct Candidates
   WorkColumns<Spectral<D>> trial;
   WorkColumn<double> band_strain, bands_per_cell, deviation;
   WorkColumn<double> increment, excess; ///< of the plastic strain, and by how much that of its surface is larger
-  WorkColumn<double> next, next_excess; ///< the same at the place that the secant points to
-  WorkColumns<Returned> returned;       ///< stresses on the surface last looked at
+  WorkColumn<double> lost;              ///< fraction of the strength that is lost with it
+  WorkColumn<double> next, next_excess, next_lost; ///< the same for the increment to look at next
+  WorkColumns<Returned> returned;                  ///< stresses on the surface last looked at
 
   SofteningPoint at(const FallingStrength& strength, std::size_t i)
   {
@@ -49,12 +60,12 @@ struct ElasticStep
 
 /// Elastic step of the points of a block: stresses become trial stresses where they are usable.
 /// @tparam intact  whether no point has lost strength yet, nor is weaker than the law: all have the peak's surface
-template <int D, bool intact>
+template <int D, Falls falls, bool intact>
 void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, Index first, Index last,
                   ElasticStep& step)
 {
   const FallingStrength s = strength; // a copy that no store can alias
-  const Surface peak = surface_after(s, 0, 0);
+  const Surface peak = surface_after<falls>(s, 0, 0);
   std::int64_t failed = 0;
 #pragma GCC ivdep
   for (Index i = first; i < last; ++i)
@@ -67,7 +78,7 @@ void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, 
     if constexpr (intact)
       leaves = may_yield(peak, trial);
     else
-      leaves = may_yield(surface_after(s, points.state[1][i], points.state[2][i]), trial);
+      leaves = may_yield(surface_after<falls>(s, points.state[1][i], points.state[2][i]), trial);
     step.may_leave[static_cast<std::size_t>(i - first)] = usable & leaves ? 1 : 0;
     failed += usable ? 0 : 1;
   }
@@ -75,7 +86,7 @@ void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, 
 }
 
 /// Elastic step of the points of a block; lists those that may yield.
-template <int D>
+template <int D, Falls falls>
 void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, Index first, Index last,
                   ElasticStep& step, Candidates<D>& candidates)
 {
@@ -83,9 +94,9 @@ void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, 
   for (Index i = first; i < last; ++i)
     changed += (points.state[1][i] == 0) & (points.state[2][i] >= 0) ? 0 : 1;
   if (changed == 0)
-    elastic_step<D, true>(strength, points, first, last, step);
+    elastic_step<D, falls, true>(strength, points, first, last, step);
   else
-    elastic_step<D, false>(strength, points, first, last, step);
+    elastic_step<D, falls, false>(strength, points, first, last, step);
   candidates.size = 0;
   for (Index i = first; i < last; ++i) // without a branch on the single point
   {
@@ -117,25 +128,47 @@ void gather(const PointBatch<D>& points, double per_reference_length, Candidates
         points.cell_size ? points.cell_size[candidates.point[i]] * per_reference_length : 1.0;
 }
 
-/// Returns to the surfaces that hold after the given plastic strains, and by how much the plastic strains of these
-/// returns are larger. Not inlined, so that all points go through the same instructions and round alike.
-template <int D, bool with_cutoff>
-[[gnu::noinline]] void return_stresses(const FallingStrength& strength, Candidates<D>& candidates,
-                                       WorkColumn<double>& increment, WorkColumn<double>& excess)
+/// Returns to the surfaces before the increment, their plastic strains, and the ones to expect in the end. Not inlined,
+/// so that all points go through the same instructions and round alike.
+template <int D, bool with_cutoff, Falls falls>
+[[gnu::noinline]] void begin_returns(const FallingStrength& strength, Group group, Candidates<D>& candidates)
 {
   const FallingStrength s = strength; // a copy that no store can alias
 #pragma GCC ivdep
-  for (std::size_t i = 0; i < candidates.padded; ++i)
+  for (std::size_t i = group.first; i < group.last; ++i)
   {
     const SofteningPoint point = candidates.at(s, i);
-    const Surface m = point.surface_at(increment[i]);
-    const Returned returned = return_to_surface<with_cutoff>(m, point.trial);
-    candidates.returned.set(i, returned);
-    excess[i] = deviatoric_plastic_strain(m, point.trial, returned.stress) - increment[i];
+    const Strength left = point.strength_at<falls>(0.0);
+    const Surface m = surface_of(s, left);
+    const Principal stress = return_to_surface<with_cutoff>(m, point.trial).stress;
+    const double first = deviatoric_plastic_strain(m, point.trial, stress);
+    candidates.increment[i] = 0;
+    candidates.excess[i] = first;
+    candidates.lost[i] = left.lost;
+    candidates.next[i] = point.template expected<falls>(m, left, stress, first);
   }
 }
 
-/// Root of the excess of a point that the secant method did not find. The strain stays finite while the strength falls
+/// Returns to the surfaces that hold after the next plastic strains, and by how much the plastic strains of these
+/// returns are larger. Not inlined, for the same reason.
+template <int D, bool with_cutoff, Falls falls>
+[[gnu::noinline]] void return_stresses(const FallingStrength& strength, Group group, Candidates<D>& candidates)
+{
+  const FallingStrength s = strength; // a copy that no store can alias
+#pragma GCC ivdep
+  for (std::size_t i = group.first; i < group.last; ++i)
+  {
+    const SofteningPoint point = candidates.at(s, i);
+    const Strength left = point.strength_at<falls>(candidates.next[i]);
+    const Surface m = surface_of(s, left);
+    candidates.next_lost[i] = left.lost;
+    const Returned returned = return_to_surface<with_cutoff>(m, point.trial);
+    candidates.returned.set(i, returned);
+    candidates.next_excess[i] = deviatoric_plastic_strain(m, point.trial, returned.stress) - candidates.next[i];
+  }
+}
+
+/// Root of the excess of a point that Newton's method did not find. The strain stays finite while the strength falls
 /// no further than to its residual, so there is a bracket.
 double bracketed_increment(const SofteningPoint& point)
 {
@@ -151,45 +184,58 @@ double bracketed_increment(const SofteningPoint& point)
   return excess == 0 ? bound : root_between(excess_at, {0, first}, {bound, excess});
 }
 
-/// One step of the secant method for all candidates whose root is not found: their strength still changes.
+/// One step of Newton's method for all candidates whose root is not found: their strength still changes. The plastic
+/// strain of a return is all but linear in the strength that is lost, so its derivative by that is the one between the
+/// last two returns, while that of the loss by the strain is known.
 /// @returns number of them before the step
 template <int D>
-std::int64_t secant_step(double per_softening_strain, Candidates<D>& c)
+std::int64_t newton_step(const FallingStrength& strength, Group group, Candidates<D>& c)
 {
+  const FallingStrength s = strength; // a copy that no store can alias
   std::int64_t left = 0;
 #pragma GCC ivdep
-  for (std::size_t i = 0; i < c.padded; ++i)
+  for (std::size_t i = group.first; i < group.last; ++i)
   {
-    const double x = c.next[i], excess = c.next_excess[i];
-    const bool found = std::abs(excess) * c.bands_per_cell[i] * per_softening_strain <= accuracy;
-    const double slope = (excess - c.excess[i]) / (x - c.increment[i]);
-    c.next[i] = found ? x : x - excess / slope;
+    const SofteningPoint point = c.at(s, i);
+    const double x = c.next[i], excess = c.next_excess[i], lost = c.next_lost[i];
+    const bool found = std::abs(excess) * c.bands_per_cell[i] * s.per_softening_strain <= accuracy;
+    const double more_lost = lost - c.lost[i];
+    const double per_lost =
+        more_lost > 0 || more_lost < 0 ? (x + excess - c.increment[i] - c.excess[i]) / more_lost : 0.0;
+    c.next[i] = found ? x : x + excess / (1 - per_lost * point.lost_per_strain(x, lost));
     c.increment[i] = found ? c.increment[i] : x;
     c.excess[i] = found ? c.excess[i] : excess;
+    c.lost[i] = found ? c.lost[i] : lost;
     left += found ? 0 : 1;
   }
   return left;
 }
 
-/// Solves the fixed-point equations for the plastic strain increments, all candidates side by side, by the secant
-/// method. In small increments the strength falls little, and a few returns suffice; otherwise the root is bracketed.
+/// Solves the fixed-point equations for the plastic strain increments of a group of candidates, side by side, by the
+/// Newton's method from where they are expected. In small increments two or three returns suffice; otherwise the root
+/// is bracketed.
 /// @post `next` are the increments, and `returned` the stresses
-template <int D, bool with_cutoff>
-void find_increments(const FallingStrength& s, Candidates<D>& c)
+template <int D, bool with_cutoff, Falls falls>
+void find_increments(const FallingStrength& s, Group group, Candidates<D>& c)
 {
-  c.increment.fill(0);
-  return_stresses<D, with_cutoff>(s, c, c.increment, c.excess);
-  c.next = c.excess;
-  for (int step = 0; step <= most_secants; ++step)
+  begin_returns<D, with_cutoff, falls>(s, group, c);
+  for (int step = 0; step <= most_newton_steps; ++step)
   {
-    return_stresses<D, with_cutoff>(s, c, c.next, c.next_excess);
-    if (secant_step(s.per_softening_strain, c) == 0)
+    return_stresses<D, with_cutoff, falls>(s, group, c);
+    if (newton_step(s, group, c) == 0)
       return;
   }
-  for (std::size_t i = 0; i < c.padded; ++i)
+  for (std::size_t i = group.first; i < group.last; ++i)
     if (!(std::abs(c.next_excess[i]) * c.bands_per_cell[i] * s.per_softening_strain <= accuracy))
       c.next[i] = bracketed_increment(c.at(s, i));
-  return_stresses<D, with_cutoff>(s, c, c.next, c.next_excess);
+  return_stresses<D, with_cutoff, falls>(s, group, c);
+}
+
+template <int D, bool with_cutoff, Falls falls>
+void find_increments(const FallingStrength& s, Candidates<D>& c)
+{
+  for (std::size_t first = 0; first < c.padded; first += group_size)
+    find_increments<D, with_cutoff, falls>(s, Group{first, std::min(c.padded, first + group_size)}, c);
 }
 
 /// Final stresses and states of the candidates that yielded; the others are as they are to be.
@@ -241,10 +287,11 @@ MohrCoulomb softened(const SofteningMohrCoulomb& law, double band_strain, double
 
 double p_wave_modulus(const SofteningMohrCoulomb& law) { return p_wave_modulus(law.peak); }
 
-template <int D>
-BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
+namespace
 {
-  const FallingStrength strength = falling_strength(law);
+template <int D, Falls falls>
+BatchReport update(const SofteningMohrCoulomb& law, const FallingStrength& strength, const PointBatch<D>& points)
+{
   if (points.tangent)
     fill_elastic_tangent<D>(strength.moduli, points.size, points.tangent);
   BatchReport report;
@@ -253,14 +300,14 @@ BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
   constexpr auto block = static_cast<Index>(block_size);
   for (Index first = 0; first < points.size; first += block)
   {
-    elastic_step(strength, points, first, std::min(points.size, first + block), step, candidates);
+    elastic_step<D, falls>(strength, points, first, std::min(points.size, first + block), step, candidates);
     if (candidates.size == 0)
       continue;
     gather(points, 1 / law.reference_length, candidates);
     if (law.peak.tension_cutoff < unlimited)
-      find_increments<D, true>(strength, candidates);
+      find_increments<D, true, falls>(strength, candidates);
     else
-      find_increments<D, false>(strength, candidates);
+      find_increments<D, false, falls>(strength, candidates);
     report.plastic += write_back(points, candidates);
     if (points.tangent)
       write_tangents(strength, candidates, points.tangent);
@@ -268,6 +315,18 @@ BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
   if (step.failed > 0)
     report.failed = unusable_points<D>(strength.moduli, points);
   return report;
+}
+} // namespace
+
+template <int D>
+BatchReport update(const SofteningMohrCoulomb& law, const PointBatch<D>& points)
+{
+  const FallingStrength strength = falling_strength(law);
+  if (strength.psi.fall > 0)
+    return update<D, Falls::dilation>(law, strength, points);
+  if (strength.phi.fall > 0)
+    return update<D, Falls::friction>(law, strength, points);
+  return update<D, Falls::cohesion>(law, strength, points);
 }
 
 template BatchReport update<2>(const SofteningMohrCoulomb&, const PointBatch<2>&);
