@@ -9,6 +9,7 @@ void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, 
                               BlockEntries& entries)
 {
   BlockSum sum(entries, {system.unknowns, 1}, system.number);
+  const bool dries = step.pore.flows && !step.pore.drying.empty();
   for (Index c : step.cells)
   {
     for (int k = 0; k <= D; ++k)
@@ -23,6 +24,8 @@ void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, 
         double* block = sum.next(mesh.cells[c][k], mesh.cells[c][l]);
         for (int a = 0; a < D; ++a)
           block[a] += force[a] / (D + 1);
+        if (dries && !step.pore.held[mesh.cells[c][k]])
+          block[D] -= step.pore.unit * step.pore.drying[c].wet[k] / (D + 1);
       }
     }
   }

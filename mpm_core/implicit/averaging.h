@@ -8,7 +8,7 @@
 namespace mpm::implicit
 {
 /// With nodal mixed discretisation, J gains K_p G: K_p = d f_int / d theta, rows for displacements, columns for nodes,
-/// ...
+/// and for the water that soil takes up which may dry; saturated soil goes by the volume of its cells itself; ...
 template <class G, int D = G::dim>
 void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                               BlockEntries& entries);

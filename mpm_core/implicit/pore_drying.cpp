@@ -52,7 +52,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
   {
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, water, run.cell);
-    const double growth = volume_strain(mesh, field, step.dt, run.cell);
+    const double growth = growth_of(mesh, field, step, run.cell);
     const auto anisotropy = anisotropy_of<D>(water, run.material);
     for (Index p = run.first; p < run.last; ++p)
     {

@@ -243,6 +243,7 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
 {
   auto& pore = step.pore;
   pore.cells.clear();
+  pore.drying.clear();
   pore.surface.clear();
   pore.flows = pore.drained = false;
   if (!model.water)

@@ -165,8 +165,7 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       const auto pressure = cell_pressure(mesh, field, step, run.cell);
       model.energy.stress_work +=
           add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
-      const double growth =
-          step.options.nmd ? step.strains[run.cell].volumetric : volume_strain(mesh, field, step.dt, run.cell);
+      const double growth = growth_of(mesh, field, step, run.cell);
       if (changes_masses(*model.water, step.options))
         model.energy.outflow_kinetic +=
             take_up_water(run, *model.water, step, growth, pressure, centre, model.particles);

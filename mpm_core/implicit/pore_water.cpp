@@ -185,7 +185,9 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   for (int a = 0; a < D; ++a)
   {
     forces[a] *= pore.held[column] ? 0 : -unit * (dries ? pore.drying[c].by_pressure[l] : cell.mean[l]);
-    const double wet = dries ? pore.drying[c].wet[k] : cell.mean[k];
+    const double wet = !dries             ? cell.mean[k]
+                       : step.options.nmd ? 0
+                                          : pore.drying[c].wet[k]; // averaged: see averaging.h
     volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * flux[a] * shape.gradient[k][a]);
   }
   double water = cell.capacity[k][l] + flow<D>(flux, shape.gradient[k], shape.gradient[l]);

@@ -16,6 +16,7 @@
 /// that has grown by e, and the conductivity k_r k.
 
 #include "implicit/entries.h"
+#include "transfer/nodal_mixed_discretisation.h"
 
 namespace mpm::implicit
 {
@@ -45,6 +46,15 @@ Vector<G::dim> water_weight(const Mesh<G::dim>& mesh, const VelocityField<G>& fi
 /// discretisation, and where volumes do not change.
 template <class G, int D = G::dim>
 double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double dt, Index cell);
+
+/// Volumetric strain by which the soil of a cell takes up water in the books of its particles, whose volumes are
+/// averaged with nodal mixed discretisation.
+template <class G, int D = G::dim>
+double growth_of(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step, Index cell)
+{
+  return step.options.nmd ? mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain)
+                          : volume_strain(mesh, field, step.dt, cell);
+}
 
 /// Sum V k_r k dt / gamma_w of a cell along each axis, under the iterate.
 template <int D>

@@ -298,10 +298,6 @@ class Model(ContactMethods, Body):
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()
         refuse_two_phases(self, "implicit()")
-        if nmd and self.has_water and self._core.water.may_dry:
-            raise InputError(
-                "nmd is True and the soil may dry, expected False: averaged strains would not keep its water"
-            )
         if second_order:
             refuse_water(self, "the scheme of second order")
         if isinstance(solver, Relaxation):

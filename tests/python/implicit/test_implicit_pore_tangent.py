@@ -65,6 +65,9 @@ def free(step, dim, direction):
         (2, {"dries": True}),
         (2, {"dries": True, "round": True}),
         (3, {"dries": True}),
+        (2, {"dries": True, "nmd": True}),
+        (2, {"dries": True, "nmd": True, "averaged": True, "round": True}),
+        (3, {"dries": True, "nmd": True}),
     ],
     ids=str,
 )
