@@ -161,7 +161,7 @@ def newmark(a: Namespace, history: History) -> tuple[float, dict[str, np.ndarray
     strength = bridge.davis_strength(soil)
     begins = yield_acceleration(a.height, a.angle, strength.cohesion, strength.friction_angle, a.unit_weight, GRAVITY)
     if begins <= 0:
-        raise mpm.InputError(f"--height is {a.height:g} m, expected a slope that stands without an earthquake")
+        raise mpm.InputError(f"--height is {a.height:g} m, expected a slope that is stable without an earthquake")
     motions = {"toe": "foot_velocity_m_per_s", "crest": "crest_level_velocity_m_per_s"}
     return begins, {
         level: sliding_block(history["time_s"], history[column], begins)[1] for level, column in motions.items()

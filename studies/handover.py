@@ -56,7 +56,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_slope_options(p, options)
-    check(p, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without it no slope stands")
+    check(p, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without cohesion no slope is stable")
     return options
 
 

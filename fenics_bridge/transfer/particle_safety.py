@@ -109,7 +109,7 @@ def particle_safety(
     first = attempt(start)
     if not first.converged:
         raise InputError(
-            f"start: with the strength divided by {start!r} the particles do not rest: {first.reason}; take a smaller one"
+            f"start: with the strength divided by {start!r} the particles do not come to rest: {first.reason}; take a smaller one"
         )
     steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
     above = [step for step in steps if step.value > curve[-1][0]]

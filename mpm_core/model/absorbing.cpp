@@ -196,7 +196,7 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
   VelocityField<G>& field = model.fields.front();
   if (G::has_hoop || model.fields.size() > 1)
     throw InputError(
-        "sides are to absorb waves in axial symmetry or with several velocity fields, expected plane strain "
+        "absorbing sides are not supported in axial symmetry or with several velocity fields, expected plane strain "
         "or three dimensions and one field");
   prepare(model);
   map_to_nodes(model);

@@ -171,7 +171,7 @@ void check_resting_cells(const Particles<D>& particles, const std::vector<Run>& 
   const auto refuse = [&](Index p)
   {
     throw InputError("particle " + std::to_string(particles.id[p]) +
-                     " is in a cell that rests, expected such cells without particles");
+                     " is in a resting cell, expected resting cells without particles");
   };
   for (const Run& run : runs)
     if (!resting.marks.empty() && resting.marks[static_cast<std::size_t>(run.cell)])

@@ -32,7 +32,7 @@ template <int D>
   out << "particle " << particles.id[p] << " at (";
   for (int i = 0; i < D; ++i)
     out << (i ? ", " : "") << particles.position[i][p];
-  out << ") m " << what << ", expected the particles of cells that are to rest as model.seed() places them";
+  out << ") m " << what << ", expected in each resting cell the particles as model.seed() places them";
   throw InputError(out.str());
 }
 
@@ -171,8 +171,8 @@ void rest_cells(Model<G>& model, std::span<const unsigned char> chosen)
                [&]
                {
                  if (model.fields.size() > 1)
-                   throw InputError("cells are to rest in a model of " + std::to_string(model.fields.size()) +
-                                    " velocity fields, expected one");
+                   throw InputError("resting cells are not supported in a model of " +
+                                    std::to_string(model.fields.size()) + " velocity fields, expected one");
                  cells = rows_of_cells<G>(model.mesh, particles, chosen);
                });
   begin_transfer(model, Transfer::flip);

@@ -195,7 +195,7 @@ double load_facets(const Mesh<G::dim>& mesh, Index facet_tag, const Vector<G::di
   for (Index p = 0; p < particles.size(); ++p)
     if (is_resting(particles, p) &&
         std::ranges::count(mesh.facet_tags[static_cast<std::size_t>(particles.cell[p])], facet_tag) > 0)
-      throw InputError("facet_tag has facets of cells that rest, expected particles behind all of them");
+      throw InputError("facet_tag has facets of resting cells, expected particles behind all of them");
   double total = 0;
   for (Index c = 0; c < mesh.owned_cells; ++c)
     for (int k = 0; k <= D; ++k)

@@ -68,7 +68,7 @@ class ConsolidationSite:
         fem.reconfigure(pore_pressure=flow.pore_pressure())
         fem.solve(self.load(0.0))
         if not fem.converged:
-            raise mpm.RunError("the ground does not carry its weight and the pressures at the beginning")
+            raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
         model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
                                     element=element, cell_tags=cell_tags)  # fmt: skip
         model.initialise(fem, flow)

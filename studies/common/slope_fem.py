@@ -57,7 +57,9 @@ def check_fem_slope_options(parser: argparse.ArgumentParser, options: argparse.N
     check_slope_options(parser, options)
     check(parser, options.cell_size <= min(options.height, options.crest),
           lambda: f"--cell-size is {options.cell_size:g}, expected at most --height and --crest")  # fmt: skip
-    check(parser, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without it no slope stands")
+    check(
+        parser, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without cohesion no slope is stable"
+    )
 
 
 def mesh_sizes(options: argparse.Namespace) -> list[float]:

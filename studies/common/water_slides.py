@@ -118,7 +118,7 @@ def handed_over(
     fem = slope.elements(1, pressure, stronger, solver=bridge.Solver(tolerance=1e-10))
     fem.solve(site.load())
     if not fem.converged:
-        raise mpm.RunError(f"no equilibrium for the particles to begin with, at {instant.time / DAY:.3g} days")
+        raise mpm.RunError(f"the particles find no initial equilibrium at {instant.time / DAY:.3g} days")
     model = site.particles(a.particles_per_cell, stronger, more=list(site.laws.values()))
     nodal = pressure(model.mesh.points)
 

@@ -50,7 +50,7 @@ class WetElements:
     def advance(self, dt):
         report = self.model.advance(dt)
         if not report.converged:
-            raise mpm.RunError(f"no step from {self.time:.4g} s on: {report.reason}")
+            raise mpm.RunError(f"no equilibrium in the step from {self.time:.4g} s: {report.reason}")
 
     def displacement(self, point):
         """At a point [m]."""

@@ -62,7 +62,7 @@ class Body:
             factor * self.period, max(first, 0.08 * start) * self.period, growth, 0.04 * self.period
         )
         if not reports[-1].converged:
-            raise mpm.RunError(f"no step from a time factor of {start:.3g}: {reports[-1].reason}")
+            raise mpm.RunError(f"no equilibrium in the step from a time factor of {start:.3g}: {reports[-1].reason}")
 
     def advance(self, dt):
         """One step of dt [s]."""

@@ -77,7 +77,7 @@ def drainage(element, cells):
         for _ in range(count):
             report = model.advance(dt)
             if not report.converged:
-                raise mpm.RunError(f"no step from {model.time:.4g} s on: {report.reason}")
+                raise mpm.RunError(f"no equilibrium in the step from {model.time:.4g} s: {report.reason}")
             time = round(model.time)
             if abs(model.time - time) < 1e-6 and time in (300, 600, 1200, 7200):
                 moved, pressure = at(model, np.column_stack([np.full(21, 0.05), heights]))

@@ -49,7 +49,7 @@ def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
     try:
         return json.dumps({**description, "notes": dict(notes or {})}, indent=1)
     except (TypeError, ValueError) as error:
-        raise InputError(f"notes hold what JSON has no form for: {error}") from None
+        raise InputError(f"notes contain a value that JSON cannot represent: {error}") from None
 
 
 def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _take_partition(model: Model, file: CheckpointFile, path: str) -> None:
     cells = file.rows(array, file.own_rows(_OWNED_CELLS, array))
     numbers = np.where(np.abs(cells) < 2**53, cells, -1).astype(np.int64)  # also where it is no number
     if not partition.is_partition(model, numbers):
-        raise RunError(f"cannot read /{array} in {path}: it has not each cell of the mesh once")
+        raise RunError(f"cannot read /{array} in {path}: it does not contain each cell of the mesh exactly once")
     partition.take_partition(model, numbers)
 
 

@@ -142,7 +142,7 @@ def require_border(model: Any, path: str, state: dict[str, Any] | None) -> None:
 def refuse_far_field(model: Any, what: str) -> None:
     """Raises InputError where something does not know a far field."""
     if model._border is not None:
-        raise InputError(f"{what} does not know far fields, expected implicit steps; see Model.detach_far_field")
+        raise InputError(f"{what} does not support far fields, expected implicit steps; see Model.detach_far_field")
 
 
 def _refuse(model: Any) -> None:

@@ -100,14 +100,16 @@ def newton(
         if len(residuals) > max_iterations:
             return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e} after {max_iterations} iterations")
         if patience and len(residuals) > patience and min(residuals[-patience:]) > 0.5 * min(residuals[:-patience]):
-            return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e}: it chatters")
+            return NewtonReport(
+                False, residuals, f"residual {residuals[-1]:.1e}: the iterates alternate and do not converge"
+            )
         if not system.correction():
             return NewtonReport(False, residuals, system.reason or "the linear solver failed")
         residual = line_search(system, max_halvings)
         if residual == float("inf"):
             return NewtonReport(False, residuals, system.reason)
         if residual > RUN_AWAY:
-            return NewtonReport(False, residuals, f"residual {residual:.1e}: the iteration ran away")
+            return NewtonReport(False, residuals, f"residual {residual:.1e}: the iteration diverges")
         system.keep()
         residuals.append(residual)
     return NewtonReport(True, residuals)

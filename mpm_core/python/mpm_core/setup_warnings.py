@@ -74,8 +74,8 @@ def _locks(model: Model, nmd: bool) -> str:
     if not reasons:
         return ""
     return (
-        f"linear cells lock in soil that keeps its volume ({', '.join(reasons)}): it is too stiff and too strong, more so the "
-        "coarser the mesh; nmd=True averages volumetric strains against that (docs/locking.md)"
+        f"linear cells lock in soil whose volume hardly changes ({', '.join(reasons)}): it is too stiff and too strong, the more the "
+        "coarser the mesh; use nmd=True, which averages volumetric strains (docs/locking.md)"
     )
 
 
@@ -100,9 +100,9 @@ class FailureWatch:
         if self._speaks and report.plastic_work > YIELDS_ABOVE * report.energy_scale > 0:
             self._speaks = False
             warnings.warn(
-                "the soil fails, with a dilation angle below its friction angle: it then keeps its volume, and linear cells "
-                "are too strong, more so the coarser the mesh. nmd=True averages volumetric strains against that, best together "
-                "with integration=MIXED (docs/howto/switches.md)",
+                "the soil fails, and its dilation angle is below its friction angle, so that its volume hardly changes; linear cells "
+                "then overestimate the strength (volumetric locking), the more the coarser the mesh. Use nmd=True, which averages "
+                "volumetric strains, best together with integration=MIXED (docs/howto/switches.md)",
                 RuntimeWarning,
                 stacklevel=5,
             )

@@ -121,7 +121,7 @@ class SpaceWatch:
         if volumes.filled < LEAST_FILLED * volumes.particles:
             warnings.warn(
                 f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
-                f"{self._model.time:.6g} s: they crowd in some cells, and the body takes up too little space; this is less "
+                f"{self._model.time:.6g} s: they accumulate in some cells, so that the body takes up too little space; this is less "
                 "with integration=MIXED than with PARTICLES",
                 RuntimeWarning,
                 stacklevel=5,

@@ -269,7 +269,7 @@ def test_what_a_model_refuses():
     far = one_far_field()
     model = particles(part_of_box(COMM, (4, 2), (4.0, 2.0), everywhere))
     far.attach(model, 1)
-    with pytest.raises(mpm.InputError, match="explicit scheme does not know far fields"):
+    with pytest.raises(mpm.InputError, match="explicit scheme does not support far fields"):
         model.explicit(0.1)
     with pytest.raises(mpm.InputError, match="stiffness is not symmetric"):
         model.attach_far_field([0], [[1.0, 2.0], [0.0, 1.0]])

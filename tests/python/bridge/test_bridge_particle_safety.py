@@ -85,7 +85,7 @@ def test_the_factor_is_that_of_the_strength():
 
 def test_wrong_arguments_are_named():
     with pytest.raises(
-        bridge.InputError, match="start: with the strength divided by 3.0 the particles do not rest: .*flow"
+        bridge.InputError, match="start: with the strength divided by 3.0 the particles do not come to rest: .*flow"
     ):
         bridge.particle_safety(particles(soil()), start=3.0)
     with pytest.raises(bridge.InputError, match="model_of: its model has no gravity"):

@@ -362,14 +362,14 @@ def test_cells_that_cannot_rest_are_refused(model, before, message):
     "use, message",
     [
         (moved, r"place\(\) does not support resting cells, of which the model has 8"),
-        (lambda model: model.traction(1, (1.0, 0.0)), "facets of cells that rest"),
+        (lambda model: model.traction(1, (1.0, 0.0)), "facets of resting cells"),
         (
             lambda model: list(model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)),
             "integration DUAL_DOMAIN does not support",
         ),
         (lambda model: list(model.explicit(1.0, conversion=0.1)), "conversion is 0.1, expected a Conversion or None"),
         (lambda model: model.rest(where=[True]), r"where has shape \(1,\) and dtype bool, expected \(8,\) of bool"),
-        (lambda model: model.seed_points([[0.3, 0.2]], [0.01], density=1.0) and model.report(), "is in a cell that rests"),
+        (lambda model: model.seed_points([[0.3, 0.2]], [0.01], density=1.0) and model.report(), "is in a resting cell"),
         (lambda model: mpm.Conversion(layers=0), "layers is 0, expected a whole number from 1"),
         (lambda model: mpm.Conversion(displacement=-0.1), "displacement is -0.1"),
     ],
