@@ -28,8 +28,8 @@ def about() -> str:
         "linear solvers": common.version_of("petsc4py.PETSc", _solvers),
         "processors": f"{len(os.sched_getaffinity(0))} for this process; mpirun {shutil.which('mpirun') or 'not found'}",
         "films": "MP4 by ffmpeg" if shutil.which("ffmpeg") else "GIF (ffmpeg not found)",
-        "meshes": "read by a process that may not start programs" if ctypes.util.find_library("seccomp") else
-        "searched for commands before they are read (libseccomp not found)",
+        "meshes": "gmsh reads them in a process that cannot start programs" if ctypes.util.find_library("seccomp") else
+        "files are searched for commands before gmsh reads them (libseccomp not found)",
         "studies": ", ".join(str(folder) for folder in find.folders()),
     }  # fmt: skip
     return "\n".join(f"{name + ':':<16} {value}" for name, value in lines.items())

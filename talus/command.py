@@ -7,6 +7,7 @@ import importlib.util
 import signal
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from talus import find
@@ -76,7 +77,10 @@ def run_study(words: list[str]) -> int:
         raise ValueError(f"no study is named, expected one of these:\n{listed()}")
     script = find.study_path(words[0])
     if script is None:
-        raise ValueError(f"there is no study '{words[0]}', expected one of these, or the path of a script:\n{listed()}")
+        near = get_close_matches(words[0], find.studies())
+        hint = f"did you mean {' or '.join(near)}? `talus list` lists all" if near else \
+            f"expected one of these, or the path of a script:\n{listed()}"  # fmt: skip
+        raise ValueError(f"there is no study '{words[0]}'; {hint}")
     for name in ("dolfinx", "h5py"):
         if importlib.util.find_spec(name) is None:
             raise ValueError(

@@ -108,7 +108,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         wrong = re.search(r"unrecognized arguments: (--[\w-]+)", message)
-        near = get_close_matches(wrong.group(1), self._option_string_actions) if wrong else []
+        near = get_close_matches(wrong.group(1), self._option_string_actions, cutoff=0.75) if wrong else []
         message += f"; did you mean {' or '.join(near)}?" if near else ""
         self.exit(2, f"{self.prog}: {message}\n(--help lists the options)\n")
 

@@ -38,9 +38,9 @@ def version_of(module: str, text: Callable[[Any], str] = lambda module: module._
 
 
 def git_revision() -> str:
-    """Commit of the sources, with ``-changed`` when files differ from it; ``unknown`` outside a clone."""
+    """Commit of the sources, with ``-changed`` when files differ from it; ``unknown`` outside a clone, none of an installed package."""
     if not IN_SOURCES:
-        return "installed"
+        return "none, installed package"
     command = ["git", "-C", str(ROOT), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=-changed"]
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()

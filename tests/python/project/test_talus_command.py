@@ -55,7 +55,8 @@ def test_all_studies_are_listed_with_their_purpose(tmp_path):
     "words, message",
     [
         (["run"], "no study is named, expected one of these"),
-        (["run", "nosuch"], "there is no study 'nosuch', expected one of these"),
+        (["run", "nosuch"], "there is no study 'nosuch'; expected one of these"),
+        (["run", "slop"], "there is no study 'slop'; did you mean slope?"),
         (["run", "nosuch.py"], "there is no study 'nosuch.py'"),
         (["run", "--ranks", "0", "slope"], "--ranks is '0', expected a whole number from 1 on"),
         (["run", "--ranks"], "--ranks is '', expected a whole number from 1 on"),
@@ -201,6 +202,6 @@ def test_the_installed_package_holds_all_that_studies_need(tmp_path):
     done = talus(work, "run", "element_test", "--steps", "5", PYTHONPATH=str(tmp_path))
     assert done.returncode == 0, done.stderr
     summary = json.loads((work / "results" / "element_test" / "summary.json").read_text())
-    assert summary["finished_run"] and summary["versions"]["git_revision"] == "installed"
+    assert summary["finished_run"] and summary["versions"]["git_revision"] == "none, installed package"
     assert (tmp_path / "talus" / "meshes" / "embankment.toml").exists()
     assert str(tmp_path / "talus" / "studies") in talus(work, "info", PYTHONPATH=str(tmp_path)).stdout
