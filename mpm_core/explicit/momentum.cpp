@@ -12,7 +12,7 @@ void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt,
   for (Index i : field.part.nodes)
   {
     const NodeSums<D>& node = field.nodes[i];
-    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
+    const double per_mass = field.per_mass[i];
     // Components side by side: of single numbers g++ makes branches on the signs of velocities
     const Components<D> residual = components<D>(unbalanced_force<D>(node, gravity));
     const Components<D> momentum = node.mass * components<D>(field.start_velocity[i]);
@@ -47,9 +47,8 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field)
   for (Index i : field.part.nodes)
   {
     const auto& node = field.nodes[i];
-    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
     for (int a = 0; a < G::dim; ++a)
-      field.velocity[i][a] = (flip_fraction * node.momentum[a] + field.velocity[i][a]) * per_mass;
+      field.velocity[i][a] = (flip_fraction * node.momentum[a] + field.velocity[i][a]) * field.per_mass[i];
   }
   for (const auto& support : field.supports)
     impose<G::dim>(support, field.velocity[support.node]);

@@ -8,6 +8,7 @@ namespace mpm::explicit_scheme
 {
 /// a_i = (f_ext - f_int - D)_i / m_i, with boundary conditions; D_i = alpha |R_i| sign(v_i) per component,
 /// R = f_ext - f_int.
+/// @pre find_start_velocity has been called in this step
 template <class G>
 void find_acceleration(const Vector<G::dim>& gravity, double damping, double dt, VelocityField<G>& field);
 

@@ -2,9 +2,9 @@
 
 #include "base/eigen.h"
 #include "implicit/cell_tangent.h"
-#include "model/batches.h"
 #include "model/integration.h"
 #include "model/law_increment.h"
+#include "particles/batches.h"
 #include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
 

@@ -2,8 +2,8 @@
 /// @file
 /// What a law is given of the increment of a batch beyond stress and strain, where it needs it.
 
-#include "model/batches.h"
 #include "model/material_points.h"
+#include "particles/batches.h"
 
 namespace mpm::model
 {

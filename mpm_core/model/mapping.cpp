@@ -143,7 +143,8 @@ void map_to_nodes(Model<G>& model)
         add_pore_forces(model.mesh, model.particles, *model.water, *runs, field);
       add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
       if (has_two_phases(model) && !model.water->standing.empty())
-        add_standing_forces<G>(model.mesh, model.particles, *model.water, model.order.runs, field.nodes);
+        for (const auto* runs : {&model.order.runs, &field.resting.runs})
+          add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, field.nodes);
     }
     sum_shared(model.exchange, field.nodes);
   }
@@ -154,7 +155,8 @@ void map_to_nodes(Model<G>& model)
                  water);
   add_surface_pressures(model.mesh, *model.water, &PressureCondition::held, water.motion);
   if (!model.water->standing.empty())
-    add_standing_forces<G>(model.mesh, model.particles, *model.water, model.order.runs, water.motion.nodes);
+    for (const auto* runs : {&model.order.runs, &model.fields.front().resting.runs})
+      add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, water.motion.nodes);
   sum_shared(model.exchange, water.motion.nodes);
   sum_shared(model.exchange, water.nodes);
 }
@@ -180,10 +182,11 @@ Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField
 template <class G>
 void find_start_velocity(VelocityField<G>& field)
 {
+  field.per_mass.resize(field.nodes.size());
   for (Index i : field.part.nodes)
   {
     const NodeSums<G::dim>& node = field.nodes[i];
-    const double per_mass = is_light(field, i) ? 0 : 1 / node.mass;
+    const double per_mass = field.per_mass[i] = is_light(field, i) ? 0 : 1 / node.mass;
     for (int a = 0; a < G::dim; ++a)
       field.start_velocity[i][a] = node.momentum[a] * per_mass;
   }

@@ -17,9 +17,6 @@
 
 namespace mpm::model
 {
-/// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
-inline constexpr Index batch_size = 256;
-
 /// What stops a run, with its place.
 template <int D>
 struct Failure

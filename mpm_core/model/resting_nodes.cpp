@@ -4,7 +4,7 @@
 #include "transfer/resting.h"
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 namespace mpm::model
 {
@@ -19,35 +19,30 @@ void take_resting_runs(const Mesh<D>& mesh, std::vector<Run>& runs, VelocityFiel
   for (const Run& run : resting.runs)
     resting.marks[static_cast<std::size_t>(run.cell)] = 1;
   std::ranges::sort(resting.runs, {}, &Run::cell);
+  resting.batches.clear();
+  for (std::size_t r = 0; r < resting.runs.size(); r = resting.batches.back().last_run)
+    resting.batches.push_back(next_batch(resting.runs, r));
 }
 
 namespace
 {
+/// Numbers of the pairs of vertices of a cell.
+template <int D>
+using VertexMatrix = std::array<std::array<double, D + 1>, D + 1>;
+
 /// sum m_p N_k N_l over the particles of a cell.
 template <class G, int D = G::dim>
 VertexMatrix<D> mass_matrix(const CellMoments<G>& moments, const CellShape<D>& shape)
 {
   VertexMatrix<D> masses;
   for (int k = 0; k <= D; ++k)
-    for (int l = 0; l <= D; ++l)
-      masses[k][l] =
+    for (int l = 0; l <= k; ++l)
+      masses[k][l] = masses[l][k] =
           sum_of_products<G>({1.0 / (D + 1), shape.gradient[k]}, {1.0 / (D + 1), shape.gradient[l]}, moments);
   return masses;
 }
 
-/// Whether a matrix has one number on its diagonal and one elsewhere. That of a rule that is the same for all vertices
-/// has; not those of eight or 32 points in a tetrahedron, nor any in axial symmetry.
-template <int D>
-bool is_uniform(const VertexMatrix<D>& masses)
-{
-  for (int k = 0; k <= D; ++k)
-    for (int l = 0; l <= D; ++l)
-      if (std::abs(masses[k][l] - masses[0][k == l ? 0 : 1]) > 1e-12 * masses[0][0])
-        return false;
-  return true;
-}
-
-/// Shape functions and masses of the cells.
+/// Shape functions of the cells.
 template <class G, int D = G::dim>
 void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
 {
@@ -56,10 +51,7 @@ void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
   resting.vertices.assign(n, {});
   for (auto& column : resting.gradient)
     column.assign(n, 0.0);
-  for (auto* column : {&resting.hoop, &resting.mass, &resting.own_mass})
-    column->assign(n, 0.0);
-  resting.masses.assign(resting.runs.size(), {});
-  bool uniform = true;
+  resting.hoop.assign(n, 0.0);
   for (std::size_t r = 0; r < resting.runs.size(); ++r)
   {
     const Index cell = resting.runs[r].cell;
@@ -68,13 +60,7 @@ void make_elements(const Mesh<D>& mesh, VelocityField<G>& field)
       for (int b = 0; b < D; ++b)
         resting.gradient[k * D + b][r] = mesh.shapes[cell].gradient[k + 1][b];
     resting.hoop[r] = hoop_gradient<G>(mesh.shapes[cell]);
-    resting.masses[r] = mass_matrix(field.moments[cell], mesh.shapes[cell]);
-    resting.mass[r] = resting.masses[r][0][1];
-    resting.own_mass[r] = resting.masses[r][0][0] - resting.mass[r];
-    uniform = uniform && is_uniform<D>(resting.masses[r]);
   }
-  if (uniform)
-    resting.masses.clear();
 }
 
 template <class G, int D = G::dim>
@@ -104,6 +90,71 @@ void sum_nodes(const Mesh<D>& mesh, VelocityField<G>& field)
   }
   std::ranges::sort(resting.nodes);
 }
+
+/// The vertices of cells by their nodes: those of nodes[n] are `vertices` from starts[n] on.
+struct CellsOfNodes
+{
+  std::vector<Index> starts;
+  std::vector<std::pair<Index, int>> vertices; ///< number of the cell among those that rest, and of its vertex
+};
+
+template <int D>
+CellsOfNodes cells_of_nodes(std::size_t all_nodes, const RestingCells<D>& resting)
+{
+  std::vector<Index> place(all_nodes, 0); // first the number of cells, then where the next one goes
+  for (std::size_t r = 0; r < resting.runs.size(); ++r)
+    for (Index node : resting.vertices[r])
+      ++place[node];
+  CellsOfNodes found;
+  Index count = 0;
+  for (Index node : resting.nodes)
+  {
+    found.starts.push_back(count);
+    count += std::exchange(place[node], count);
+  }
+  found.starts.push_back(count);
+  found.vertices.resize(static_cast<std::size_t>(count));
+  for (std::size_t r = 0; r < resting.runs.size(); ++r)
+    for (int k = 0; k <= D; ++k)
+      found.vertices[place[resting.vertices[r][k]]++] = {static_cast<Index>(r), k};
+  return found;
+}
+
+/// The mass matrix of the nodes, row by row.
+/// @pre nodes are known
+template <class G, int D = G::dim>
+void make_mass_matrix(const Mesh<D>& mesh, VelocityField<G>& field)
+{
+  RestingCells<D>& resting = field.resting;
+  std::vector<VertexMatrix<D>> masses;
+  for (const Run& run : resting.runs)
+    masses.push_back(mass_matrix(field.moments[run.cell], mesh.shapes[run.cell]));
+  const CellsOfNodes cells = cells_of_nodes(mesh.points.size(), resting);
+  std::vector<std::size_t> entry_of(mesh.points.size(), 0); // in the row under way, where it is there already
+  resting.rows.clear();
+  resting.masses.clear();
+  for (std::size_t n = 0; n < resting.nodes.size(); ++n)
+  {
+    const std::size_t row = resting.masses.size();
+    resting.rows.push_back(static_cast<Index>(row));
+    for (Index i = cells.starts[n]; i < cells.starts[n + 1]; ++i)
+    {
+      const auto [r, k] = cells.vertices[i];
+      for (int l = 0; l <= D; ++l)
+      {
+        const Index node = resting.vertices[r][l];
+        std::size_t& entry = entry_of[node];
+        if (entry < row || entry >= resting.masses.size() || resting.masses[entry].node != node)
+        {
+          entry = resting.masses.size();
+          resting.masses.push_back({0, node});
+        }
+        resting.masses[entry].mass += masses[r][k][l];
+      }
+    }
+  }
+  resting.rows.push_back(static_cast<Index>(resting.masses.size()));
+}
 } // namespace
 
 template <class G, int D>
@@ -114,6 +165,7 @@ void make_resting_cells(const Mesh<D>& mesh, const Particles<D>& particles, Velo
     return;
   make_elements(mesh, field);
   sum_nodes(mesh, field);
+  make_mass_matrix(mesh, field);
   for (auto* values : {&resting.mapped, &resting.change, &resting.displacement})
     values->assign(mesh.points.size(), {});
   resting.flip_fraction = 1;
@@ -160,78 +212,24 @@ const MeshPart& part_of_particles(VelocityField<G>& field)
   return others;
 }
 
-namespace
-{
-/// Adds to `mapped` what the masses of the cells make of `velocity_change`.
-/// @param gained_by  momentum of vertex k of cell r by the changes of its vertices; a callable
-template <class G, class GainedBy>
-void map_change(VelocityField<G>& field, GainedBy&& gained_by)
-{
-  constexpr int D = G::dim;
-  RestingCells<D>& resting = field.resting;
-  for (std::size_t r = 0; r < resting.runs.size(); ++r)
-  {
-    const auto& vertices = resting.vertices[r];
-    std::array<Components<D>, D + 1> change;
-    for (int k = 0; k <= D; ++k)
-      change[k] = components<D>(field.velocity_change[vertices[k]]);
-    const auto gained = gained_by(r, change);
-    for (int k = 0; k <= D; ++k)
-      for (int a = 0; a < D; ++a)
-        resting.mapped[vertices[k]][a] += gained[k][a];
-  }
-}
-
-template <int D>
-using VertexComponents = std::array<Components<D>, D + 1>;
-
-/// By two numbers of a cell.
-template <int D>
-VertexComponents<D> gained_uniformly(const RestingCells<D>& resting, std::size_t r, const VertexComponents<D>& change)
-{
-  Components<D> all = change[0];
-  for (int k = 1; k <= D; ++k)
-    all += change[k];
-  all *= resting.mass[r];
-  VertexComponents<D> gained;
-  for (int k = 0; k <= D; ++k)
-    gained[k] = all + resting.own_mass[r] * change[k];
-  return gained;
-}
-
-/// By the whole matrix of a cell.
-template <int D>
-VertexComponents<D> gained_by_matrix(const VertexMatrix<D>& masses, const VertexComponents<D>& change)
-{
-  VertexComponents<D> gained;
-  for (int k = 0; k <= D; ++k)
-  {
-    gained[k] = masses[k][0] * change[0];
-    for (int l = 1; l <= D; ++l)
-      gained[k] += masses[k][l] * change[l];
-  }
-  return gained;
-}
-} // namespace
-
 template <class G>
 void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
 {
   constexpr int D = G::dim;
   RestingCells<D>& resting = field.resting;
-  for (Index i : resting.nodes)
-    resting.mapped[i] = {};
-  if (resting.masses.empty())
-    map_change(field, [&](std::size_t r, const auto& change) { return gained_uniformly<D>(resting, r, change); });
-  else
-    map_change(field,
-               [&](std::size_t r, const auto& change) { return gained_by_matrix<D>(resting.masses[r], change); });
-  resting.is_mapped = true;
-  if (momentum.empty())
-    return;
-  for (Index i : resting.nodes)
+  for (std::size_t n = 0; n < resting.nodes.size(); ++n)
+  {
+    Components<D> gained{};
+    for (Index e = resting.rows[n]; e < resting.rows[n + 1]; ++e)
+      gained += resting.masses[e].mass * components<D>(field.velocity_change[resting.masses[e].node]);
+    const Index i = resting.nodes[n];
     for (int a = 0; a < D; ++a)
-      momentum[i][a] += resting.mapped[i][a];
+      resting.mapped[i][a] = gained[a];
+    if (!momentum.empty())
+      for (int a = 0; a < D; ++a)
+        momentum[i][a] += gained[a];
+  }
+  resting.is_mapped = true;
 }
 
 namespace
@@ -280,13 +278,18 @@ void move_nodes(const PassOptions& options, VelocityField<G>& field)
   if (!resting.is_mapped)
     map_resting_change<G>(field, {});
   const double flip = 1 - options.pic_fraction;
-  for (Index i : resting.nodes)
+  const auto add = [](Vector<D>& to, double factor, double times, const Vector<D>& gain)
+  {
+    const Components<D> sum = factor * components<D>(to) + times * components<D>(gain);
     for (int a = 0; a < D; ++a)
-    {
-      resting.sums[i].momentum[a] = flip * resting.sums[i].momentum[a] + resting.mapped[i][a];
-      resting.change[i][a] = flip * resting.change[i][a] + field.velocity_change[i][a];
-      resting.displacement[i][a] += options.dt * field.velocity[i][a];
-    }
+      to[a] = sum[a];
+  };
+  for (Index i : resting.nodes)
+  {
+    add(resting.sums[i].momentum, flip, 1, resting.mapped[i]);
+    add(resting.change[i], flip, 1, field.velocity_change[i]);
+    add(resting.displacement[i], 1, options.dt, field.velocity[i]);
+  }
   resting.flip_fraction *= flip;
   resting.is_mapped = false;
   resting.is_behind = true;

@@ -8,7 +8,9 @@
 #include "transfer/resting.h"
 #include "transfer/turn.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace mpm::model
 {
@@ -22,11 +24,18 @@ struct RestingScratch
   alignas(64) double gradient[D * D][batch_size + lanes]; ///< of displacement
   alignas(64) double volumetric[batch_size + lanes];
   alignas(64) double strain[n_stress<D>][batch_size + lanes];
+
+  RestingScratch()
+  {
+    for (auto& component : strain) // that out of plane stays zero
+      std::ranges::fill(component, 0.0);
+  }
 };
 
 /// Gradient of the displacement over dt of `lanes` cells.
 template <class G, int D = G::dim>
-std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>& field, double dt, std::size_t first)
+[[gnu::always_inline]] inline std::array<std::array<Lanes, D>, D> displacement_gradient(const VelocityField<G>& field,
+                                                                                        double dt, std::size_t first)
 {
   const auto* v = &field.resting.vertices[first];
   const auto at = [&](int k) { return by_component<D>([&](int l) -> const auto& { return field.velocity[v[l][k]]; }); };
@@ -79,22 +88,30 @@ std::array<Lanes, G::n_working> working_stress(const Piece<N>& piece)
   return stress;
 }
 
-/// Calls `change(piece, group)` on consecutive rows of columns, `lanes` of them together, and writes them back.
-template <std::size_t N, class Change>
-void change_rows(const std::array<double*, N>& columns, Index first, Index last, Change&& change)
+/// Calls `change(piece, i, count)` on rows first + i of columns and those behind, `count` of `lanes`, and writes them
+/// back, unless they are constant. Columns are named one by one, and the last few rows are apart: g++ keeps a piece in
+/// registers then.
+template <std::size_t N, class T, class Change>
+[[gnu::always_inline]] inline void for_rows(const std::array<T*, N>& columns, const Batch& batch, Change&& change)
 {
-  for (Index i = first; i < last; i += lanes)
+  const Index size = batch.last - batch.first, whole = size - size % lanes;
+  const auto change_whole = [&]<std::size_t... k>(std::index_sequence<k...>, Index i) __attribute__((always_inline))
   {
-    const int count = std::min<Index>(lanes, last - i);
-    Piece<N> piece = count == lanes ? load(columns, i) : load_few(columns, i, last);
-    change(piece, static_cast<std::size_t>(i - first));
+    Piece<N> piece{load(columns[k] + batch.first + i)...};
+    change(piece, static_cast<std::size_t>(i), lanes);
+    if constexpr (!std::is_const_v<T>)
+      (store(piece[k], columns[k] + batch.first + i), ...);
+  };
+  for (Index i = 0; i < whole; i += lanes)
+    change_whole(std::make_index_sequence<N>{}, i);
+  if (whole == size)
+    return;
+  Piece<N> piece = load_few(columns, batch.first + whole, batch.last);
+  change(piece, static_cast<std::size_t>(whole), size - whole);
+  if constexpr (!std::is_const_v<T>)
     for (std::size_t k = 0; k < N; ++k)
-      if (count == lanes)
-        store(piece[k], columns[k] + i);
-      else
-        for (int l = 0; l < count; ++l)
-          columns[k][i + l] = piece[k][l];
-  }
+      for (int l = 0; l < size - whole; ++l)
+        columns[k][batch.first + whole + l] = piece[k][l];
 }
 
 /// Volumetric strains by nodal mixed discretisation of cells side by side.
@@ -129,7 +146,7 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
 {
   constexpr int S = n_symmetric<D>;
   Lanes work_before{}, all_growth{};
-  const auto strain_piece = [&]<std::size_t N>(Piece<N>& piece, std::size_t i)
+  const auto strain_piece = [&](auto& piece, std::size_t i, Index cells) __attribute__((always_inline))
   {
     const auto gradient = displacement_gradient(field, options.dt, batch.first_run + i);
     CellStrain<D, Lanes> strain = strain_increment<D>(gradient, 1);
@@ -149,21 +166,20 @@ double strain_batch(const Mesh<D>& mesh, const VelocityField<G>& field, const Pa
     all_growth += strain.volumetric;
     for (int k = 0; k < D * D; ++k)
       store(gradient[k / D][k % D], scratch.gradient[k] + i);
-    work_before +=
-        work<G>(working_stress<G>(piece), piece[S], increment, batch.last - batch.first - static_cast<Index>(i));
+    work_before += work<G>(working_stress<G>(piece), piece[S], increment, cells);
     turn<D>(piece, strain.rotation);
     piece[S] *= 1 + strain.volumetric;
     piece[S + 1] += strain.deviatoric;
   };
-  change_rows(columns_to_strain<G>(particles), batch.first, batch.last, strain_piece);
+  for_rows(columns_to_strain<G>(particles), batch, strain_piece);
   growth = sum(all_growth);
   return sum(work_before);
 }
 
 /// Adds the forces of the stresses of `n` cells, at most `lanes`, to their nodes.
 template <class G, int D = G::dim>
-void add_forces(const std::array<Lanes, G::n_working>& stress, std::size_t first, std::size_t n,
-                RestingCells<D>& resting)
+[[gnu::always_inline]] inline void add_forces(const std::array<Lanes, G::n_working>& stress, std::size_t first,
+                                              std::size_t n, RestingCells<D>& resting)
 {
   std::array<std::array<Lanes, D>, D + 1> force{};
   for (int k = 0; k < D; ++k)
@@ -200,11 +216,8 @@ double integrate_batch(const Particles<D>& particles, const Batch& batch, const 
     columns[k] = particles.stress[working_component<G>[k]].data();
   columns[S] = particles.volume.data();
   Lanes work_after{};
-  for (Index row = batch.first; row < batch.last; row += lanes)
+  const auto integrate_piece = [&](const auto& piece, std::size_t i, Index cells) __attribute__((always_inline))
   {
-    const auto i = static_cast<std::size_t>(row - batch.first);
-    const Index count = std::min<Index>(lanes, batch.last - row);
-    const Piece<S + 1> piece = count == lanes ? load(columns, row) : load_few(columns, row, batch.last);
     std::array<Lanes, S> increment, stress, force;
     for (int k = 0; k < S; ++k)
     {
@@ -212,9 +225,10 @@ double integrate_batch(const Particles<D>& particles, const Batch& batch, const 
       stress[k] = piece[k];
       force[k] = piece[k] * piece[S];
     }
-    work_after += work<G>(stress, piece[S], increment, count);
-    add_forces<G>(force, batch.first_run + i, static_cast<std::size_t>(count), resting);
-  }
+    work_after += work<G>(stress, piece[S], increment, cells);
+    add_forces<G>(force, batch.first_run + i, static_cast<std::size_t>(cells), resting);
+  };
+  for_rows(columns, batch, integrate_piece);
   return sum(work_after);
 }
 
@@ -271,13 +285,9 @@ void resting_pass(Model<G>& model, const PassOptions& options)
     return;
   for (Index i : resting.nodes)
     resting.sums[i].internal = {};
-  RestingScratch<G::dim> scratch{};
-  for (std::size_t r = 0; r < resting.runs.size();)
-  {
-    const Batch batch = next_batch(resting.runs, r);
+  RestingScratch<G::dim> scratch;
+  for (const Batch& batch : resting.batches)
     pass_batch(model, options, batch, scratch);
-    r = batch.last_run;
-  }
   if (options.nmd || options.small || field.integration.kind != Integration::particles)
     update_moments(model.particles, field);
 }

@@ -64,6 +64,7 @@ struct VelocityField
   std::vector<Vector<D>> contact_force; ///< of rigid surfaces, before it is added to the tractions; else zero
   std::vector<Vector<D>> damping_force; ///< of Rayleigh damping, likewise; else empty
   double least_mass = 0;                ///< nodes below this mass are not moved [kg]
+  std::vector<double> per_mass;         ///< 1 / m_i of this step; zero at nodes that are not moved
   bool has_light_nodes = false;         ///< whether a cell with particles may have one in this explicit step
 
   // How its nodes move

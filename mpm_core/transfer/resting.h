@@ -12,6 +12,7 @@
 /// linear finite elements: nodes keep the momentum of resting cells, and what has been added to velocities and
 /// displacements; rows learn of it only when somebody asks (model/resting_nodes.h).
 
+#include "particles/batches.h"
 #include "transfer/moments.h"
 #include "transfer/nodes.h"
 
@@ -39,9 +40,12 @@ std::vector<double> rule_weights(const Mesh<D>& mesh, Index cell, const Rule<D>&
 template <class G, int D = G::dim>
 void take_mass(const Mesh<D>& mesh, Index cell, double mass, const Rule<D>& rule, CellMoments<G>& moments);
 
-/// Numbers of the pairs of vertices of a cell.
-template <int D>
-using VertexMatrix = std::array<std::array<double, D + 1>, D + 1>;
+/// An entry of the mass matrix of nodes: sum m_p N_i N_j with node j.
+struct MassEntry
+{
+  double mass;
+  Index node;
+};
 
 /// The resting cells of a velocity field, in rising order. Entries per cell are followed by some of zero, so that the
 /// last ones fill a vector.
@@ -50,6 +54,7 @@ struct RestingCells
 {
   std::vector<unsigned char> marks; ///< per owned cell: 1 where it rests; empty where no cell of the model may
   std::vector<Run> runs;            ///< the row of each
+  std::vector<Batch> batches;       ///< of these rows
 
   MeshPart others; ///< the field's part of the mesh without them; nodes are those of the whole part
 
@@ -57,12 +62,11 @@ struct RestingCells
   std::vector<std::array<Index, D + 1>> vertices;
   std::array<std::vector<double>, D * D> gradient; ///< of the shape functions of all vertices but the first
   std::vector<double> hoop;                        ///< strain by a radial velocity of a vertex, in axial symmetry
-  std::vector<double> mass;                        ///< m_kl of different vertices, sum m_p N_k N_l
-  std::vector<double> own_mass;                    ///< m_kk - m_kl
-  std::vector<VertexMatrix<D>> masses;             ///< m_kl instead, where these differ within a cell; empty elsewhere
 
   // Per node
   std::vector<Index> nodes;            ///< of these cells
+  std::vector<Index> rows;             ///< where the entries of nodes[n] begin, and one past the last
+  std::vector<MassEntry> masses;       ///< their mass matrix, row by row
   std::vector<NodeSums<D>> sums;       ///< of these cells as they are now; without tractions
   std::vector<Vector<D>> mapped;       ///< mass matrix times `velocity_change` of the field in this step
   std::vector<Vector<D>> change;       ///< of velocities, that rows do not know yet

@@ -2,10 +2,13 @@
 /// @file
 /// How the particles are cut into what a law is given at once.
 
-#include "model/model.h"
+#include "particles/particles.h"
 
-namespace mpm::model
+namespace mpm::particles
 {
+/// Longest run of particles, and so the batch that a law is given: its scratch stays in the first-level cache.
+inline constexpr Index batch_size = 256;
+
 /// Runs of one material, one behind the other, at most `batch_size` particles: what a law is given at once.
 struct Batch
 {
@@ -23,4 +26,4 @@ inline Batch next_batch(const std::vector<Run>& runs, std::size_t first_run)
     batch.last = runs[batch.last_run++].last;
   return batch;
 }
-} // namespace mpm::model
+} // namespace mpm::particles
