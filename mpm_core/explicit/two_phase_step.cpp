@@ -5,6 +5,7 @@
 #include "explicit/phase_momentum.h"
 #include "model/mapping.h"
 #include "model/pore_forces.h"
+#include "model/resting_nodes.h"
 #include "model/water_mapping.h"
 #include "model/water_pass.h"
 
@@ -38,7 +39,9 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   for (VelocityField<G>* phase : {&soil, &water.motion})
   {
     find_velocity_change(*phase, options.pic_fraction, dt);
-    scatter_momentum<G>(mesh, model.exchange, phase->part, phase->moments, phase->velocity_change, phase->velocity);
+    scatter_momentum<G>(mesh, model.exchange, part_of_particles(*phase), phase->moments, phase->velocity_change,
+                        phase->velocity);
+    map_resting_change<G>(*phase, phase->velocity); // of the soil: the mass of water changes, whose moments follow
     sum_shared(exchange, phase->velocity);
     find_mapped_velocity(1 - options.pic_fraction, *phase);
   }

@@ -101,7 +101,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   if (step.pore.flows)
     update(step.halos.nodes, step.pore.rate);
   if (model.water && model.water->may_dry())
-    try_drying(mesh, model.particles, model.order.runs, field, *model.water, step);
+    try_drying(mesh, model.particles, step.runs, field, *model.water, step);
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);

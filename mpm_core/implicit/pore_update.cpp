@@ -118,7 +118,8 @@ double add_increments(Particles<G::dim>& particles, double modulus, const Run& r
 /// @returns kinetic energy of the water that leaves them, which moves as they do
 template <class G, int D = G::dim>
 double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double growth,
-                     const CellPressure<D>& pressure, const Vector<G::dim>& centre, Particles<D>& particles)
+                     const CellPressure<D>& pressure, const Vector<G::dim>& centre, const CellMoments<G>& moments,
+                     Particles<D>& particles)
 {
   double kinetic = 0;
   for (Index p = run.first; p < run.last; ++p)
@@ -138,7 +139,15 @@ double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<
     const double gained = after * (growth + porosity / water.modulus * increment) + (after - before) * porosity;
     const double mass = step.pore.density * particles.volume[p] * gained;
     const Vector<D> v = at<D>(particles.velocity, p);
-    kinetic -= 0.5 * mass * dot<D>(v, v);
+    double squared = dot<D>(v, v);
+    if (run.resting) // its mean over the particles
+    {
+      const Matrix<D> gradient = gradient_at<D>(particles.velocity_gradient, p);
+      squared = 0;
+      for (int a = 0; a < D; ++a)
+        squared += sum_of_products<G>({v[a], gradient[a]}, {v[a], gradient[a]}, moments) / moments.mass;
+    }
+    kinetic -= 0.5 * mass * squared;
     particles.mass[p] += mass;
   }
   return kinetic;
@@ -168,7 +177,7 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       const double growth = growth_of(mesh, field, step, run.cell);
       if (changes_masses(*model.water, step.options))
         model.energy.outflow_kinetic +=
-            take_up_water(run, *model.water, step, growth, pressure, centre, model.particles);
+            take_up_water(run, *model.water, step, growth, pressure, centre, field.moments[run.cell], model.particles);
     }
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,

@@ -1,5 +1,6 @@
 #include "model/resting.h"
 
+#include "model/held_water.h"
 #include "model/resting_nodes.h"
 #include "particles/seed.h"
 #include "transfer/resting.h"
@@ -21,8 +22,16 @@ void divide_row(const Mesh<D>& mesh, const Rule<D>& points, Index row, Index end
   const std::vector<double> weights = rule_weights<G>(mesh, cell, points);
   const double mass = particles.mass[row], volume = particles.volume[row];
   particles.resting[0][row] = 0;
+  const bool two_phases = particles.water_velocity.present;
+  const Vector<D> water_velocity = two_phases ? at<D>(particles.water_velocity.columns, row) : Vector<D>{};
+  const Matrix<D> water_spin = two_phases ? gradient_at<D>(particles.water_gradient, row) : Matrix<D>{};
+  const double water_mass = two_phases ? particles.water_mass[0][row] : 0;
   for (int k = 0; k < D * D; ++k)
+  {
     particles.velocity_gradient[k][row] = particles.displacement_gradient[k][row] = 0;
+    if (two_phases)
+      particles.water_gradient[k][row] = 0;
+  }
   for (int i = 0; i < D; ++i)
     particles.resting_displacement[i][row] = 0;
   const auto copy_to = [&](Index p)
@@ -54,10 +63,35 @@ void divide_row(const Mesh<D>& mesh, const Rule<D>& points, Index row, Index end
         particles.initial_position[i][p] -= strain[i][j] * (x[j] - centre[j]);
       }
     }
+    if (two_phases)
+    {
+      particles.water_mass[0][p] = weights[static_cast<std::size_t>(k)] * water_mass;
+      for (int i = 0; i < D; ++i)
+      {
+        particles.water_velocity[i][p] = water_velocity[i];
+        for (int j = 0; j < D; ++j)
+          particles.water_velocity[i][p] += water_spin[i][j] * (x[j] - centre[j]);
+      }
+    }
     if (particles.pore_pressure.present && particles.pressure_gradient.present)
       for (int i = 0; i < D; ++i)
         particles.pore_pressure[0][p] += particles.pressure_gradient[i][p] * (x[i] - centre[i]);
   }
+}
+
+/// Lets the particles that have taken the place of a row hold the water that it had.
+template <int D>
+void hold_water(const PoreWater& water, std::span<const double> weights, double pressure, Index row, Index end,
+                Particles<D>& particles)
+{
+  std::vector<double> pressures{particles.pore_pressure[0][row]};
+  const auto others = std::span(particles.pore_pressure[0]).subspan(static_cast<std::size_t>(end), weights.size() - 1);
+  pressures.insert(pressures.end(), others.begin(), others.end());
+  const double shift = holding_shift(water.retention[static_cast<std::size_t>(particles.material[row])],
+                                     particles.saturation[0][row], pressures, weights, pressure, pressure);
+  particles.pore_pressure[0][row] += shift;
+  for (double& other : others)
+    other += shift;
 }
 
 /// Largest displacement of the vertices of a resting cell since it began to rest.
@@ -122,7 +156,10 @@ void convert_cells(Model<G>& model, std::span<const unsigned char> chosen)
   for (Index row : rows)
   {
     const Rule<D>& points = rules.at(static_cast<int>(particles.resting[0][row]));
+    const double pressure = particles.pore_pressure.present ? particles.pore_pressure[0][row] : 0;
     divide_row<G>(model.mesh, points, row, end, particles);
+    if (model.water && model.water->may_dry())
+      hold_water(*model.water, rule_weights<G>(model.mesh, particles.cell[row], points), pressure, row, end, particles);
     end += static_cast<Index>(points.size()) - 1;
   }
   model.totals.converted_cells += static_cast<std::int64_t>(rows.size());

@@ -59,6 +59,13 @@ ParticleEnergy particle_energy(const Model<G, D>& model, Index p)
   {
     const Vector<D> w = at<D>(particles.water_velocity.columns, p);
     kinetic += 0.5 * particles.water_mass[0][p] * dot<D>(w, w);
+    if (is_resting(particles, p))
+    {
+      const CellMoments<G>& moments = field_of(model, particles.material[p]).moments[particles.cell[p]];
+      const Matrix<D> gradient = gradient_at<D>(particles.water_gradient, p);
+      for (const Vector<D>& row : gradient) // masses of soil and water are in the same proportions
+        kinetic += 0.5 * particles.water_mass[0][p] / moments.mass * relative_product<D>(row, row, moments.mass_xixi);
+    }
   }
   if (model.water && particles.pore_pressure.present)
   {

@@ -2,6 +2,7 @@
 
 #include "base/eigen.h"
 #include "model/affine.h"
+#include "model/held_water.h"
 #include "parallel/agreement.h"
 #include "particles/seed.h"
 #include "transfer/resting.h"
@@ -36,9 +37,20 @@ template <int D>
   throw InputError(out.str());
 }
 
+/// Mass of a particle without the water that comes and goes in soil that may dry.
+template <int D>
+double dry_mass(const Particles<D>& particles, const std::optional<PoreWater>& water, Index p)
+{
+  if (!water || !water->may_dry())
+    return particles.mass[p];
+  return particles.mass[p] - water->unit_weight / standard_gravity * particles.saturation[0][p] *
+                                 particles.porosity[0][p] * particles.volume[p];
+}
+
 /// @throws InputError where the particles of a cell are not those of one call of `seed_cells`, or differ
 template <int D>
-void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRows<D>& cell)
+void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const std::optional<PoreWater>& water,
+                const CellRows<D>& cell)
 {
   const Index first = cell.rows.front();
   const double size = cell_size<D>(mesh.shapes[cell.cell].volume);
@@ -46,12 +58,12 @@ void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRo
   {
     const Index p = cell.rows[k];
     const double ratio = cell.weights[k] / cell.weights[0];
-    const auto differs = [&](const Column& column)
-    { return std::abs(column[p] - ratio * column[first]) > 1e-9 * column[p]; };
+    const auto differ = [&](double mine, double of_first) { return std::abs(mine - ratio * of_first) > 1e-9 * mine; };
     if (particles.id[p] != particles.id[first] + static_cast<GlobalIndex>(k) ||
         particles.material[p] != particles.material[first])
       refuse(particles, p, "shares its cell with particles of another seeding or law");
-    if (differs(particles.mass) || differs(particles.volume))
+    if (differ(dry_mass(particles, water, p), dry_mass(particles, water, first)) ||
+        differ(particles.volume[p], particles.volume[first]))
       refuse(particles, p, "has another mass or volume than its place in the cell gives it beside the others");
     if (particles.traction.present && norm<D>(at<D>(particles.traction.columns, p)) > 0)
       refuse(particles, p, "carries a traction");
@@ -68,7 +80,7 @@ void check_rows(const Mesh<D>& mesh, const Particles<D>& particles, const CellRo
 /// @throws InputError see `rest_cells`
 template <class G, int D = G::dim>
 std::vector<CellRows<D>> rows_of_cells(const Mesh<D>& mesh, const Particles<D>& particles,
-                                       std::span<const unsigned char> chosen)
+                                       const std::optional<PoreWater>& water, std::span<const unsigned char> chosen)
 {
   std::vector<std::vector<Index>> rows(static_cast<std::size_t>(mesh.owned_cells));
   for (Index p = 0; p < particles.size(); ++p)
@@ -91,7 +103,7 @@ std::vector<CellRows<D>> rows_of_cells(const Mesh<D>& mesh, const Particles<D>& 
     {
       refuse(particles, mine.front(), "is one of " + std::to_string(mine.size()) + " in its cell");
     }
-    check_rows(mesh, particles, cells.back());
+    check_rows(mesh, particles, water, cells.back());
   }
   return cells;
 }
@@ -115,6 +127,44 @@ Matrix<D> velocity_gradient(const CellMoments<G>& moments)
   return gradient;
 }
 
+/// Water with its own velocity in a cell that is to rest.
+template <int D>
+struct WaterAtRest
+{
+  double mass;
+  Vector<D> velocity; ///< at the centre of the cell
+  Matrix<D> gradient;
+};
+
+/// The water of a cell's particles as one: with their momentum, and its first moment.
+template <class G, int D = G::dim>
+WaterAtRest<D> water_at_rest(const Mesh<D>& mesh, const CellRows<D>& cell, const Particles<D>& particles)
+{
+  CellMoments<G> moments{};
+  for (Index p : cell.rows)
+  {
+    const double mass = particles.water_mass[0][p];
+    Vector<D> xi = at<D>(particles.position, p);
+    for (int i = 0; i < D; ++i)
+      xi[i] -= mesh.shapes[cell.cell].centre[i];
+    moments.mass += mass;
+    for (int k = 0; k < n_symmetric<D>; ++k)
+      moments.mass_xixi[k] += mass * xi[symmetric_pairs<D>[k][0]] * xi[symmetric_pairs<D>[k][1]];
+    for (int a = 0; a < D; ++a)
+    {
+      const double momentum = mass * particles.water_velocity[a][p];
+      moments.mass_xi[a] += mass * xi[a];
+      moments.momentum[a] += momentum;
+      for (int b = 0; b < D; ++b)
+        moments.momentum_xi[a][b] += momentum * xi[b];
+    }
+  }
+  WaterAtRest<D> water{moments.mass, {}, cell.rows.size() > 1 ? velocity_gradient<G>(moments) : Matrix<D>{}};
+  for (int a = 0; a < D; ++a) // the masses of resting cells have no first moment: none of momentum goes into it
+    water.velocity[a] = moments.momentum[a] / moments.mass;
+  return water;
+}
+
 /// Makes the first row of a cell that of the resting cell; the others are to be removed.
 template <class G, int D = G::dim>
 void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& particles)
@@ -123,6 +173,8 @@ void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& part
   CellMoments<G> moments{};
   for (Index p : cell.rows)
     add_moments<G>(particles, p, p + 1, mesh.shapes[cell.cell], moments);
+  const bool two_phases = particles.water_velocity.present;
+  const WaterAtRest<D> water = two_phases ? water_at_rest<G>(mesh, cell, particles) : WaterAtRest<D>{};
   for_each_column(particles,
                   [&](std::string_view, int, auto& column)
                   {
@@ -138,6 +190,16 @@ void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& part
                   });
   particles.mass[row] = moments.mass;
   particles.volume[row] = moments.volume;
+  if (two_phases)
+  {
+    particles.water_mass[0][row] = water.mass;
+    for (int i = 0; i < D; ++i)
+    {
+      particles.water_velocity[i][row] = water.velocity[i];
+      for (int j = 0; j < D; ++j)
+        particles.water_gradient[i * D + j][row] = water.gradient[i][j];
+    }
+  }
   particles.resting[0][row] = static_cast<double>(cell.rows.size());
   const Matrix<D> gradient = cell.rows.size() > 1 ? velocity_gradient<G>(moments) : Matrix<D>{};
   Vector<D> to_centre; // from the centre of mass, where the means are
@@ -159,6 +221,24 @@ void merge_rows(const Mesh<D>& mesh, const CellRows<D>& cell, Particles<D>& part
     }
   }
 }
+/// Least and largest pore pressure of some particles.
+template <int D>
+std::array<double, 2> pressure_range(const Particles<D>& particles, const std::vector<Index>& rows)
+{
+  std::array<double, 2> range{particles.pore_pressure[0][rows.front()], particles.pore_pressure[0][rows.front()]};
+  for (Index p : rows)
+    range = {std::min(range[0], particles.pore_pressure[0][p]), std::max(range[1], particles.pore_pressure[0][p])};
+  return range;
+}
+
+/// Lets the row of a resting cell hold the water of its particles, whose pressures were in a range.
+template <int D>
+void hold_water(const PoreWater& water, double least, double largest, Index row, Particles<D>& particles)
+{
+  double& pressure = particles.pore_pressure[0][row];
+  pressure += holding_shift(water.retention[static_cast<std::size_t>(particles.material[row])],
+                            particles.saturation[0][row], std::array{pressure}, std::array{1.0}, least, largest);
+}
 } // namespace
 
 template <class G>
@@ -173,17 +253,23 @@ void rest_cells(Model<G>& model, std::span<const unsigned char> chosen)
                  if (model.fields.size() > 1)
                    throw InputError("resting cells are not supported in a model of " +
                                     std::to_string(model.fields.size()) + " velocity fields, expected one");
-                 cells = rows_of_cells<G>(model.mesh, particles, chosen);
+                 cells = rows_of_cells<G>(model.mesh, particles, model.water, chosen);
                });
   begin_transfer(model, Transfer::flip);
   require(particles.resting, particles.id.size());
   require(particles.velocity_gradient, particles.id.size());
   require(particles.resting_displacement, particles.id.size());
+  if (particles.water_velocity.present)
+    require(particles.water_gradient, particles.id.size());
   require(particles.displacement_gradient, particles.id.size());
+  const bool dries = model.water && model.water->may_dry();
   std::vector<Index> gone;
   for (const CellRows<D>& cell : cells)
   {
+    const auto [least, largest] = dries ? pressure_range(particles, cell.rows) : std::array<double, 2>{};
     merge_rows<G>(model.mesh, cell, particles);
+    if (dries)
+      hold_water(*model.water, least, largest, cell.rows.front(), particles);
     gone.insert(gone.end(), cell.rows.begin() + 1, cell.rows.end());
   }
   std::ranges::sort(gone);

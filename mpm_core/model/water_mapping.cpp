@@ -4,6 +4,8 @@
 #include "parallel/agreement.h"
 #include "transfer/lanes.h"
 
+#include <algorithm>
+
 namespace mpm::model
 {
 namespace
@@ -38,6 +40,13 @@ void split_phases(Model<G>& model)
   require(particles.water_velocity, size);
   require(particles.water_mass, size);
   particles.water_velocity.columns = particles.velocity;
+  if (particles.resting.present)
+  {
+    require(particles.water_gradient, size);
+    particles.water_gradient.columns = particles.velocity_gradient.columns;
+    for (auto& gradient : particles.pressure_gradient.columns)
+      std::ranges::fill(gradient, 0.0); // water spreads evenly over the pores of a cell
+  }
   for (Index p = 0; p < particles.size(); ++p)
   {
     const double mass = water_mass(particles, *model.water, p);
@@ -125,6 +134,33 @@ void add_moments(const Particles<D>& particles, double unit_weight, const Run& r
   }
 }
 
+/// Moments of the water in a resting cell, of whose mass and volume each particle has the same part as of the soil's.
+template <class G, int D = G::dim>
+void add_resting_moments(const Particles<D>& particles, double unit_weight, Index row, const CellMoments<G>& soil,
+                         CellMoments<G>& motion, PoreMoments<D>& pores)
+{
+  const double volume = particles.volume[row], porosity = particles.porosity[0][row];
+  const double part = particles.water_mass[0][row] / soil.mass;
+  motion.volume = volume;
+  motion.mass = particles.water_mass[0][row];
+  for (int k = 0; k < n_symmetric<D>; ++k)
+    motion.mass_xixi[k] = part * soil.mass_xixi[k];
+  for (int k : normal_component<G>)
+    motion.stress[k] = -volume * particles.pore_pressure[0][row];
+  const Vector<D> velocity = at<D>(particles.water_velocity.columns, row);
+  const Matrix<D> gradient = gradient_at<D>(particles.water_gradient, row);
+  pores.pores = volume * porosity;
+  pores.drag = pores.pores * porosity * unit_weight / particles.conductivity[0][row];
+  for (int a = 0; a < D; ++a)
+  {
+    motion.momentum[a] = motion.mass * velocity[a];
+    pores.pore_velocity[a] = pores.pores * velocity[a];
+    for (int b = 0; b < D; ++b)
+      for (int c = 0; c < D; ++c)
+        motion.momentum_xi[a][b] += gradient[a][c] * motion.mass_xixi[symmetric_index<D>(c, b)];
+  }
+}
+
 /// The water is where the soil is.
 template <class G>
 void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterField<G>& field)
@@ -163,6 +199,9 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
   for (const Run& run : runs)
     add_moments<G>(particles, water.unit_weight, run, mesh.shapes[run.cell], motion.moments[run.cell],
                    field.cells[run.cell]);
+  for (const Run& run : soil.resting.runs)
+    add_resting_moments<G>(particles, water.unit_weight, run.first, soil.moments[run.cell], motion.moments[run.cell],
+                           field.cells[run.cell]);
   particles_to_nodes(mesh, exchange, particles, runs, motion);
   for (Index i : motion.part.nodes)
     field.nodes[i] = {};

@@ -5,6 +5,8 @@
 #include "transfer/affine_field.h"
 #include "transfer/lanes.h"
 
+#include <algorithm>
+
 namespace mpm::model
 {
 namespace
@@ -100,6 +102,17 @@ bool change_water(Particles<D>& particles, const PoreWater& water, const Run& ru
   return any == 0;
 }
 
+/// The water of a resting cell moves as that of its particles would, at whose places its velocity is affine.
+template <int D>
+void change_gradient(Particles<D>& particles, Index row, double flip_fraction, const WaterChange<D>& change)
+{
+  for (int k = 0; k < D * D; ++k)
+  {
+    double& gradient = particles.water_gradient[k][row];
+    gradient = flip_fraction * gradient + change.velocity.gradient[k / D][k % D];
+  }
+}
+
 template <class G>
 void note_closed_pores(Model<G>& model, const Run& run)
 {
@@ -117,15 +130,19 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
   Particles<D>& particles = model.particles;
   const double density = model.water->unit_weight / standard_gravity;
   std::array<double, 2> work{};
-  for (const Run& run : model.order.runs)
+  const auto change_run = [&](const Run& run)
   {
     const auto change = water_change(model.mesh, model.fields.front(), model.water_field, run.cell, dt, nmd);
     const double half_strain = 0.5 * (change.growth + change.outflow / density);
     work[0] -= half_strain * pressure_sum(particles, run);
+    if (run.resting)
+      change_gradient<D>(particles, run.first, flip_fraction, change);
     if (!change_water<D>(particles, *model.water, run, model.mesh.shapes[run.cell].centre, flip_fraction, change))
       note_closed_pores(model, run);
     work[1] -= half_strain * (1 + change.growth) * pressure_sum(particles, run); // volumes grow later in the step
-  }
+  };
+  std::ranges::for_each(model.order.runs, change_run);
+  std::ranges::for_each(model.fields.front().resting.runs, change_run);
   for (Index c : model.water_field.motion.part.cells)
     if (model.water_field.motion.moments[c].volume > 0)
       model.water->inflow -=

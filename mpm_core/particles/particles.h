@@ -44,6 +44,7 @@ struct Particles
   OptionalColumns<D> pressure_gradient;
   OptionalColumns<D> water_velocity; ///< of water that moves by itself; `mass` is then that of the grains
   OptionalColumns<1> water_mass;
+  OptionalColumns<D * D> water_gradient; ///< of its velocity, in resting cells
   std::vector<Index> material;
   std::vector<Index> cell;
   std::vector<AddedField> added; ///< fields that the run has declared for itself
@@ -95,6 +96,11 @@ void for_each_field(P& particles, F&& f)
     particles.water_velocity);
   f(Field{"water_mass", "kg", "Mass of the pore water where it has its own velocity, per metre in plane strain"},
     particles.water_mass);
+  f(Field{"water_gradient", "1/s",
+          "Gradient of the velocity of the pore water in a resting cell, where it has its own; dw_x/dx first, then "
+          "dw_x/dy",
+          settable},
+    particles.water_gradient);
   f(Field{"material", "-", "Number of the law"}, particles.material);
   f(Field{"cell", "-", "Number of the cell on this rank that holds the particle"}, particles.cell);
   for (auto& added : particles.added)

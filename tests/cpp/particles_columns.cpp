@@ -214,7 +214,7 @@ TYPED_TEST(ParticlesTest, RunsFoundAgainAreThoseFoundAnew)
 TYPED_TEST(ParticlesTest, BytesPerParticleCountTheColumns)
 {
   // 8 bytes: id, 3 D (position, velocity, initial position) + D (traction), stress, volume, mass, strain, 3 states, 2
-  // of the added field, 1 + D + 2 D^2 of resting cells, 5 + 2 D of water; 4: two
+  // of the added field, 1 + D + 2 D^2 of resting cells, 5 + 2 D + D^2 of water; 4: two
   constexpr int D = TypeParam::value;
-  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (6 + 7 * D + 2 * D * D + n_stress<D> + 3 + 4 + 2) + 2 * 4);
+  EXPECT_EQ(bytes_per_particle(marked<D>(10, 2, 1)), 8 * (6 + 7 * D + 3 * D * D + n_stress<D> + 3 + 4 + 2) + 2 * 4);
 }

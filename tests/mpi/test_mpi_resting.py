@@ -98,3 +98,16 @@ def test_pore_water_flows_through_resting_cells_on_all_ranks_as_on_one(comm, own
         assert report.converted_cells > 0 and report.resting_cells > 0
     fields = (*FIELDS, "pore_pressure", "pressure_gradient", "porosity")
     assert_same(*(all_by_id(model, fields) for model in models))
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_water_with_its_own_velocity_is_the_same_in_resting_cells_on_all_ranks(comm, owners_of):
+    models = steep_block(comm, owners_of), steep_block(MPI.COMM_SELF)
+    for model in models:
+        model.add_water(porosity=0.4, conductivity=1e-3, modulus=1e7)
+        model.convert(where=lambda x: x[:, 0] < 0.3)
+        conversion = mpm.Conversion(displacement=0.02, layers=1)
+        report = model.explicit(0.06, energy_limit=None, conversion=conversion).last()
+        assert report.converted_cells > 0 and report.resting_cells > 0
+    fields = (*FIELDS, "pore_pressure", "porosity", "water_velocity", "water_mass", "water_gradient")
+    assert_same(*(all_by_id(model, fields) for model in models))

@@ -34,7 +34,7 @@ from .rayleigh import Rayleigh, checked_rayleigh
 from .relaxation import Relaxation
 from .report import ImplicitReport, Report
 from .reports import Reports
-from .resting import Conversion, checked_conversion, refuse_drying
+from .resting import Conversion, checked_conversion
 from .setup_warnings import warn_of_setup
 from .two_phase import begin_two_phases, refuse_two_phases
 from .views import model_text
@@ -294,7 +294,6 @@ class Model(ContactMethods, Body):
             refuse_contacts(self, "the implicit scheme with pore water")
         if isinstance(solver, Relaxation):
             refuse_contacts(self, "relaxation")
-        refuse_drying(self, "the implicit scheme")
         refuse_absorbing(self, "the implicit scheme")
         self._check_water()
         refuse_two_phases(self, "implicit()")
@@ -355,7 +354,6 @@ class Model(ContactMethods, Body):
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
         refuse_contacts(self, "equilibrate()")
-        refuse_drying(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
         options = collectively(

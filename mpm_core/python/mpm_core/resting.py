@@ -71,7 +71,7 @@ class RestingCells:
     def rest(self, cell_tag: Tag | None = None, *, where: Where | None = None) -> int:
         """Turn cells into resting cells: each is a linear finite element with one material point, instead of its particles.
 
-        A resting cell costs about as much as two particles. Its nodes are those of the particles around it, and it has their
+        A resting cell costs little more than one particle. Its nodes are those of the particles around it, and it has their
         mass, so that waves pass from one to the other. It is for soil that hardly moves: a cell turns into particles where it
         fails (`Conversion`), which changes neither mass, momentum and force of the nodes nor the energy.
 
@@ -136,12 +136,6 @@ def refuse_resting(model: Any, what: str) -> None:
     count = model.comm.allreduce(int(model.particles.is_resting.sum()))
     if count:
         raise InputError(f"{what} does not support resting cells, of which the model has {count}; see Model.convert")
-
-
-def refuse_drying(model: Any, what: str) -> None:
-    """Raises InputError where cells rest in soil that may dry: their mass would not stay as it is. Collective."""
-    if model.has_water and model._core.water.may_dry:
-        refuse_resting(model, f"{what} of soil that dries")
 
 
 def checked_conversion(model: Any, conversion: Conversion | None, integration: Any) -> Any:

@@ -34,7 +34,6 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
     refused = {
         "axial symmetry": model.geometry == Geometry.AXISYMMETRIC,
         "several velocity fields": max(model._velocity_fields) > 0,
-        "resting cells": model._core.has_resting_cells,
         "rigid surfaces": bool(model._contacts),
         "absorbing sides": bool(model._absorbing),
         "retention curves": model._core.water.may_dry,

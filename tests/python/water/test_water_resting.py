@@ -102,12 +102,61 @@ def test_a_model_at_rest_finds_the_equilibrium_of_its_particles():
     assert np.abs(found[0][:, 1]).max() > 8e3
 
 
-def test_resting_cells_of_soil_that_dries_are_refused():
-    model = on_box((0.5, 1.0), (2, 4), ELASTIC)
-    model.add_water(porosity=0.4, conductivity=1e-6, retention=VanGenuchten(alpha=4e-4, n=2.0))
-    model.rest()
-    for use in (lambda: model.implicit(1.0, dt=1.0), model.equilibrate):
-        with pytest.raises(
-            mpm.InputError, match="of soil that dries does not support resting cells, of which the model has 16"
-        ):
-            use()
+CURVE = VanGenuchten(alpha=4e-4, n=2.0, residual=0.1)
+
+
+def drying(per_cell, rest, n=10, young=5e6):
+    """A column that is saturated at first and drains at its base."""
+    model = on_box((0.2, 1.0), (2, n), mpm.LinearElastic(young=young, poisson=0.3), per_cell=per_cell)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-5, retention=CURVE, modulus=np.inf)
+    model.set_pore_pressure(lambda x: 9810.0 * (1.0 - x[:, 1]) - 3e3)
+    model.hold_pore_pressure(3, 0.0)
+    if rest:
+        assert model.rest() == len(model.mesh.cells)
+    return model
+
+
+def test_soil_that_dries_at_rest_is_that_of_one_particle_in_each_cell():
+    found = []
+    for rest in (False, True):
+        model = drying(1, rest, young=5e10)  # so that particles stay where they are
+        for dt in (50.0, 100.0, 200.0, 400.0):
+            model.implicit(model.time + dt, dt=dt, quasi_static=True, solver=mpm.Newton(tolerance=1e-11)).last()
+        p = model.particles
+        found.append((p.pore_pressure, p.saturation, p.mass, p.stress[:, 1], np.array([model.water_inflow()])))
+    assert found[0][1].min() < 0.8 and np.ptp(found[0][1]) > 0.1
+    for one, other in zip(*found, strict=True):
+        assert np.abs(one - other).max() < 1e-6 * np.abs(one).max()
+
+
+def test_no_water_is_lost_where_drying_soil_comes_to_rest_and_turns_into_particles():
+    """Pressures differ within a cell, and saturation is not linear in them: particles get those by which they hold its water."""
+    model = drying(10, False)
+    law = CURVE.saturation
+    pores, held = 0.4 * model.particles.volume, model.water_volume()
+    assert model.rest() == len(model.mesh.cells)
+    assert model.water_volume() == pytest.approx(held, rel=1e-13)
+    entered, mass = model.water_inflow(), model.particles.mass.sum()
+    for converts in (None, lambda x: x[:, 1] > 0.5, lambda x: x[:, 1] > 0.0):
+        if converts is not None:
+            p = model.particles
+            before = model.water_volume(), p.mass.sum(), (p.mass[:, None] * p.velocity).sum(axis=0)
+            model.convert(where=converts)
+            after = model.water_volume(), p.mass.sum(), (p.mass[:, None] * p.velocity).sum(axis=0)
+            for one, other in zip(before, after, strict=True):
+                np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13)
+            particles = ~p.is_resting
+            pores = p.volume * p.porosity * particles
+            own = law(np.maximum(-p.pore_pressure, 0))
+            assert np.abs(own - p.saturation)[particles].max() > 1e-4  # each has its own
+            assert np.sum(pores * own) == pytest.approx(
+                np.sum(pores * p.saturation), rel=1e-7
+            )  # the core has a table of it
+        for dt in (100.0, 200.0):
+            model.implicit(model.time + dt, dt=dt, quasi_static=True, solver=mpm.Newton(tolerance=1e-11)).last()
+            now, inflow = model.water_volume(), model.water_inflow()
+            assert now - held == pytest.approx(inflow - entered, abs=1e-10 * held)
+            held, entered = now, inflow
+    assert model.particles.saturation.min() < 0.9
+    assert model.particles.mass.sum() - mass == pytest.approx(1000 * entered, rel=1e-6)
