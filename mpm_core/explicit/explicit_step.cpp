@@ -74,7 +74,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     clock.begin(Phase::mapping);
     find_velocity_change(field, replaced, dt);
     scatter_momentum<G>(mesh, exchange, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
-    map_resting_change<G>(field, field.velocity);
+    gain_resting_momentum<G>(model, replaced, field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - replaced, field);
   }

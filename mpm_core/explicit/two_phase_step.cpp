@@ -41,7 +41,8 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
     find_velocity_change(*phase, options.pic_fraction, dt);
     scatter_momentum<G>(mesh, model.exchange, part_of_particles(*phase), phase->moments, phase->velocity_change,
                         phase->velocity);
-    map_resting_change<G>(*phase, phase->velocity); // of the soil: the mass of water changes, whose moments follow
+    gain_resting_momentum<G>(model, options.pic_fraction, *phase,
+                             phase->velocity); // of the soil: the mass of water changes, whose moments follow
     sum_shared(exchange, phase->velocity);
     find_mapped_velocity(1 - options.pic_fraction, *phase);
   }

@@ -94,16 +94,20 @@ void hold_water(const PoreWater& water, std::span<const double> weights, double 
     other += shift;
 }
 
-/// Largest displacement of the vertices of a resting cell since it began to rest.
+/// Largest displacement of the vertices of a resting cell since it began to rest: what its row knows, and what its
+/// nodes have moved since.
 template <int D>
-double largest_displacement(const Mesh<D>& mesh, const Particles<D>& particles, Index row)
+double largest_displacement(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Vector<D>> since,
+                            Index row)
 {
   const Index cell = particles.cell[row];
   const Matrix<D> gradient = gradient_at<D>(particles.displacement_gradient, row);
   double largest = 0;
   for (Index node : mesh.cells[cell])
   {
-    Vector<D> u = at<D>(particles.resting_displacement.columns, row);
+    Vector<D> u = since[static_cast<std::size_t>(node)];
+    for (int i = 0; i < D; ++i)
+      u[i] += particles.resting_displacement[i][row];
     for (int i = 0; i < D; ++i)
       for (int j = 0; j < D; ++j)
         u[i] += gradient[i][j] * (mesh.points[node][j] - mesh.shapes[cell].centre[j]);
@@ -114,12 +118,14 @@ double largest_displacement(const Mesh<D>& mesh, const Particles<D>& particles, 
 
 /// Whether the row of a particle or of a resting cell says that its cell may not rest, nor those around it.
 template <int D>
-bool fails(const Mesh<D>& mesh, const Particles<D>& particles, Index p, const Conversion& conversion)
+bool fails(const Mesh<D>& mesh, const Particles<D>& particles, std::span<const Vector<D>> since, Index p,
+           const Conversion& conversion)
 {
   if (!particles.state.empty() && particles.state[0][p] > conversion.plastic_strain)
     return true;
   const double size = cell_size<D>(mesh.shapes[particles.cell[p]].volume);
-  return is_resting(particles, p) && largest_displacement(mesh, particles, p) > conversion.displacement * size;
+  return is_resting(particles, p) &&
+         largest_displacement<D>(mesh, particles, since, p) > conversion.displacement * size;
 }
 
 template <int D>
@@ -175,10 +181,9 @@ void convert_failing(Model<G>& model, const Conversion& conversion)
   const Mesh<D>& mesh = model.mesh;
   if (!model.particles.resting.present)
     return;
-  update_resting_rows(model);
   std::vector<unsigned char> chosen(static_cast<std::size_t>(mesh.owned_cells), 0);
   for (Index p = 0; p < model.particles.size(); ++p)
-    if (fails(mesh, model.particles, p, conversion))
+    if (fails<D>(mesh, model.particles, model.fields.front().resting.displacement, p, conversion))
       chosen[static_cast<std::size_t>(model.particles.cell[p])] = 1;
   std::vector<std::array<double, 1>> nodes(mesh.points.size());
   for (int layer = 0; layer < conversion.layers; ++layer)

@@ -132,6 +132,7 @@ void make_mass_matrix(const Mesh<D>& mesh, VelocityField<G>& field)
   const CellsOfNodes cells = cells_of_nodes(mesh.points.size(), resting);
   std::vector<std::size_t> entry_of(mesh.points.size(), 0); // in the row under way, where it is there already
   resting.rows.clear();
+  resting.columns.clear();
   resting.masses.clear();
   for (std::size_t n = 0; n < resting.nodes.size(); ++n)
   {
@@ -144,12 +145,13 @@ void make_mass_matrix(const Mesh<D>& mesh, VelocityField<G>& field)
       {
         const Index node = resting.vertices[r][l];
         std::size_t& entry = entry_of[node];
-        if (entry < row || entry >= resting.masses.size() || resting.masses[entry].node != node)
+        if (entry < row || entry >= resting.masses.size() || resting.columns[entry] != node)
         {
           entry = resting.masses.size();
-          resting.masses.push_back({0, node});
+          resting.columns.push_back(node);
+          resting.masses.push_back(0);
         }
-        resting.masses[entry].mass += masses[r][k][l];
+        resting.masses[entry] += masses[r][k][l];
       }
     }
   }
@@ -166,10 +168,10 @@ void make_resting_cells(const Mesh<D>& mesh, const Particles<D>& particles, Velo
   make_elements(mesh, field);
   sum_nodes(mesh, field);
   make_mass_matrix(mesh, field);
-  for (auto* values : {&resting.mapped, &resting.change, &resting.displacement})
+  for (auto* values : {&resting.change, &resting.displacement})
     values->assign(mesh.points.size(), {});
   resting.flip_fraction = 1;
-  resting.is_mapped = resting.is_behind = false;
+  resting.has_gained = resting.is_behind = false;
   resting.others = {};
 }
 
@@ -212,26 +214,6 @@ const MeshPart& part_of_particles(VelocityField<G>& field)
   return others;
 }
 
-template <class G>
-void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum)
-{
-  constexpr int D = G::dim;
-  RestingCells<D>& resting = field.resting;
-  for (std::size_t n = 0; n < resting.nodes.size(); ++n)
-  {
-    Components<D> gained{};
-    for (Index e = resting.rows[n]; e < resting.rows[n + 1]; ++e)
-      gained += resting.masses[e].mass * components<D>(field.velocity_change[resting.masses[e].node]);
-    const Index i = resting.nodes[n];
-    for (int a = 0; a < D; ++a)
-      resting.mapped[i][a] = gained[a];
-    if (!momentum.empty())
-      for (int a = 0; a < D; ++a)
-        momentum[i][a] += gained[a];
-  }
-  resting.is_mapped = true;
-}
-
 namespace
 {
 /// Kinetic energy that PIC takes out of a resting cell, whose particles have velocities v + grad v . xi: see
@@ -260,47 +242,62 @@ double pic_loss_at_rest(const Particles<D>& particles, const VelocityField<G>& f
 }
 
 template <class G>
-void add_pic_loss(Model<G>& model, const PassOptions& options)
+void add_pic_loss(Model<G>& model, double pic_fraction)
 {
-  if (options.pic_fraction == 0)
+  if (pic_fraction == 0)
     return;
   update_resting_rows(model);
   const VelocityField<G>& field = model.fields.front();
   for (const Run& run : field.resting.runs)
-    model.energy.pic_loss += pic_loss_at_rest(model.particles, field, model.mesh, run, options.pic_fraction);
+    model.energy.pic_loss += pic_loss_at_rest(model.particles, field, model.mesh, run, pic_fraction);
 }
 
-/// The gains of the nodes in a step: momentum, and velocities and displacements that the rows do not know yet.
-template <class G, int D = G::dim>
-void move_nodes(const PassOptions& options, VelocityField<G>& field)
+/// `kept` times what was there and a gain.
+template <int D>
+[[gnu::always_inline]] inline void gain(double kept, const Components<D>& more, Vector<D>& to)
 {
-  RestingCells<D>& resting = field.resting;
-  if (!resting.is_mapped)
-    map_resting_change<G>(field, {});
-  const double flip = 1 - options.pic_fraction;
-  const auto add = [](Vector<D>& to, double factor, double times, const Vector<D>& gain)
-  {
-    const Components<D> sum = factor * components<D>(to) + times * components<D>(gain);
-    for (int a = 0; a < D; ++a)
-      to[a] = sum[a];
-  };
-  for (Index i : resting.nodes)
-  {
-    add(resting.sums[i].momentum, flip, 1, resting.mapped[i]);
-    add(resting.change[i], flip, 1, field.velocity_change[i]);
-    add(resting.displacement[i], 1, options.dt, field.velocity[i]);
-  }
-  resting.flip_fraction *= flip;
-  resting.is_mapped = false;
-  resting.is_behind = true;
+  const Components<D> sum = kept * components<D>(to) + more;
+  for (int a = 0; a < D; ++a)
+    to[a] = sum[a];
 }
 } // namespace
 
 template <class G>
+void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G>& field,
+                           std::span<Vector<G::dim>> momentum)
+{
+  constexpr int D = G::dim;
+  RestingCells<D>& resting = field.resting;
+  if (resting.runs.empty())
+    return;
+  add_pic_loss(model, pic_fraction);
+  const double flip = 1 - pic_fraction;
+  for (std::size_t n = 0; n < resting.nodes.size(); ++n)
+  {
+    Components<D> gained{};
+    for (Index e = resting.rows[n]; e < resting.rows[n + 1]; ++e)
+      gained += resting.masses[e] * components<D>(field.velocity_change[resting.columns[e]]);
+    const Index i = resting.nodes[n];
+    if (!momentum.empty())
+      gain<D>(1, gained, momentum[i]);
+    gain<D>(flip, gained, resting.sums[i].momentum);
+    gain<D>(flip, components<D>(field.velocity_change[i]), resting.change[i]);
+  }
+  resting.flip_fraction *= flip;
+  resting.has_gained = resting.is_behind = true;
+}
+
+template <class G>
 void move_resting_nodes(Model<G>& model, const PassOptions& options)
 {
-  add_pic_loss(model, options);
-  move_nodes(options, model.fields.front());
+  constexpr int D = G::dim;
+  VelocityField<G>& field = model.fields.front();
+  RestingCells<D>& resting = field.resting;
+  if (!resting.has_gained)
+    gain_resting_momentum<G>(model, options.pic_fraction, field, {});
+  for (Index i : resting.nodes)
+    gain<D>(1, options.dt * components<D>(field.velocity[i]), resting.displacement[i]);
+  resting.has_gained = false;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -308,7 +305,7 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   template void make_resting_cells(const Mesh<G::dim>&, const Particles<G::dim>&, VelocityField<G>&);                  \
   template void update_resting_rows(Model<G>&);                                                                        \
   template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
-  template void map_resting_change(VelocityField<G>&, std::span<Vector<G::dim>>);                                      \
+  template void gain_resting_momentum(Model<G>&, double, VelocityField<G>&, std::span<Vector<G::dim>>);                \
   template void move_resting_nodes(Model<G>&, const PassOptions&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -48,12 +48,14 @@ void add_resting_sums(const Mesh<G::dim>& mesh, StressOf&& stress_of, VelocityFi
 template <class G>
 const MeshPart& part_of_particles(VelocityField<G>& field);
 
-/// Adds the momentum of resting cells by the field's `velocity_change`, their mass matrix times it.
+/// Gives nodes what resting cells gain by the field's `velocity_change`: momentum, their mass matrix times it, added to
+/// `momentum` as well, and velocities as (18), with the energy that PIC takes out of them. The rows learn of it later.
+/// @param momentum  per node; may be empty
 template <class G>
-void map_resting_change(VelocityField<G>& field, std::span<Vector<G::dim>> momentum);
+void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G>& field,
+                           std::span<Vector<G::dim>> momentum);
 
-/// Moves resting cells with their nodes: velocities as (18), with the energy that PIC takes out of them. The rows learn
-/// of it later.
+/// Moves resting cells with their nodes, whose gains of the step are made now, unless they have been.
 template <class G>
 void move_resting_nodes(Model<G>& model, const PassOptions& options);
 } // namespace mpm::model

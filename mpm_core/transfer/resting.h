@@ -40,13 +40,6 @@ std::vector<double> rule_weights(const Mesh<D>& mesh, Index cell, const Rule<D>&
 template <class G, int D = G::dim>
 void take_mass(const Mesh<D>& mesh, Index cell, double mass, const Rule<D>& rule, CellMoments<G>& moments);
 
-/// An entry of the mass matrix of nodes: sum m_p N_i N_j with node j.
-struct MassEntry
-{
-  double mass;
-  Index node;
-};
-
 /// The resting cells of a velocity field, in rising order. Entries per cell are followed by some of zero, so that the
 /// last ones fill a vector.
 template <int D>
@@ -65,15 +58,15 @@ struct RestingCells
 
   // Per node
   std::vector<Index> nodes;            ///< of these cells
-  std::vector<Index> rows;             ///< where the entries of nodes[n] begin, and one past the last
-  std::vector<MassEntry> masses;       ///< their mass matrix, row by row
+  std::vector<Index> rows;             ///< where the entries of nodes[n] in the mass matrix begin, and the end
+  std::vector<Index> columns;          ///< node j of each entry
+  std::vector<double> masses;          ///< sum m_p N_i N_j
   std::vector<NodeSums<D>> sums;       ///< of these cells as they are now; without tractions
-  std::vector<Vector<D>> mapped;       ///< mass matrix times `velocity_change` of the field in this step
   std::vector<Vector<D>> change;       ///< of velocities, that rows do not know yet
   std::vector<Vector<D>> displacement; ///< likewise [m]
 
   double flip_fraction = 1; ///< by which the velocities of rows are to be multiplied before `change` is added
-  bool is_mapped = false;   ///< `mapped` is that of this step
+  bool has_gained = false;  ///< sums and `change` are those of the end of the step under way
   bool is_behind = false;   ///< rows are behind their nodes
 };
 

@@ -135,3 +135,32 @@ def test_the_exact_reflection_of_a_lumped_chain_is_the_closed_form():
         coarse = np.arcsin(2 * np.sin(fine))  # sin(k h / 2) / h is the same on both sides
         expected = (np.cos(fine) - np.cos(coarse)) / (np.cos(fine) + np.cos(coarse))
         assert exact_reflection(2, False, per_wave) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "rests", [None, lambda x: x[:, 0] > 1.0, lambda x: x[:, 0] < 1.0], ids=["none", "stiff", "soft"]
+)
+def test_a_pulse_that_meets_twice_the_impedance_comes_back_by_a_third(rests):
+    """Velocity returns as (Z1 - Z2) / (Z1 + Z2) = -1/3 and stress as 1/3; 2/3 and 4/3 go on. Compared are integrals over the
+    pulses, which dispersion leaves alone."""
+    laws = [mpm.LinearElastic(young=factor * YOUNG, poisson=0.0) for factor in (1.0, 2.0)]
+    mesh = box((160, 1), (2.0, 1 / 80), diagonals="alternating", body=((1.0, 0.0), (2.0, 1.0)))
+    model = mpm.Model(mesh, laws)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=0)
+    model.seed(density=2 * DENSITY, per_cell=3, cell_tag=1, material=1)  # as fast, so that Z is twice as large
+    wave, small = np.sqrt(moduli(YOUNG, 0.0)[2] / DENSITY), 1e-6
+    p = model.particles
+    pulse = small * np.exp(-(((p.position[:, 0] - 0.5) / 0.1) ** 2))
+    p.set("velocity", pulse[:, None] * [1.0, 0.0])
+    p.set("stress", -DENSITY * wave * pulse[:, None] * [1.0, 0.0, 0.0, 0.0])
+    rollers(model, axes=[1])
+    if rests is not None:
+        model.rest(where=rests)
+    whole = small * 0.1 * np.sqrt(np.pi)
+    run(model, 1.0 / wave, conversion=None, energy_limit=None)
+    model.convert()
+    p = model.particles
+    width, back = p.volume * 80, p.position[:, 0] < 1.0
+    for side, velocity, stress in ((back, -1 / 3, 1 / 3), (~back, 2 / 3, 4 / 3)):
+        assert (width * p.velocity[:, 0])[side].sum() / whole == pytest.approx(velocity, abs=1e-3)
+        assert -(width * p.stress[:, 0])[side].sum() / whole / (DENSITY * wave) == pytest.approx(stress, abs=1e-3)
