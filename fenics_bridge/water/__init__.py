@@ -8,7 +8,7 @@ from fenics_bridge.water.motion import Newmark
 from fenics_bridge.water.particles import apply_reservoirs
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
-from fenics_bridge.water.soils import PorousSoil
+from fenics_bridge.water.soils import PorousSoil, dipping
 from fenics_bridge.water.standing import ground_line, standing_water
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "Tabulated",
     "VanGenuchten",
     "apply_reservoirs",
+    "dipping",
     "ground_line",
     "standing_water",
 ]

@@ -72,6 +72,33 @@ class PorousSoil:
         return k if k.ndim == 2 else np.diag(np.broadcast_to(k, k.shape or (dim,)))
 
 
+def dipping(along: float, across: float, dip: float, direction: float | None = None) -> NDArray[np.float64]:
+    """Tensor of the conductivity of strata that dip, for `PorousSoil` or, over a conductivity, for `Model.add_water`.
+
+    Args:
+        along: conductivity along the strata [m/s].
+        across: conductivity across them [m/s].
+        dip: angle by which they fall below the horizontal [degrees]; in two dimensions along x.
+        direction: in three dimensions, the horizontal direction in which they fall, as an angle from x towards y [degrees].
+
+    Returns:
+        Shape (2, 2), or (3, 3) with a direction [m/s].
+
+    Raises:
+        InputError: a conductivity is not positive, or an angle is not finite.
+    """
+    for name, value in (("along", along), ("across", across)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name}: got {value!r} m/s, expected a positive number")
+    for name, value in (("dip", dip), ("direction", 0.0 if direction is None else direction)):
+        if not np.isfinite(value):
+            raise InputError(f"{name}: got {value!r} degrees, expected a finite number")
+    sine, cosine = np.sin(np.radians(dip)), np.cos(np.radians(dip))
+    turned = None if direction is None else np.radians(direction)
+    normal = np.array([sine, cosine] if turned is None else [sine * np.cos(turned), sine * np.sin(turned), cosine])
+    return along * np.eye(len(normal)) + (across - along) * np.outer(normal, normal)
+
+
 def soils_by_tag(
     domain: Mesh, soil: Any, cell_tags: MeshTags | None, dry: bool = False
 ) -> tuple[list[PorousSoil], list[Any], list[NDArray[np.int32]]]:

@@ -14,4 +14,12 @@ inline auto as_eigen(const Matrix<D>& a)
 {
   return Eigen::Map<const Eigen::Matrix<double, D, D, Eigen::RowMajor>>(a.front().data());
 }
+
+template <int D>
+inline Matrix<D> inverse(const Matrix<D>& a)
+{
+  Matrix<D> result;
+  Eigen::Map<Eigen::Matrix<double, D, D, Eigen::RowMajor>>(result.front().data()) = as_eigen<D>(a).inverse();
+  return result;
+}
 } // namespace mpm::base

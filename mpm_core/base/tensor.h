@@ -56,6 +56,15 @@ inline double dot(const Vector<D>& a, const Vector<D>& b)
   return sum;
 }
 
+/// sum += factor a
+template <int D>
+inline void add(double factor, const Matrix<D>& a, Matrix<D>& sum)
+{
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+      sum[i][j] += factor * a[i][j];
+}
+
 template <int D>
 inline Matrix<D> product(const Matrix<D>& a, const Matrix<D>& b)
 {

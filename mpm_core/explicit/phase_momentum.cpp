@@ -1,5 +1,6 @@
 #include "explicit/phase_momentum.h"
 
+#include "explicit/directed_drag.h"
 #include "model/mapping.h"
 
 #include <algorithm>
@@ -36,13 +37,6 @@ PhaseForces<D> phase_forces(const VelocityField<G>& soil, const WaterField<G>& w
   }
   return f;
 }
-
-/// Velocities of soil and water, or damping forces on them.
-template <int D>
-struct Phases
-{
-  Vector<D> soil, water;
-};
 
 /// Local damping of the node as a whole, by mass; none where the soil is held, whose reaction is no residual.
 template <int D>
@@ -85,6 +79,22 @@ Phases<D> free_velocities(const PhaseForces<D>& f, const Phases<D>& damped, cons
     end.water[a] = mean + ms / mass * relative;
   }
   return end;
+}
+
+/// Velocities at the end where the drag depends on the direction, with the soil's support.
+template <int D>
+Phases<D> directed_velocities(const PhaseForces<D>& f, const Matrix<D>& drag, const Phases<D>& damped,
+                              const Phases<D>& start, const Support<D>* support, double dt)
+{
+  Phases<D> momenta;
+  Matrix<D> by_drag{};
+  add<D>(dt, drag, by_drag);
+  for (int a = 0; a < D; ++a)
+  {
+    momenta.soil[a] = f.soil_mass * start.soil[a] + dt * (f.on_soil[a] - damped.soil[a]);
+    momenta.water[a] = f.water_mass * start.water[a] + dt * (f.on_water[a] - damped.water[a]);
+  }
+  return velocities_after_drag<D>(f.soil_mass, f.water_mass, momenta, by_drag, support);
 }
 
 /// Prescribed velocities of the soil; the water beside it has the drag of that soil.
@@ -158,11 +168,15 @@ void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, dou
     const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
     const Support<D>* support = support_of(i);
     const Phases<D> damped = damping_forces<D>(f, support, start, damping, dt);
-    Phases<D> end = free_velocities<D>(f, damped, start, dt);
+    const bool directed = !water.drag.empty() && f.water_mass > 0;
+    Phases<D> end = directed ? directed_velocities<D>(f, water.drag[i], damped, start, support, dt)
+                             : free_velocities<D>(f, damped, start, dt);
     const ImperviousNode<D>* side = side_of(i);
     if (side)
       close<D>(*side, f.soil_mass / (f.soil_mass + f.water_mass), end);
-    if (support)
+    if (support && directed)
+      impose<D>(*support, end.soil); // once more, as sides may have changed it
+    else if (support)
       hold_soil<D>(*support, f, damped, start, dt, end);
     if (side)
       close<D>(*side, 1, end);
@@ -208,22 +222,27 @@ void add_phase_work(const VelocityField<G>& soil, const WaterField<G>& water, st
     const PhaseForces<D> f = phase_forces<G>(soil, water, i, gravity, density);
     const Phases<D> start{soil.start_velocity[i], water.motion.start_velocity[i]};
     const Phases<D> damped = damping_forces<D>(f, support_of(i), start, damping, dt);
+    Vector<D> relative, drag; // at the end
+    for (int a = 0; a < D; ++a)
+    {
+      relative[a] = start.water[a] - start.soil[a] + dt * (water.motion.acceleration[i][a] - soil.acceleration[i][a]);
+      drag[a] = f.drag * relative[a];
+    }
+    if (!water.drag.empty())
+      drag = product<D>(water.drag[i], relative);
     for (int a = 0; a < D; ++a)
     {
       const double us = 0.5 * dt * (start.soil[a] + soil.velocity[i][a]);
       const double uw = 0.5 * dt * (start.water[a] + water.motion.velocity[i][a]);
-      const double relative = start.water[a] - start.soil[a] +
-                              dt * (water.motion.acceleration[i][a] - soil.acceleration[i][a]); // at the end
-      const double drag = f.drag * relative;
       const double force_s = f.soil_mass * soil.acceleration[i][a],
                    force_w = f.water_mass * water.motion.acceleration[i][a];
       totals.external_work += f.external_on_soil[a] * us + f.external_on_water[a] * uw;
       totals.internal_work +=
           (f.external_on_soil[a] - f.on_soil[a]) * us + (f.external_on_water[a] - f.on_water[a]) * uw;
       totals.damping_work += damped.soil[a] * us + damped.water[a] * uw;
-      totals.drag_work += drag * (uw - us);
-      totals.support_work += (force_s - f.on_soil[a] + damped.soil[a] - drag) * us +
-                             (force_w - f.on_water[a] + damped.water[a] + drag) * uw;
+      totals.drag_work += drag[a] * (uw - us);
+      totals.support_work += (force_s - f.on_soil[a] + damped.soil[a] - drag[a]) * us +
+                             (force_w - f.on_water[a] + damped.water[a] + drag[a]) * uw;
     }
   }
 }

@@ -1,6 +1,7 @@
 #include "implicit/pore_drying.h"
 
 #include "implicit/pore_water.h"
+#include "model/anisotropy.h"
 #include "model/integration.h"
 
 namespace mpm::implicit
@@ -17,7 +18,7 @@ struct DryingParticle
 };
 
 template <int D>
-void add_particle(const DryingParticle& particle, const Vector<D>& mobility, const Retention& retention,
+void add_particle(const DryingParticle& particle, const Matrix<D>& mobility, const Retention& retention,
                   const std::array<double, D + 1>& n, DryingCell<D>& cell)
 {
   const Wetness before = wetness_at(retention, particle.start), after = wetness_at(retention, particle.end);
@@ -26,16 +27,14 @@ void add_particle(const DryingParticle& particle, const Vector<D>& mobility, con
   const double content = after.saturation * gained + (after.saturation - before.saturation) * particle.porosity;
   const double capacity = after.saturation * particle.storage + after.by_saturation * (gained + particle.porosity);
   cell.pressure += volume * (after.effective * particle.end - particle.standing);
-  for (int a = 0; a < D; ++a)
-    cell.flux[a] += volume * after.permeability * mobility[a];
+  add<D>(volume * after.permeability, mobility, cell.flux);
   for (int k = 0; k <= D; ++k)
   {
     const double weight = volume * n[k];
     cell.by_pressure[k] += weight * (after.effective + after.by_effective * particle.end);
     cell.content[k] += weight * content;
     cell.wet[k] += weight * after.saturation;
-    for (int a = 0; a < D; ++a)
-      cell.flux_by_pressure[k][a] += weight * after.by_permeability * mobility[a];
+    add<D>(weight * after.by_permeability, mobility, cell.flux_by_pressure[k]);
     for (int l = 0; l <= D; ++l)
       cell.capacity[k][l] += weight * n[l] * capacity;
   }
@@ -53,7 +52,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, water, run.cell);
     const double growth = growth_of(mesh, field, step, run.cell);
-    const auto anisotropy = anisotropy_of<D>(water, run.material);
+    const Matrix<D> anisotropy = anisotropy_of<D>(water, run.material).tensor;
     for (Index p = run.first; p < run.last; ++p)
     {
       const Vector<D> x = at<D>(particles.position, p);
@@ -68,9 +67,8 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
                                     particles.pore_pressure[0][p],
                                     end,
                                     pressure_at<D>(standing, n)};
-      Vector<D> mobility = anisotropy;
-      for (double& component : mobility)
-        component *= step.dt * particles.conductivity[0][p] / water.unit_weight;
+      Matrix<D> mobility{};
+      add<D>(step.dt * particles.conductivity[0][p] / water.unit_weight, anisotropy, mobility);
       add_particle<D>(particle, mobility, water.retention[static_cast<std::size_t>(run.material)], n,
                       pore.drying[static_cast<std::size_t>(run.cell)]);
     }

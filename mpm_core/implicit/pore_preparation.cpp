@@ -2,6 +2,7 @@
 
 #include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
+#include "model/anisotropy.h"
 #include "model/integration.h"
 #include "transfer/resting.h"
 
@@ -20,7 +21,8 @@ template <int D>
 struct PoreSums
 {
   double volume = 0;     ///< 1
-  Vector<D> mobility{};  ///< k / gamma_w along each axis
+  Matrix<D> mobility{};  ///< k / gamma_w
+  double least = 0;      ///< likewise, of the direction in which that is least
   double compliance = 0; ///< 1 / M + n / K_w + n dS/dp, the compliance of the soil without drainage
   double swung = 0;      ///< likewise, of soil whose mass resists too: what the pressure projection goes by
 };
@@ -69,7 +71,8 @@ MeanShapes<D> mean_shapes(const CellShape<D>& shape, const CellMoments<G>& momen
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
                   double modulus, double inertia, double factor, const StandingWater<D>& standing,
-                  const CellMoments<G>& moments, PoreCell<D>& cell, PoreSums<D>& sums, std::vector<NodalWater>& nodes)
+                  const Anisotropy<D>& anisotropy, const CellMoments<G>& moments, PoreCell<D>& cell, PoreSums<D>& sums,
+                  std::vector<NodalWater>& nodes)
 {
   const bool dries = water.may_dry(); // then what is stored depends on the iterate
   const Vector<D> x = at<D>(particles.position, p);
@@ -77,8 +80,6 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
   const double mobility = particles.conductivity[0][p] / water.unit_weight;
-  const auto anisotropy = anisotropy_of<D>(water, run.material);
-  const double largest = *std::ranges::max_element(anisotropy) * mobility;
   double stored = storage;
   if (dries)
     stored += particles.porosity[0][p] *
@@ -87,8 +88,8 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
   add_pore_load(mesh.shapes[run.cell], particles, water, standing, moments, run.material, p, volume, cell.load);
   sums.volume += volume;
-  for (int a = 0; a < D; ++a)
-    sums.mobility[a] += volume * anisotropy[a] * mobility;
+  add<D>(volume * mobility, anisotropy.tensor, sums.mobility);
+  sums.least += volume * mobility * anisotropy.least;
   sums.compliance += volume * compliance;
   sums.swung += volume * (1 / (modulus + inertia * particles.mass[p] / particles.volume[p]) + stored);
   for (int k = 0; k <= D; ++k)
@@ -104,7 +105,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
     NodalWater& sum = nodes[node];
     sum.volume += weight;
     sum.pressure += weight * there;
-    sum.mobility += weight * largest;
+    sum.mobility += weight * mobility * anisotropy.largest;
     sum.compliance += weight * compliance;
   }
 }
@@ -113,7 +114,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
 template <int D>
 void add_projection(const PoreSums<D>& sums, double edge_squared, double dt, PoreCell<D>& cell)
 {
-  const double margin = 1.5 * sums.swung - 6 * dt * *std::ranges::min_element(sums.mobility) / edge_squared;
+  const double margin = 1.5 * sums.swung - 6 * dt * sums.least / edge_squared;
   const double factor = projection_margin * std::max(0.0, margin) / (D + 2);
   for (int k = 0; k <= D; ++k)
     for (int l = 0; l <= D; ++l)
@@ -142,9 +143,10 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, *model.water, run.cell);
+    const auto anisotropy = anisotropy_of<D>(*model.water, run.material);
     const double inertia = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing,
+      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing, anisotropy,
                       field.moments[run.cell], step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)],
                       nodes);
   }
@@ -152,8 +154,7 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   {
     PoreCell<D>& cell = step.pore.cells[c];
     const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
-    for (int a = 0; a < D; ++a)
-      cell.flux[a] = step.dt * of_cell.mobility[a];
+    add<D>(step.dt, of_cell.mobility, cell.flux);
     cell.compliance = of_cell.compliance;
     add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
   }

@@ -13,7 +13,7 @@ template <int D>
 struct PoreCell
 {
   PoreLoad<D> load;               ///< of the pressures at the start, and of standing water
-  Vector<D> flux;                 ///< sum V k dt / gamma_w along each axis [m5/Pa]
+  Matrix<D> flux;                 ///< sum V k dt / gamma_w, symmetric [m5/Pa]
   double compliance;              ///< sum V (1 / M + n / K_w), of the soil without drainage [m3/Pa]
   double grains;                  ///< largest 1 - n of its particles: a volume below that has no pores
   std::array<double, D + 1> mean; ///< W_k = sum V N_k [m3]
@@ -30,8 +30,8 @@ struct DryingCell
   std::array<double, D + 1> content;     ///< water that is stored by the end, less that at the start [m3]
   std::array<double, D + 1> wet;         ///< sum V S N_k, its derivatives by the volumetric strain [m3]
   std::array<std::array<double, D + 1>, D + 1> capacity; ///< and by the pressures, without the projection [m3/Pa]
-  Vector<D> flux;                                        ///< sum V k_r k dt / gamma_w along each axis [m5/Pa]
-  std::array<Vector<D>, D + 1> flux_by_pressure;         ///< [m5/Pa2]
+  Matrix<D> flux;                                        ///< sum V k_r k dt / gamma_w, symmetric [m5/Pa]
+  std::array<Matrix<D>, D + 1> flux_by_pressure;         ///< [m5/Pa2]
 };
 
 /// Means over the particles around a node, over all ranks, the pressure and the others by volume; plain doubles.
@@ -76,14 +76,11 @@ struct PoreStep
   std::vector<double> content;     ///< water that the soil takes up less what flows to it [m3], over all ranks
 };
 
-/// Water that a gradient drives through the soil of a cell, against another one: sum f_a g_a h_a.
+/// Water that a gradient drives through the soil of a cell, against another one: g . f h.
 template <int D>
-inline double flow(const Vector<D>& flux, const Vector<D>& gradient, const Vector<D>& other)
+inline double flow(const Matrix<D>& flux, const Vector<D>& gradient, const Vector<D>& other)
 {
-  double sum = 0;
-  for (int a = 0; a < D; ++a)
-    sum += flux[a] * gradient[a] * other[a];
-  return sum;
+  return dot<D>(gradient, product<D>(flux, other));
 }
 
 /// Volume of the particles of a cell: its vertices' parts together [m3].

@@ -117,6 +117,16 @@ double upward(const Mesh<D>& mesh, Index cell, const std::array<double, D + 1>& 
   const double length = norm<D>(inward);
   return length > 0 ? std::max(0.0, -inward[D - 1] / length) : 0;
 }
+
+template <int D>
+double largest_diagonal(const Matrix<D>& a)
+{
+  double largest = 0;
+  for (int i = 0; i < D; ++i)
+    largest = std::max(largest, a[i][i]);
+  return largest;
+}
+
 /// Outflow over a step by pressure, per area: from the cell's own soil, or from that around its nodes where it has
 /// none.
 template <class G, int D = G::dim>
@@ -125,7 +135,7 @@ double outflow_per_area(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::s
   const PoreCell<D>& cell = step.pore.cells[c];
   const double h = cell_size<D>(mesh.shapes[c].volume), volume = volume_of(cell);
   if (volume > 0)
-    return penalty * (*std::ranges::max_element(cell.flux) / h + cell.compliance * h) / volume;
+    return penalty * (largest_diagonal<D>(cell.flux) / h + cell.compliance * h) / volume;
   double largest = 0;
   for (Index node : mesh.cells[c])
     largest = std::max(largest, step.dt * nodes[node].mobility / h + nodes[node].compliance * h);

@@ -177,18 +177,19 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   const Index row = mesh.cells[c][k], column = mesh.cells[c][l];
   const double unit = pore.unit;
   const double volume = volume_of(cell);
-  const Vector<D>& flux = flux_of(pore, c);
+  const Matrix<D>& flux = flux_of(pore, c);
   const double inertia = step.options.quasi_static
                              ? 0
                              : pore.density * cell.mean[l] / (volume * step.stage.weight * step.stage.dt * step.dt);
   Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
+  const Vector<D> outflow = product<D>(flux, shape.gradient[k]);
   for (int a = 0; a < D; ++a)
   {
     forces[a] *= pore.held[column] ? 0 : -unit * (dries ? pore.drying[c].by_pressure[l] : cell.mean[l]);
     const double wet = !dries             ? cell.mean[k]
                        : step.options.nmd ? 0
                                           : pore.drying[c].wet[k]; // averaged: see averaging.h
-    volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * flux[a] * shape.gradient[k][a]);
+    volumes[a] = pore.held[row] ? 0 : -unit * (wet * volumes[a] + inertia * outflow[a]);
   }
   double water = cell.capacity[k][l] + flow<D>(flux, shape.gradient[k], shape.gradient[l]);
   if (dries)

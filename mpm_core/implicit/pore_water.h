@@ -56,9 +56,9 @@ double growth_of(const Mesh<D>& mesh, const VelocityField<G>& field, const Impli
                           : volume_strain(mesh, field, step.dt, cell);
 }
 
-/// Sum V k_r k dt / gamma_w of a cell along each axis, under the iterate.
+/// Sum V k_r k dt / gamma_w of a cell, under the iterate.
 template <int D>
-inline const Vector<D>& flux_of(const PoreStep<D>& pore, Index cell)
+inline const Matrix<D>& flux_of(const PoreStep<D>& pore, Index cell)
 {
   return pore.drying.empty() ? pore.cells[cell].flux : pore.drying[cell].flux;
 }

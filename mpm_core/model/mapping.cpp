@@ -159,6 +159,8 @@ void map_to_nodes(Model<G>& model)
       add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, water.motion.nodes);
   sum_shared(model.exchange, water.motion.nodes);
   sum_shared(model.exchange, water.nodes);
+  if (!model.water->anisotropy.empty())
+    sum_shared(model.exchange, water.drag);
 }
 
 template <class G>

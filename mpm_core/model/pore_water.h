@@ -2,6 +2,7 @@
 /// @file
 /// Water in the pores of the soil: what a model knows of it beside the columns of its particles.
 
+#include "base/tensor.h"
 #include "base/types.h"
 #include "model/retention.h"
 
@@ -44,25 +45,15 @@ struct PoreWater
   double suction_limit = std::numeric_limits<double>::infinity(); ///< below that pores are not full; explicit runs [Pa]
   bool drained_surface = false; ///< whether the pressure is zero at the free surface, wherever that is
   std::vector<PressureCondition> conditions;
-  std::vector<std::array<double, 3>> anisotropy; ///< of each law: conductivities along the axes over k; none where one
-  std::vector<Retention> retention;              ///< of the soil of each law; none where all soil stays saturated
-  TimeTable standing; ///< level of water that stands over the free surface [m]; none without such water
-  TimeTable rain;     ///< on the free surface above that water, per horizontal area [m/s]; likewise
-  double inflow = 0;  ///< water that has entered at the nodes of this rank since the start [m3]
-  double time = 0;    ///< for which loads and levels are wanted: the end of an implicit step [s]
+  std::vector<Matrix<3>> anisotropy; ///< of each law: tensor of the conductivity over k; none where one
+  std::vector<Retention> retention;  ///< of the soil of each law; none where all soil stays saturated
+  TimeTable standing;                ///< level of water that stands over the free surface [m]; none without such water
+  TimeTable rain;                    ///< on the free surface above that water, per horizontal area [m/s]; likewise
+  double inflow = 0;                 ///< water that has entered at the nodes of this rank since the start [m3]
+  double time = 0;                   ///< for which loads and levels are wanted: the end of an implicit step [s]
 
   bool may_dry() const { return !retention.empty(); }
 };
-
-/// Conductivities of the soil of a law along the axes, over those of its particles.
-template <int D>
-inline Vector<D> anisotropy_of(const PoreWater& water, Index material)
-{
-  Vector<D> factors;
-  for (int a = 0; a < D; ++a)
-    factors[a] = water.anisotropy.empty() ? 1 : water.anisotropy[static_cast<std::size_t>(material)][a];
-  return factors;
-}
 
 /// Pressure of the water that stands over the soil, at a height [Pa].
 inline double standing_pressure(const PoreWater& water, double height)

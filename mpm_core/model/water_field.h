@@ -44,7 +44,9 @@ struct WaterField
   VelocityField<G> motion;
   std::vector<PoreMoments<D>> cells;
   std::vector<PoreNode<D>> nodes;
-  std::vector<unsigned char> supplied;       ///< per node: 1 where water may enter the soil
+  std::vector<Matrix<D>> resistance;   ///< of cells: K^-1 k of their soils by their drag; empty where soil is isotropic
+  std::vector<Matrix<D>> drag;         ///< of nodes, in the place of c_i: sum V_p n^2 gamma_w K^-1 N_i; likewise
+  std::vector<unsigned char> supplied; ///< per node: 1 where water may enter the soil
   std::vector<ImperviousNode<D>> impervious; ///< by rising node
   std::vector<Vector<D>> flux;               ///< j_i = m_w,i / V_i (w_i - v_i) [kg/(m2 s)]
 };

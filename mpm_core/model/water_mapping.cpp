@@ -1,5 +1,6 @@
 #include "model/water_mapping.h"
 
+#include "model/anisotropy.h"
 #include "model/mapping.h"
 #include "parallel/agreement.h"
 #include "transfer/lanes.h"
@@ -196,15 +197,29 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
     motion.moments[c] = {};
     field.cells[c] = {};
   }
+  field.resistance.assign(water.anisotropy.empty() ? 0 : field.cells.size(), {});
+  const auto resist = [&](const Run& run, double drag)
+  {
+    if (!field.resistance.empty())
+      add<D>(drag, resistance_of<D>(water, run.material), field.resistance[run.cell]);
+  };
   for (const Run& run : runs)
-    add_moments<G>(particles, water.unit_weight, run, mesh.shapes[run.cell], motion.moments[run.cell],
-                   field.cells[run.cell]);
+  {
+    PoreMoments<D>& pores = field.cells[run.cell];
+    const double before = pores.drag;
+    add_moments<G>(particles, water.unit_weight, run, mesh.shapes[run.cell], motion.moments[run.cell], pores);
+    resist(run, pores.drag - before);
+  }
   for (const Run& run : soil.resting.runs)
+  {
     add_resting_moments<G>(particles, water.unit_weight, run.first, soil.moments[run.cell], motion.moments[run.cell],
                            field.cells[run.cell]);
+    resist(run, field.cells[run.cell].drag);
+  }
   particles_to_nodes(mesh, exchange, particles, runs, motion);
   for (Index i : motion.part.nodes)
     field.nodes[i] = {};
+  field.drag.assign(field.resistance.empty() ? 0 : field.nodes.size(), {});
   for (Index c : motion.part.cells)
     for (int k = 0; k <= D; ++k)
     {
@@ -214,7 +229,10 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
       for (int a = 0; a < D; ++a)
         node.outward[a] += motion.moments[c].volume * gradient[a];
       node.volume += at_vertex<D>(motion.moments[c].volume, field.cells[c].volume_xi, gradient);
-      node.drag += at_vertex<D>(field.cells[c].drag, field.cells[c].drag_xi, gradient);
+      const double drag = at_vertex<D>(field.cells[c].drag, field.cells[c].drag_xi, gradient);
+      node.drag += drag;
+      if (!field.drag.empty() && field.cells[c].drag > 0)
+        add<D>(drag / field.cells[c].drag, field.resistance[c], field.drag[mesh.cells[c][k]]);
     }
 }
 

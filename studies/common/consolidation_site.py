@@ -30,7 +30,7 @@ from .slope_case import GRAVITY
 from .water_site import DAY, condition, porous_soil
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points")
-POROUS = ("conductivity", "porosity")
+POROUS = ("conductivity", "dip", "porosity")
 
 
 @dataclass
@@ -78,14 +78,10 @@ class ConsolidationSite:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
 
         Raises:
-            InputError: the water has a boundary condition other than reservoirs, or a conductivity that is a tensor.
+            InputError: the water has a boundary condition other than reservoirs.
         """
         model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
         for k, (soil, weight) in enumerate(self.unit_weight.items()):
-            if np.ndim(self.soils[soil].conductivity) > 1:
-                raise mpm.InputError(
-                    f"soils.{soil}: conductivity: is a tensor, expected one along each axis for particles"
-                )
             for tag in model.mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=k)
         bridge.apply_supports(model, self.supports)

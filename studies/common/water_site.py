@@ -6,7 +6,7 @@ Example of a file:
     cell_size = 0.6                    # and other constants of the .geo file under [constants]
 
     [soils.core]                       # a physical group of the mesh
-    conductivity = 1e-8                # m/s; or [along x, along y]
+    conductivity = 1e-8                # m/s; or [along x, along y], or along and across strata with dip = 20.0 [degrees]
     porosity = 0.42
     compressibility = 2e-7             # 1/Pa
     van_genuchten = {alpha = 6e-5, n = 1.4, residual = 0.15, air_entry = 200.0}   # or gardner, free_surface, tabulated
@@ -34,7 +34,7 @@ MM_PER_DAY = 1e-3 / DAY
 KEYS = ("mesh", "cell_size", "constants", "soils", "boundaries")
 CURVES = {"van_genuchten": water.VanGenuchten, "gardner": water.Gardner, "free_surface": water.FreeSurface,
           "tabulated": water.Tabulated}  # fmt: skip
-SOIL_KEYS = ("conductivity", "porosity", "compressibility", *CURVES)
+SOIL_KEYS = ("conductivity", "dip", "porosity", "compressibility", *CURVES)
 CONDITIONS: dict[str, tuple[Callable, float]] = {
     "head": (water.Head, 1.0),
     "reservoir": (water.Reservoir, 1.0),
@@ -95,11 +95,20 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
         )
     try:
         parameters = {key: value for key, value in given.items() if key not in CURVES}
+        if "dip" in parameters:
+            parameters["conductivity"] = _of_strata(given["conductivity"], parameters.pop("dip"))
         if curves:
             parameters["retention"] = CURVES[curves[0]](**given[curves[0]])
         return water.PorousSoil(**parameters)
     except (TypeError, mpm.InputError) as error:
         raise mpm.InputError(f"{where}: {error}") from None
+
+
+def _of_strata(conductivity: Any, dip: float) -> Any:
+    """Tensor of the conductivities along and across strata that dip [degrees] along x."""
+    if not isinstance(conductivity, list) or len(conductivity) != 2:
+        raise mpm.InputError(f"dip: conductivity is {conductivity!r} m/s, expected [along, across] the strata")
+    return water.dipping(*conductivity, dip)
 
 
 def condition(name: str, given: dict, where: str) -> Any:

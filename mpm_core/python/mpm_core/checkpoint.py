@@ -260,7 +260,7 @@ def _water(model: Model) -> dict[str, Any] | None:
         **surface,
         "conditions": [list(one) for one in model._water_conditions],
         "retention": curves,
-        "anisotropy": [list(factors) for factors in water.anisotropy],
+        "anisotropy": [[list(row) for row in tensor] for tensor in water.anisotropy],
     }
 
 
@@ -274,7 +274,9 @@ def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
             setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
     for name in _OF_SURFACE:
         setattr(water, name, [(time, value) for time, value in entry.get(name, [])])
-    water.anisotropy = [tuple(factors) for factors in entry.get("anisotropy", [])]
+    water.anisotropy = [  # older checkpoints have the factors along the axes
+        (tensor if np.ndim(tensor) == 2 else np.diag(tensor).tolist()) for tensor in entry.get("anisotropy", [])
+    ]
     model._set_retention(water, [[np.asarray(values) for values in of_law] for of_law in entry.get("retention", [])])
     model._core.water = water
     model._set_water_conditions(

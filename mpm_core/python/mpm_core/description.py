@@ -133,7 +133,7 @@ _FIELD_CONTACT = {
 _WATER = {
     "unit_weight": _is_number, "modulus": str, "suction_limit?": str,  # texts, as they may be infinite
     "kozeny_carman": bool, "drained_surface": bool, "standing?": [_PAIR], "rain?": [_PAIR], "retention?": [[[_is_number]]],
-    "anisotropy?": [(_is_number, _is_number, _is_number)],
+    "anisotropy?": [AnyOf([(_is_number,) * 3, ((_is_number,) * 3,) * 3])],
     "conditions": [(_is_tag, AnyOf([_is_number, [_PAIR]]), _is_number, bool, bool)],
 }  # fmt: skip
 _CONTROL = {"longest": _is_positive, "length": _is_positive, "iterations?": _is_positive, "cuts?": _is_positive}

@@ -85,8 +85,9 @@ class PoreWater(Conditions):
                 where soil stays saturated): an object with functions ``saturation``, ``effective`` and
                 ``relative_permeability`` of the suction [Pa], such as `fenics_bridge.water.VanGenuchten`. Effective stress is
                 Bishop's, with the effective saturation; particles become lighter as they dry.
-            anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, in implicit runs; or a list with
-                those of each law (None for 1 along all). Axes are fixed in space.
+            anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, or their tensor, (D, D), symmetric
+                with positive principal values, of strata that dip for instance (`fenics_bridge.water.dipping`); or a list with
+                one for each law (None for 1 in all directions). Axes are fixed in space.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
@@ -105,7 +106,7 @@ class PoreWater(Conditions):
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             _require_pores(n, k)
             self._set_retention(water, curves_of_laws(retention, self.laws))
-            water.anisotropy = factors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
+            water.anisotropy = tensors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
                 raise InputError(
                     "laws has an Undrained one, whose pores hold water already; expected laws of effective stress"
@@ -391,28 +392,37 @@ def refuse_water(body: PoreWater, scheme: str) -> None:
         )
 
 
-def factors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[tuple[float, float, float]]:
-    """Factors of the conductivity along three axes for each law; nothing where all soil is isotropic.
+def tensors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[list[list[float]]]:
+    """Tensors of the conductivity over its number for each law, (3, 3); nothing where all soil is isotropic.
 
     Raises:
-        InputError: not (D,), or one for each law, or a factor that is not positive.
+        InputError: neither (D,) nor (D, D), nor one for each law, or a tensor that is not symmetric and positive.
     """
     if anisotropy is None:
         return []
     one_each = isinstance(anisotropy, (list, tuple)) and any(part is None or np.ndim(part) for part in anisotropy)
+    if one_each and len(anisotropy) != laws and None not in anisotropy and np.shape(anisotropy) == (dim, dim):
+        one_each = False  # a tensor, as lists
     given = list(anisotropy) if one_each else [anisotropy] * laws
     if len(given) != laws:
         raise InputError(
             f"anisotropy has {len(given)} entries, expected {dim} factors, or an entry for each of the {laws} laws"
         )
-    factors = []
-    for entry in given:
-        try:
-            values = np.ones(dim) if entry is None else np.asarray(entry, dtype=float)
-        except (TypeError, ValueError):
-            values = np.empty(0)
-        if values.shape != (dim,) or not (np.all(np.isfinite(values)) and np.all(values > 0)):
-            raise InputError(f"anisotropy is {entry!r}, expected {dim} positive factors, one along each axis")
-        x, y, z = (*values, 1.0)[:3]
-        factors.append((float(x), float(y), float(z)))
-    return factors
+    return [_tensor(entry, dim) for entry in given]
+
+
+def _tensor(entry: Any, dim: int) -> list[list[float]]:
+    try:
+        values = np.ones(dim) if entry is None else np.asarray(entry, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    square = np.diag(values) if values.shape == (dim,) else values
+    good = square.shape == (dim, dim) and bool(np.all(np.isfinite(square))) and np.allclose(square, square.T)
+    if not (good and np.linalg.eigvalsh(square)[0] > 0):
+        raise InputError(
+            f"anisotropy is {entry!r}, expected {dim} positive factors, one along each axis, or a symmetric ({dim}, {dim}) tensor "
+            "with positive principal values"
+        )
+    tensor = np.eye(3)
+    tensor[:dim, :dim] = 0.5 * (square + square.T)
+    return tensor.tolist()

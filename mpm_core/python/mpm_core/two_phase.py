@@ -37,7 +37,6 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
         "rigid surfaces": bool(model._contacts),
         "absorbing sides": bool(model._absorbing),
         "retention curves": model._core.water.may_dry,
-        "conductivities that depend on the direction": bool(model._core.water.anisotropy),
         "Rayleigh damping": rayleigh != Rayleigh(),
         "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
         f"stress_update {stress_update}": stress_update != StressUpdate.MODIFIED_LAST,

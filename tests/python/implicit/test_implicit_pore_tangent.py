@@ -30,7 +30,7 @@ def started_step(dim, law, *, quasi_static, round=False, mixed=False, nmd=False,
     model.set_gravity([0.0] * (dim - 1) + [-9.81])
     retention = VanGenuchten(alpha=4e-4, n=2.0, residual=0.1) if dries else None
     model.add_water(porosity=0.4, conductivity=lambda x: 1e-3 * (1 + x[:, 0]), modulus=1e7, drained_surface=True,
-                    retention=retention, anisotropy=np.linspace(3.0, 0.5, dim))  # fmt: skip
+                    retention=retention, anisotropy=np.diag(np.linspace(3.0, 0.5, dim)) + 0.4)  # fmt: skip
     model.set_pore_pressure(lambda x: 5e3 * (1.0 - x[:, -1]) + 1e3 * x[:, 0] - (4e3 if dries else 0.0))
     model.stand_water(0.4)
     model.hold_pore_pressure(2 * dim, 100.0)

@@ -5,6 +5,7 @@ import pytest
 from core_cases import box
 
 import mpm_core as mpm
+from fenics_bridge.water import dipping
 
 POROSITY, GRAINS, WATER, GAMMA = 0.4, 2650.0, 1000.0, 9810.0
 DENSITY = (1 - POROSITY) * GRAINS + POROSITY * WATER
@@ -13,7 +14,7 @@ OEDOMETER = ELASTIC.p_wave_modulus
 LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
 
 
-def column(cells, *, conductivity=1e-3, modulus=2.2e8, law=ELASTIC, height=1.0, dim=2):
+def column(cells, *, conductivity=1e-3, modulus=2.2e8, law=ELASTIC, height=1.0, dim=2, anisotropy=None):
     """A saturated column on a fixed base between rollers, two cells wide."""
     size = 2 * height / cells
     mesh = box(
@@ -25,7 +26,7 @@ def column(cells, *, conductivity=1e-3, modulus=2.2e8, law=ELASTIC, height=1.0, 
         for end in (1, 2):
             model.roller(2 * axis + end, np.eye(dim)[axis])
     model.fix(2 * dim - 1)
-    model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus)
+    model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus, anisotropy=anisotropy)
     return model
 
 
@@ -57,6 +58,43 @@ def test_a_loaded_column_consolidates_as_terzaghi_has_it(dim, cells, error):
         degree = 1 - np.sum(2 / m**2 * np.exp(-(m**2) * factor))
         left = -model.water_inflow() / (width ** (dim - 1) * load / OEDOMETER)
         assert left == pytest.approx(degree, abs=error / 2)
+
+
+@pytest.mark.parametrize(
+    "factors", [(1.0, 1.0), (50.0, 0.5), dipping(50.0, 0.5, 35.0)], ids=["isotropic", "level", "dips"]
+)
+@pytest.mark.parametrize("held", [False, True], ids=["free", "held"])
+def test_the_drag_of_a_step_follows_the_direction_of_the_flow(factors, held):
+    """Water that moves through soil at rest, everywhere alike: m_s v = dt C (w - v), m_w (w - w_0) = -dt C (w - v), with C the
+    inverse of the conductivity; held soil stays."""
+    model = mpm.Model(box([2, 2] if not held else [1, 1], [1.0, 1.0]), ELASTIC)
+    model.seed(density=DENSITY, per_cell=3)
+    model.add_water(porosity=POROSITY, conductivity=2e-4, modulus=2.2e8, anisotropy=factors)
+    for side in (LEFT, RIGHT, BASE, TOP) if held else ():
+        model.fix(side)
+        model.hold_pore_pressure(side, 0.0)
+    list(model.explicit(1e-9))
+    first, dt = np.array([0.3, -0.1]), 2e-5
+    model.particles.set("water_velocity", np.tile(first, (len(model.particles), 1)))
+    list(model.explicit(model.time + dt, dt=dt))
+    k = 2e-4 * (np.diag(factors) if np.ndim(factors) == 1 else factors)
+    drag, soil, wet = POROSITY**2 * GAMMA * np.linalg.inv(k), (1 - POROSITY) * GRAINS, POROSITY * WATER
+    relative = np.linalg.solve(np.eye(2) + dt * drag * ((0 if held else 1 / soil) + 1 / wet), first)
+    v = np.zeros(2) if held else wet / (soil + wet) * (first - relative)
+    p = model.particles
+    assert np.linalg.norm(relative) < 0.97 * np.linalg.norm(first)
+    np.testing.assert_allclose(p.velocity, np.tile(v, (len(p), 1)), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(p.water_velocity - p.velocity, np.tile(relative, (len(p), 1)), rtol=0, atol=1e-6)
+
+
+def test_a_column_of_level_strata_consolidates_by_the_conductivity_across_them():
+    left = []
+    for conductivity, anisotropy in ((1e-4, None), (2e-4, (100.0, 0.5))):
+        model = column(12, conductivity=conductivity, modulus=2.2e7, anisotropy=anisotropy)
+        model.traction(TOP, (0.0, -10e3))
+        list(model.explicit(0.2, nmd=True))
+        left.append(model.water_inflow())
+    assert left[0] < 0 and left[1] == pytest.approx(left[0], rel=1e-3)
 
 
 # --- waves ------------------------------------------------------------------------------------------------------------
@@ -299,10 +337,6 @@ def test_input_that_explicit_water_cannot_work_with():
         light.explicit(1.0)
     with pytest.raises(mpm.InputError, match="without DUAL_DOMAIN integration"):
         model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)
-    with pytest.raises(mpm.InputError, match="without conductivities that depend on the direction"):
-        layered = column(4)
-        layered.add_water(porosity=0.4, conductivity=1e-3, anisotropy=(2.0, 1.0))
-        layered.explicit(1.0)
     with pytest.raises(mpm.InputError, match="suction_limit is -1.0 Pa, expected 0 or more"):
         model.add_water(porosity=0.4, conductivity=1e-3, suction_limit=-1.0)
     with pytest.raises(mpm.InputError, match="above the critical time step"):

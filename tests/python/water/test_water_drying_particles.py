@@ -64,7 +64,9 @@ def test_a_column_that_drains_is_that_of_finite_elements_and_loses_no_water(nmd)
     held, entered, mass = model.water_volume(), 0.0, model.particles.mass.sum()
     dt = 20.0
     while model.time < 3e5:
-        *_, report = model.implicit(model.time + dt, dt=dt, quasi_static=True, nmd=nmd, solver=mpm.Newton(tolerance=1e-11))
+        *_, report = model.implicit(
+            model.time + dt, dt=dt, quasi_static=True, nmd=nmd, solver=mpm.Newton(tolerance=1e-11)
+        )
         assert fem.advance(dt).converged and report.cuts == 0 and report.iterations <= 8
         now, inflow = model.water_volume(), model.water_inflow()
         assert now - held == pytest.approx(inflow - entered, abs=1e-10 * held)
@@ -178,7 +180,7 @@ def test_a_level_at_facets_follows_its_table():
 
 
 def test_a_restart_knows_curves_levels_and_rain(tmp_path):
-    def bank(anisotropy=(5.0, 0.5)):
+    def bank(anisotropy=((5.0, 1.0), (1.0, 0.5))):
         model = column(cells=8, height=0.9, air=2, drained_surface=True, anisotropy=anisotropy)
         model.stand_water([(0.0, 0.5), (500.0, 0.2)])
         model.rain([(0.0, 0.0), (500.0, 2e-6)])
@@ -219,6 +221,8 @@ class Tight(water.Gardner):
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=[CURVE, CURVE]), "2 curves, expected one"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, retention=3.0), r"retention is 3.0, which has no saturation\(\)"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=(1.0, 0.0)), "0.0.*expected 2 positive factors"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=[[1.0, 2.0], [2.0, 1.0]]), "positive principal values"),
+        (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=np.array([[1.0, 0.5], [0.0, 1.0]])), "a symmetric"),
         (lambda m: m.add_water(porosity=0.4, conductivity=1e-6, anisotropy=[None, (1, 1)]), "has 2 entries, expected 2 factors"),
         (lambda m: m.rain(1e-6), "no retention curve"),
         (lambda m: m.stand_water(1.0), "level: the free surface is not drained"),

@@ -7,6 +7,7 @@ from core_cases import box
 from water_particle_cases import ELASTIC, Column, layer, on_box
 
 import mpm_core as mpm
+from fenics_bridge.water import dipping
 
 PLASTIC = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=6e3, friction_angle=25.0, dilation_angle=5.0)
 
@@ -24,7 +25,9 @@ def terzaghi_base(factor):
 # --- the same as finite elements -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("anisotropy", [None, (20.0, 0.5)], ids=["isotropic", "anisotropic"])
+@pytest.mark.parametrize(
+    "anisotropy", [None, (20.0, 0.5), dipping(20.0, 0.5, 30.0)], ids=["isotropic", "level", "dips"]
+)
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
 @pytest.mark.parametrize("modulus", [np.inf, 2.2e8])
 def test_particles_at_centroids_are_the_stabilised_finite_elements(law, modulus, anisotropy):

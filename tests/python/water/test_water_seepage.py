@@ -101,6 +101,20 @@ def test_an_inclined_anisotropy_turns_the_flow():
     assert velocity == pytest.approx([3e-6, 1e-6], rel=1e-9)
 
 
+def test_strata_that_dip_conduct_along_and_across_themselves():
+    angle = np.radians(30.0)
+    tensor = water.dipping(5e-6, 1e-7, 30.0)
+    down, across = np.array([np.cos(angle), -np.sin(angle)]), np.array([np.sin(angle), np.cos(angle)])
+    assert tensor @ down == pytest.approx(5e-6 * down) and tensor @ across == pytest.approx(1e-7 * across)
+    tensor = water.dipping(5e-6, 1e-7, 30.0, direction=90.0)  # they fall along y
+    assert tensor @ [0, *down] == pytest.approx(5e-6 * np.array([0, *down]))
+    assert tensor @ [1, 0, 0] == pytest.approx([5e-6, 0, 0]) and tensor @ [0, *across] == pytest.approx(
+        1e-7 * np.array([0, *across])
+    )
+    with pytest.raises(InputError, match="across: got 0.0 m/s, expected a positive number"):
+        water.dipping(1e-6, 0.0, 30.0)
+
+
 @pytest.mark.parametrize("degree, order", [(1, 1.8), (2, 2.8)])
 def test_steady_infiltration_follows_gardners_closed_form(degree, order):
     # alpha psi = ln(r - (r - 1) exp(-alpha z)) above a water table, r = q / k (0.5 here)
