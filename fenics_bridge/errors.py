@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
 from mpm_core import InputError
 
 T = TypeVar("T")
 
-__all__ = ["InputError", "agree", "on_root"]
+__all__ = ["InputError", "agree", "is_finite", "on_root"]
 
 
 def agree(comm: MPI.Comm, message: str | None) -> None:
@@ -55,3 +56,8 @@ def on_root(comm: MPI.Comm, task: Callable[[], T]) -> T | None:
             message = str(error)
     agree(comm, message)
     return result
+
+
+def is_finite(value: Any) -> bool:
+    """Whether a value is a number, and a finite one."""
+    return isinstance(value, (int, float, np.number)) and bool(np.isfinite(value))

@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.fem.active_cells import cells_there
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
@@ -285,7 +285,7 @@ class Consolidation(ConsolidationResults):
         Note:
             Collective.
         """
-        agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
+        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
         self._take_boundary()
         end, stored = self.time + dt, self.stored_water()
         load = self.load_at(end)

@@ -11,7 +11,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.fem.active_cells import cells_there, given_stress, lonely_nodes, take_over
 from fenics_bridge.fem.fields import dilation
 from fenics_bridge.fem.supports import Constraints
@@ -66,7 +66,7 @@ def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
 def _check(model: Any, off: Any, duration: float) -> None:
     comm = model.domain.comm
     agree(comm, "reconfigure: it has inertia, expected quasi-static steps" if model.motion is not None else None)
-    good = np.isfinite(duration) and duration >= 0
+    good = is_finite(duration) and duration >= 0
     agree(comm, None if good else f"duration: got {duration!r} s, expected a number from 0 on")
     missing = len(off) and model.cell_tags is None
     agree(comm, "off: the model has no cell_tags, by which soils are known" if missing else None)

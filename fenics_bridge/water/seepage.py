@@ -23,7 +23,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
@@ -187,7 +187,7 @@ class Seepage:
         Note:
             Collective.
         """
-        agree(self.domain.comm, None if np.isfinite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
+        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
         self._take_boundary()
         if self._transient is None:
             self._transient = self._problem(transient=True)

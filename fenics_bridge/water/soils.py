@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
+from mpm_core.retention import curve_values
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree
@@ -54,6 +55,7 @@ class PorousSoil:
             raise InputError(f"porosity: got {self.porosity!r}, expected more than 0 and less than 1")
         if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
             raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
+        curve_values(self.retention)
         if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
             raise InputError(f"density: got {self.density!r} kg/m3, expected a positive number")
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpm_core.step_control import StepControl
 
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 
 SHORTEST = 1e-4
 """Step, over the first one, below which a run gives up."""
@@ -33,9 +33,9 @@ def run(
 
 
 def _mistake(until: float, time: float, first_step: float, growth: float, longest: float) -> str | None:
-    if not (np.isfinite(until) and until > time):
+    if not (is_finite(until) and until > time):
         return f"until: got {until!r} s, expected a time after the present one, {time:g} s"
-    if not (np.isfinite(first_step) and first_step > 0):
+    if not (is_finite(first_step) and first_step > 0):
         return f"first_step: got {first_step!r} s, expected a positive number"
     if not longest > 0:
         return f"longest: got {longest!r} s, expected a positive number"

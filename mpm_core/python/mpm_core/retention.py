@@ -35,7 +35,7 @@ def curves_of_laws(retention: Any, laws: Sequence[Any]) -> list[list[NDArray[np.
     given = list(retention) if isinstance(retention, (list, tuple)) else [retention] * len(laws)
     if len(given) != len(laws):
         raise InputError(f"retention has {len(given)} curves, expected one, or one for each of the {len(laws)} laws")
-    return [_values(curve) for curve in given] if any(curve is not None for curve in given) else []
+    return [curve_values(curve) for curve in given] if any(curve is not None for curve in given) else []
 
 
 def joined(values: Sequence[ArrayLike]) -> Points:
@@ -44,7 +44,12 @@ def joined(values: Sequence[ArrayLike]) -> Points:
     return SUCTIONS, arrays, [_slopes(one) for one in arrays]
 
 
-def _values(curve: Any) -> list[NDArray[np.float64]]:
+def curve_values(curve: Any) -> list[NDArray[np.float64]]:
+    """Values of a retention curve at `SUCTIONS`, one array for each of `CURVES`; None stands for soil that stays saturated.
+
+    Raises:
+        InputError: a curve that does not fall from 1 or lets no water through.
+    """
     if curve is None:
         return [np.ones_like(SUCTIONS) for _ in CURVES]
     missing = [name for name in CURVES if not callable(getattr(curve, name, None))]

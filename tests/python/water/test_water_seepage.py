@@ -293,3 +293,32 @@ def test_cells_without_a_soil_are_named():
     with pytest.raises(InputError, match="none for cells with tag 0"):
         soils = {bridge.BODY: water.PorousSoil(1e-5)}
         water.Seepage(domain, soils, facet_tags, [water.Head(LEFT, 1.0)], cell_tags=cell_tags)
+
+
+class Rising(water.AlwaysSaturated):
+    """A curve of one's own: wetter, or more conductive, with suction, or not conductive at all."""
+
+    def __init__(self, saturation, permeability):
+        self.saturation, self.relative_permeability = saturation, permeability
+
+
+@pytest.mark.parametrize(
+    "saturation, permeability, message",
+    [
+        (lambda s: np.where(s < 1e3, 1.0, 1.0 + 1e-6 * s), np.ones_like, "saturation goes from 1 to 1.001"),
+        (np.ones_like, lambda s: np.exp(-s), "relative_permeability goes from 1 to 0, expected from 1 to more than 0"),
+        (lambda s: 0.5 + 0 * s, np.ones_like, "saturation goes from 0.5 to 0.5, expected from 1"),
+    ],
+    ids=["rises", "lets nothing through", "does not begin saturated"],
+)
+def test_curves_of_ones_own_that_are_not_possible_are_refused(saturation, permeability, message):
+    with pytest.raises(InputError, match=message):
+        water.PorousSoil(1e-6, retention=Rising(saturation, permeability))
+
+
+@pytest.mark.parametrize("dt", [None, 0.0, -1.0, np.nan])
+def test_a_step_needs_a_length(dt):
+    domain, facet_tags = box((1.0, 1.0), (2, 2))
+    flow = water.Seepage(domain, water.PorousSoil(1e-6), facet_tags, [water.Head(LEFT, 1.0)])
+    with pytest.raises(InputError, match=f"dt: got {dt}.*expected a positive number"):
+        flow.advance(dt)
