@@ -212,13 +212,18 @@ void take_energies(const Model<G>& model, Diagnostics& d)
       d.nodal_kinetic_energy += 0.5 * water.nodes[i].mass * dot<D>(water.velocity[i], water.velocity[i]);
 }
 
-/// The works and energies since the balance began, of which the largest says what an unexplained one amounts to.
+/// The works and energies since the balance began, of which the largest says what an unexplained one amounts to; and
+/// what the transfer has taken out since.
 template <class G>
-std::array<double, 5> energy_scales(const Model<G>& model, double kinetic, double stored)
+std::array<double, 6> energy_scales(const Model<G>& model, double kinetic, double stored)
 {
   const EnergyBook& book = model.energy;
-  return {std::isnan(stored) ? 0 : stored, model.totals.external_work + model.totals.support_work - book.external_start,
-          book.stress_work - book.stress_start, kinetic, book.kinetic_start};
+  return {std::isnan(stored) ? 0 : stored,
+          model.totals.external_work + model.totals.support_work - book.external_start,
+          book.stress_work - book.stress_start,
+          kinetic,
+          book.kinetic_start,
+          book.pic_loss - book.pic_start};
 }
 } // namespace
 
@@ -265,6 +270,7 @@ Diagnostics diagnostics(const Model<G>& model)
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, model.exchange.comm);
   std::copy_n(sums.begin(), sums.size(), &d.particles);
   d.plastic_fraction = d.particles > 0 ? d.plastic_fraction / d.particles : 0;
+  d.unexplained_energy += std::min(0.0, scales.back()); // what a transfer of velocities generates
   for (double scale : scales)
     d.energy_scale = std::max(d.energy_scale, std::abs(scale));
   d.unbalanced_ratio = out_of_balance(model, gravity_at(model, model.time));

@@ -115,6 +115,7 @@ void start_energy_balance(Model<G, D>& model)
   book.plastic_start = book.stress_work - energy.stored - book.outflow_stored;
   book.external_start = model.totals.external_work + model.totals.support_work;
   book.stress_start = book.stress_work;
+  book.pic_start = book.pic_loss;
   book.stale = false;
 }
 

@@ -7,8 +7,9 @@
 ///
 ///     W_ext + W_supports - (K - K_0) - W_stresses - W_damping - W_drag - W_friction - W_pic = unexplained energy.
 ///
-/// The difference comes from particles that cross cells, from averages and integration over cells, whose forces are not
-/// those of the particles' stresses, and from the time step.
+/// A transfer of velocities may take energy out, which W_pic then is; where it has put energy in instead, that counts
+/// as unexplained too. The rest comes from particles that cross cells, from averages and integration over cells, whose
+/// forces are not those of the particles' stresses, and from the time step.
 
 #include "base/types.h"
 
@@ -28,6 +29,7 @@ struct EnergyBook
   double plastic_start = 0;  ///< likewise, stress_work less stored energy
   double external_start = 0; ///< likewise, external and support work
   double stress_start = 0;   ///< likewise, stress_work
+  double pic_start = 0;      ///< likewise, pic_loss
   bool stale = true;         ///< the particles have been changed since
 };
 

@@ -91,6 +91,7 @@ void for_each_number(M& model, F&& f)
   f("energy_start_plastic_work", Kind::sum, model.energy.plastic_start);
   f("energy_start_external_work", Kind::sum, model.energy.external_start);
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
+  f("energy_start_pic_loss", Kind::sum, model.energy.pic_start);
   f("plastic_particles", Kind::sum, model.last.plastic);
   if (model.water)
   {

@@ -47,7 +47,7 @@ class Report:
     plastic_work: float
     """`stress_work` less what has been stored, since the particles were last changed by anything but a step"""
     pic_loss: float
-    """Kinetic energy taken out by PIC or affine transfer"""
+    """Kinetic energy taken out by PIC or affine transfer; a negative one, put in, counts as unexplained too"""
     nodal_kinetic_energy: float
     """Of the nodes, in the last step; below that of the particles by their motion relative to the nodes"""
     unexplained_energy: float
