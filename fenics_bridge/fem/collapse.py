@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.load_steps import LoadStep, advance
 from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.locking import warn_of_locking_at_failure
 from fenics_bridge.fem.mixed import MixedQuasiStatic
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.strength import reduced_strength
@@ -83,6 +84,7 @@ def collapse_load(
     Note:
         Collective.
     """
+    warn_of_locking_at_failure(model)
     return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
 
 
@@ -119,6 +121,7 @@ def factor_of_safety(
     Note:
         Collective.
     """
+    warn_of_locking_at_failure(model)
     law = model.law
     model.law = reduce(law, start, unreduced)
     steps = model.solve(load, progress=progress)

@@ -26,6 +26,7 @@ from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
+from fenics_bridge.fem.locking import warn_of_locking
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
@@ -119,6 +120,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.solver = solver or Solver()
         """Tolerances of the solution"""
         self._assemble(constraints)
+        warn_of_locking(self)
 
     def __repr__(self) -> str:
         return body_text(

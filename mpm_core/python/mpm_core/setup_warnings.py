@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,7 @@ NEARLY_INCOMPRESSIBLE = 0.45
 
 def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
-    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), _locks(model, nmd)) if text]
+    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), "" if nmd else locking(model.laws)) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
@@ -69,14 +69,21 @@ def _weight(model: Model) -> str:
     )
 
 
-def _locks(model: Model, nmd: bool) -> str:
-    reasons = sorted({reason for law in model.laws for reason in _reasons_to_lock(law)}) if not nmd else []
+def locking(laws: Iterable[Any]) -> str:
+    """What a warning says of linear cells or elements without averaged strains; empty where no law keeps the volume of its soil."""
+    reasons = sorted({reason for law in laws for reason in _reasons_to_lock(law)})
     if not reasons:
         return ""
     return (
         f"linear cells lock in soil whose volume hardly changes ({', '.join(reasons)}): it is too stiff and too strong, the more the "
         "coarser the mesh; use nmd=True, which averages volumetric strains (docs/locking.md)"
     )
+
+
+def locks_at_failure(laws: Iterable[Any]) -> bool:
+    """Whether a law keeps the volume of its soil only as it fails: its dilation angle is below its friction angle."""
+    laws = list(laws)
+    return not locking(laws) and any(_core.associated_fraction(law) < 1 for law in laws)
 
 
 class FailureWatch:
@@ -88,8 +95,7 @@ class FailureWatch:
     """
 
     def __init__(self, model: Model, nmd: bool) -> None:
-        locks = any(_core.associated_fraction(law) < 1 for law in model.laws) and not _locks(model, nmd)
-        self._speaks = locks and not nmd and model.comm.rank == 0
+        self._speaks = not nmd and model.comm.rank == 0 and locks_at_failure(model.laws)
 
     def look(self, report: Report) -> None:
         """Warn if the soil has failed.

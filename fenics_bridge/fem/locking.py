@@ -1,0 +1,32 @@
+"""Warnings of linear elements without averaged strains in soil that keeps its volume."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from mpm_core.setup_warnings import locking, locks_at_failure
+
+if TYPE_CHECKING:
+    from fenics_bridge.fem.quasi_static import QuasiStatic
+
+
+def warn_of_locking(model: QuasiStatic) -> None:
+    """Warn where the laws of a new model keep the volume of the soil whatever happens. Not collective."""
+    if _is_plain(model) and (text := locking(model.laws)):
+        warnings.warn(f"{text}; elements of degree=2 or 4 hardly lock", RuntimeWarning, stacklevel=3)
+
+
+def warn_of_locking_at_failure(model: Any) -> None:
+    """Warn where the soil keeps its volume as it fails, before a collapse load or a factor of safety is found. Not collective."""
+    if _is_plain(model) and locks_at_failure(model.laws):
+        warnings.warn(
+            "linear elements without averaged strains are too strong for soil whose dilation angle is below its friction angle, "
+            "since it keeps its volume as it fails: take nmd=True, or elements of degree=2 or 4 (docs/locking.md)",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+
+
+def _is_plain(model: Any) -> bool:
+    return getattr(model, "degree", 2) == 1 and not model._nmd and model.domain.comm.rank == 0
