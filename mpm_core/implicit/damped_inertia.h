@@ -22,9 +22,8 @@
 ///
 /// while |v| is not above rms(v'): a viscous drag, which is what makes a damped explicit slide creep.
 ///
-/// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation, one of second order
-/// (1 + 2 z) / (1 + z)^2 with z = (g omega dt)^2 (see implicit_step.h). That fraction of D is taken as resolved, and
-/// the rest as not.
+/// A step of backward Euler leaves 1 / (1 + (omega dt)^2) of the energy of an oscillation. That fraction of D is taken
+/// as resolved, and the rest as not. Steps of second order are for motion without damping.
 
 #include <algorithm>
 #include <numbers>
@@ -55,11 +54,4 @@ inline Inertia damped_inertia(double mass, double v0, double v1, double dt, doub
 
 /// Energy of an oscillation that a step of backward Euler leaves, over that at its start; x = omega dt.
 inline double left_by_backward_euler(double x) { return 1 / (1 + x * x); }
-
-/// The same of a step of second order.
-inline double left_by_second_order(double x)
-{
-  const double z = stage_fraction * stage_fraction * x * x;
-  return (1 + 2 * z) / ((1 + z) * (1 + z));
-}
 } // namespace mpm::implicit

@@ -7,8 +7,7 @@ namespace mpm::implicit
 template <class G>
 Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, double start, double end)
 {
-  const double x = step.frequency[node] * step.length;
-  const double resolved = step.options.second_order ? left_by_second_order(x) : left_by_backward_euler(x);
+  const double resolved = left_by_backward_euler(step.frequency[node] * step.length);
   Inertia inertia =
       damped_inertia(mass, start, end, step.stage.dt, step.options.damping, step.frequency[node], resolved);
   inertia.derivative /= step.stage.weight;

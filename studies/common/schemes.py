@@ -69,6 +69,9 @@ def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Name
                   "from zero")  # fmt: skip
     check(parser, not options.second_order or options.scheme == "implicit",
           lambda: f"--second-order is given, expected --scheme implicit with it, not {options.scheme}")  # fmt: skip
+    check(parser, not options.second_order or options.damping == 0,
+          lambda: f"--second-order is given with --damping {options.damping:g}, expected --damping 0 with it: such steps do not "
+                  "bring a slope to rest")  # fmt: skip
     check(parser, options.integration != "dual-domain" or options.scheme == "explicit",
           lambda: f"--integration is dual-domain, expected particles or mixed with --scheme {options.scheme}")  # fmt: skip
     check(parser, options.transfer == "flip" or (options.scheme == "explicit" and options.integration != "dual-domain"),

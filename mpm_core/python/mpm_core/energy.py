@@ -18,6 +18,10 @@ LEAST_STEPS = 32
 """Steps of a model before its energy is checked: in the first steps half a time step is a large part of it"""
 
 
+ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
+"""What to look at where energy is unexplained"""
+
+
 class EnergyWarning(RuntimeWarning):
     """The energy balance of a run is not closed; see docs/energy.md."""
 
@@ -29,10 +33,12 @@ class EnergyWatch:
     Args:
         limit: `Report.unexplained_fraction` at which the run ends with an error; None for none.
         speaks: whether this rank issues the warning.
+        advice: what its text ends with.
     """
 
     limit: float | None
     speaks: bool
+    advice: str = ADVICE
     warned: float = WARN_ABOVE
     noisy: bool = False
     largest: float = 0.0  # of the energies at work so far: a body that swings back has little of it
@@ -53,19 +59,16 @@ class EnergyWatch:
             return
         fraction = abs(report.unexplained_fraction)
         if self.limit is not None and fraction > self.limit:
-            raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {_ADVICE}")
+            raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {self.advice}")
         if fraction > self.warned:
             self.warned = 10 * fraction
             if self.speaks:
-                warnings.warn(f"{_said(report)}; {_ADVICE}", EnergyWarning, stacklevel=4)
+                warnings.warn(f"{_said(report)}; {self.advice}", EnergyWarning, stacklevel=4)
         self.largest = max(self.largest, report.energy_scale)
         if not self.noisy and _is_noisy(report, self.largest):
             self.noisy = True
             if self.speaks:
                 warnings.warn(_noise(report, self.largest), EnergyWarning, stacklevel=4)
-
-
-_ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
 
 
 def _against_nodes(report: Report) -> float:

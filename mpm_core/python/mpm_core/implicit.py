@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import positive, within
-from .energy import EnergyWatch
+from .energy import ADVICE, EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
@@ -48,6 +48,11 @@ def implicit_options(
     options.quasi_static = bool(quasi_static)
     if second_order and quasi_static:
         raise InputError("second_order is True, expected False where quasi_static is True: there is no inertia")
+    if second_order and damping:
+        raise InputError(
+            f"second_order is True with damping {damping:g}, expected damping 0: such steps do not bring a body to rest; those of "
+            "backward Euler (second_order False) do"
+        )
     options.second_order = bool(second_order)
     options.ghost = (ghost or GhostPenalty()).options()
     if small_displacements and not quasi_static:
@@ -55,6 +60,16 @@ def implicit_options(
     options.hold_positions = bool(small_displacements)
     options.average_stress = bool(small_displacements and nmd)
     return options
+
+
+def _energy_advice(options: Any) -> str:
+    """What to do about energy that an implicit run does not explain."""
+    if options.second_order or options.damping:
+        return ADVICE
+    return (
+        "steps of backward Euler dissipate motion that they resolve, and a slide ends too early: second_order=True with "
+        "integration=MIXED, or shorter steps, dissipate less (docs/implicit.md)"
+    )
 
 
 def checked_accuracy(accuracy: float | None, second_order: bool) -> float | None:
@@ -174,7 +189,8 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    energy, failure = EnergyWatch(energy_limit, model.comm.rank == 0), FailureWatch(model, options.nmd)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, _energy_advice(options))
+    failure = FailureWatch(model, options.nmd)
 
     def report() -> ImplicitReport:
         now = stepper.report()

@@ -277,7 +277,8 @@ class Model(ContactMethods, Body):
             rebalance: see ``explicit``; checked before each step.
             energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
             second_order: use a method of second order in time with two stages per step (Alexander 1977) instead of backward
-                Euler, the paper's scheme. It hardly dissipates motion that the steps resolve; a step costs twice as much.
+                Euler, the paper's scheme. It hardly dissipates motion that the steps resolve; a step costs twice as much. Without
+                damping only.
             accuracy: for steps of second order, the permitted error of a step in displacement [m], as the root mean square
                 weighted by mass; an estimate of it determines the length of the steps, up to ``dt``. By default all are ``dt``.
             conversion: when resting cells turn into particles, as for ``explicit``; looked at after each step.

@@ -27,7 +27,8 @@ NEARLY_INCOMPRESSIBLE = 0.45
 
 def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
-    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), "" if nmd else locking(model.laws)) if text]
+    locks = "" if nmd else locking(model.laws)
+    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), locks) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)

@@ -101,6 +101,8 @@ def test_what_does_not_go_together_is_refused():
     model = bar()
     with pytest.raises(mpm.InputError, match="second_order is True"):
         model.implicit(1.0, dt=0.1, quasi_static=True, second_order=True)
+    with pytest.raises(mpm.InputError, match="second_order is True with damping 0.75, expected damping 0"):
+        model.implicit(1.0, dt=0.1, damping=0.75, second_order=True)
     with pytest.raises(mpm.InputError, match="accuracy is 0.1 m"):
         model.implicit(1.0, dt=0.1, accuracy=0.1)
 
