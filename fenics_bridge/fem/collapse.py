@@ -65,7 +65,7 @@ def collapse_load(
     tolerance: float = 2e-3,
     progress: Callable[[LoadStep], Any] | None = None,
 ) -> Collapse:
-    """Raise a load to the last equilibrium: steps double while they converge easily; below a value that fails they bisect.
+    """Raise a load until there is no equilibrium: steps double while they converge easily, and are bisected below a failure.
 
     Args:
         model: finite elements in equilibrium under `load_of(start)`, e.g. fresh and unloaded.

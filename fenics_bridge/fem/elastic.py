@@ -84,7 +84,7 @@ class ElasticSolution:
         return cell_function(self.displacement.function_space.mesh, size, 0, "deviatoric_strain")
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
-        """Values at points, whichever ranks have the points and their cells.
+        """Values at points; the points and their cells may be on different ranks.
 
         Args:
             points: positions [m], shape (n, D).

@@ -124,7 +124,7 @@ class PointSearch:
 
 
 def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArray[np.float64]]:
-    """Values of several functions of one mesh at points, whichever ranks have the points and their cells.
+    """Values of several functions of one mesh at points; the points and their cells may be on different ranks.
 
     Args:
         points: positions of this rank's points [m], shape (n, D).

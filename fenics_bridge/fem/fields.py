@@ -88,7 +88,7 @@ def part_of(function: fem.Function, collapsed: tuple[Any, Any], name: str) -> fe
 
 
 class SupportedBody:
-    """A body in equilibrium on its supports, which asks for the forces on these."""
+    """The method of a body in equilibrium that returns the forces on its supports."""
 
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         """The space of displacements, external less internal forces at its local dofs, and the tags of the boundary."""

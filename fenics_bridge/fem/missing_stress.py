@@ -1,4 +1,4 @@
-"""The stress that a body lacks, over the strength that it mobilises: equilibrium that no small mechanism is lost in."""
+"""The stress that a cell lacks for equilibrium, relative to the strength that it mobilises; it also shows small mechanisms."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ class MixedQuasiStatic(SupportedBody):
         return space, forces[dofs], self._facet_tags
 
     def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Pressure at points, whichever ranks have the points and their cells; compression positive.
+        """Pressure at points, compression positive; the points and their cells may be on different ranks.
 
         Args:
             points: positions [m], shape (n, D).
@@ -187,7 +187,7 @@ class MixedQuasiStatic(SupportedBody):
         return self._kinematics.scale * evaluate_at(points, pressure=pressure)["pressure"][:, 0]
 
     def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Values at points, whichever ranks have the points and their cells.
+        """Values at points; the points and their cells may be on different ranks.
 
         Args:
             points: positions [m], shape (n, D).

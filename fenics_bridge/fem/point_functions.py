@@ -1,4 +1,4 @@
-"""What the quadrature points of a body hold, as functions of position."""
+"""Values at the quadrature points of a body as functions of position."""
 
 from __future__ import annotations
 

@@ -338,7 +338,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return nodal_average(mean, self.radius) if smooth else mean
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
-        """Values at points, whichever ranks have the points and their cells.
+        """Values at points; the points and their cells may be on different ranks.
 
         The cells' mean stress is admissible; the smooth one may exceed the strength.
 

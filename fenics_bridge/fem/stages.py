@@ -1,4 +1,4 @@
-"""Stages of construction: one list of them for finite elements and for quasi-static particles."""
+"""Stages of construction: the same list serves finite elements and quasi-static particles."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class StageReport:
-    """How a stage went."""
+    """Result of a stage."""
 
     number: int
     """Number of the stage, from 1 on"""
@@ -146,7 +146,7 @@ def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator
 
 
 class SiteState:
-    """What holds at a site beside stresses: which soils are there, their laws and weights, loads, supports, water.
+    """The state of a site except for its stresses: the soils that are present, their laws and weights, loads, supports and water.
 
     All by the numbers of tags. `after(stage)` is the state that a stage leads to.
 

@@ -54,7 +54,7 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
 
 
 def davis_strength(law: Laws) -> Laws:
-    """Mohr-Coulomb law with associated flow and the strength that Davis (1968) gives to soil of less dilation.
+    """Mohr-Coulomb law with associated flow, and the reduced strength of Davis (1968) for soil with a smaller dilation angle.
 
     c* = b c and tan(phi*) = b tan(phi) with b = cos(psi) cos(phi) / (1 - sin(psi) sin(phi)): collapse loads of the
     associated soil with that strength estimate, mostly from below, those of the soil itself (Tschuchnigg, Schweiger,
@@ -77,7 +77,7 @@ def davis_strength(law: Laws) -> Laws:
 
 
 def davis_reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] = ()) -> Laws:
-    """The law with its strength divided by a factor, then by what Davis (1968) has for its flow ("Davis B").
+    """The law with its strength divided by a factor, and then reduced for its dilation angle by Davis (1968) ("Davis B").
 
     For `factor_of_safety(..., reduce=davis_reduced_strength)`: associated flow, so a factor that is quick to find and does
     not depend on the mesh.

@@ -1,4 +1,4 @@
-"""The background mesh of a box: the plainest ground there is, in two and three dimensions."""
+"""The background mesh of a box, in two and three dimensions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def box_mesh(
     diagonals: str = "alternating",
     body: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Background mesh of a box with its low corner at the origin: squares or cubes, each cut in D! simplices (Kuhn 1960).
+    """Background mesh of a box with its lower corner at the origin: squares or cubes, each divided into D! simplices (Kuhn 1960).
 
     Args:
         comm: the ranks that share the mesh.

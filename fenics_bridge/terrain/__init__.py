@@ -1,4 +1,4 @@
-"""Ground as it is: rasters of heights, a background mesh over them, a slide between two of them, and maps of its deposit."""
+"""Terrain: rasters of elevations, a background mesh above them, a slide between two of them, and maps of its deposit."""
 
 from fenics_bridge.terrain.maps import SlideMaps
 from fenics_bridge.terrain.raster import Raster, read_raster, write_raster

@@ -197,7 +197,7 @@ class FarField:
         return self._summed(self._forces(displacement).reshape(-1, self._domain.geometry.dim))
 
     def attach(self, model: mpm.Model, facet_tag: int | str | Sequence[int | str], *, balanced: bool = False) -> None:
-        """Let the ground act on the particles' mesh, in implicit steps from now on.
+        """Attach the ground to the particles' mesh; it acts in all later implicit steps.
 
         The border's nodes need not match. The displacement of the finite elements' border is the mortar projection of that of the
         particles' mesh, and the forces on the latter are its transpose: they do the same work, and a state of constant stress

@@ -54,7 +54,7 @@ class Flux:
 
 @dataclass(frozen=True)
 class Rain:
-    """Rain enters until water ponds; what the soil cannot take runs off."""
+    """Rain infiltrates until water ponds; what the soil cannot take up runs off."""
 
     facet_tag: int | str
     """Number or name of the tag"""

@@ -1,4 +1,4 @@
-"""Water retention curves: how much water unsaturated soil holds and lets through, over its suction.
+"""Water retention curves: saturation and relative permeability of unsaturated soil as functions of suction.
 
 Suction is minus the pore pressure [Pa]; at and below zero suction soil is saturated. Each curve has two functions of the
 suction, which take numbers, NumPy arrays and UFL expressions alike:
@@ -218,7 +218,7 @@ class Tabulated(_Curve):
 
 @dataclass(frozen=True)
 class FreeSurface(_Curve):
-    """Soil that drains and lets hardly any water through above the water table: for seepage with a free surface.
+    """Soil that drains above the water table and hardly conducts water there: for seepage with a free surface.
 
     The relative permeability falls smoothly from 1 to `dry_permeability` over the suction of a `fringe` of water, and
     saturation from 1 to `residual`.

@@ -1,4 +1,4 @@
-"""How soils hold water and let it through, and which of them fills which cell."""
+"""Hydraulic properties of soils, and the soil of each cell."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WATER_MODULUS = 2.2e9
 
 @dataclass(frozen=True)
 class PorousSoil:
-    """How soil holds water and lets it through.
+    """Hydraulic properties of a soil: conductivity, porosity, compressibility and retention curve.
 
     Raises:
         InputError: a value out of its range.

@@ -1,4 +1,4 @@
-"""Sides of the mesh that let waves out, and waves that come in through them."""
+"""Sides of the mesh that absorb outgoing waves, and incoming waves."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class AbsorbingSides:
         impedances: tuple[float, float] | None = None,
         free_field: bool = False,
     ) -> None:
-        """Let waves out through a side: dashpots and weak springs take the place of the ground behind it.
+        """Make a side absorb outgoing waves: dashpots and weak springs replace the ground behind it.
 
         The traction on the side is minus ``rho c_p`` times its normal and ``rho c_s`` times its tangential velocity (Lysmer &
         Kuhlemeyer 1969), which absorbs waves at normal incidence; at other angles a part comes back. Forces that hold the
@@ -103,7 +103,7 @@ class AbsorbingSides:
         self._columns, self._tables = [], []
 
     def shake(self, motion: Motion, direction: ArrayLike) -> None:
-        """Let a plane wave come in through the sides that absorb, all at once: a base below level ground.
+        """Apply an incoming plane wave at the absorbing sides, at all of them at the same time: a base below level ground.
 
         The traction of the wave is ``2 rho c`` times its velocity: on a free surface of the ground behind the side, an
         outcrop, it would move twice as fast. So halve the motion of a record that was taken on an outcrop.
@@ -118,7 +118,7 @@ class AbsorbingSides:
         self._let_in(motion, direction, 1.0)
 
     def drive(self, facet_tag: Tag, motion: Motion, direction: ArrayLike) -> None:
-        """Move a side as prescribed, whatever the soil does: a base on rigid ground, through which no wave leaves.
+        """Prescribe the motion of a side, as of a base on rigid ground, which reflects all waves.
 
         Args:
             facet_tag: facets with this tag, or these tags, at cells with soil; without other boundary conditions (`release`).

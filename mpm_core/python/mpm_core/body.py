@@ -240,7 +240,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         return load_surface(self, surface, pressure, traction)
 
     def remove(self, chosen: ArrayLike) -> int:
-        """Take particles away, such as excavated soil; the others may have another order afterwards.
+        """Remove particles, such as excavated soil; the order of the others may change.
 
         Args:
             chosen: whether each particle of this rank goes, shape (n,) of bool, in the order of ``particles``.
@@ -262,7 +262,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         return self.comm.allreduce(len(gone))
 
     def place(self, position: ArrayLike) -> None:
-        """Put the particles elsewhere: their cells are searched again on all ranks, and their displacement changes accordingly.
+        """Move the particles to other positions: cells are searched again on all ranks, and displacements change accordingly.
 
         The particles may have another order, and other ranks, afterwards.
 

@@ -1,4 +1,4 @@
-"""Rigid surfaces over time, for ParaView and other programs."""
+"""Output of rigid surfaces over time, for ParaView and other programs."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class RigidContact:
-    """What a rigid surface feels, where it is and how it moves, as `Model.add_contact` returns it; all is collective.
+    """Forces on a rigid surface, its position and its motion, as `Model.add_contact` returns them; all methods are collective.
 
     It is a probe: ``mpm_core.probes.ProbeFile("wall.csv", wall)`` records its histories.
     """
@@ -158,7 +158,7 @@ class RigidContact:
         return self.velocity + np.cross(self._vector("spin"), arms)[:, :dim]
 
     def add_collision(self, other: RigidContact, *, friction: float = 0.0, restitution: float = 0.0) -> None:
-        """Let this body collide with another rigid surface of the model, which without this it passes through.
+        """Define collisions of this body with another rigid surface of the model; without them the body passes through it.
 
         One of them is a `Disc` or a `Sphere`, the other any surface; one of them at least is a `FreeBody`. Where they touch,
         impulses keep them apart: with friction bodies roll or slide, with restitution they bounce until they rest. Momentum is

@@ -94,7 +94,7 @@ class ContactMethods:
         friction: float = 0.0,
         adhesion: float = 0.0,
     ) -> FieldContact:
-        """Let the bodies of two velocity fields touch along an interface, with friction and adhesion; explicit scheme only.
+        """Define contact of the bodies of two velocity fields along an interface, with friction and adhesion; explicit only.
 
         Without this, bodies in different velocity fields pass through one another. Where both have mass at a node and their
         particles, each as wide as the side of a square or cube of its volume, touch, they do not approach any further, slide

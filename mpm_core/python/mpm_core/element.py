@@ -15,7 +15,7 @@ MAX_ITERATIONS = 50
 
 
 class ElementTest:
-    """One point of a law, of which some components of strain and the others of stress are prescribed.
+    """A point of a law at which some components of strain are prescribed, and the stress in the other components.
 
     Args:
         law: any law.

@@ -39,7 +39,7 @@ class FarFields:
     def attach_far_field(
         self, nodes: ArrayLike, stiffness: ArrayLike, mass: ArrayLike | None = None, *, balanced: bool = False
     ) -> None:
-        """Let elastic ground act on nodes of the mesh: f = f_0 + W g - K u, with their displacement u from now on.
+        """Attach elastic ground to nodes of the mesh: it exerts f = f_0 + W g - K u, with their displacement u from now on.
 
         `fenics_bridge.FarField` finds K and W by static condensation of finite elements, and calls this. The forces take part in
         implicit steps; their work counts as external. The arguments are the same on all ranks.
@@ -87,7 +87,7 @@ class FarFields:
         self._take_border(border, np.zeros_like(border.held))
 
     def detach_far_field(self) -> None:
-        """Take the far field away; its border is free from now on. Collective."""
+        """Remove the far field; its border is free from now on. Collective."""
         self._take_border(None, None)
 
     @property

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class FieldContact:
-    """What two bodies of soil do to each other, as `Model.add_field_contact` returns it; all is collective.
+    """Forces between two bodies of soil, as `Model.add_field_contact` returns them; all methods are collective.
 
     It is a probe: ``mpm_core.probes.ProbeFile("interface.csv", contact)`` records its histories.
     """

@@ -1,4 +1,4 @@
-"""A column of level ground that a wave comes up through: the free field beside a side of a mesh."""
+"""A column of level ground in which a wave travels upwards: the free field beside a side of a mesh."""
 
 from __future__ import annotations
 
