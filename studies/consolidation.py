@@ -33,7 +33,7 @@ from common.results import open_results
 from common.schemes import add_particles_per_cell
 from common.site_options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY
+from common.water_site import DAY, in_days
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -113,7 +113,7 @@ class Files(FieldFiles):
         days = model.time / DAY
         if self.particles is not None:
             self.particles.frame(days)
-        name = f"After {days:.0f} days" if days >= 100 else f"After {days:.3g} days"
+        name = f"After {in_days(model.time)}"
         self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
 
 

@@ -26,7 +26,7 @@ from common.results import open_results
 from common.seepage_plots import FlowPicture, flow_picture, save_flow
 from common.site_options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY, WaterSite, read_water_site
+from common.water_site import DAY, WaterSite, in_days, read_water_site
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -92,7 +92,7 @@ def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowP
             if stopped:
                 return stopped
             files.frame()
-            pictures.append(flow_picture(flow, f"After {flow.time / DAY:.3g} days"))
+            pictures.append(flow_picture(flow, f"After {in_days(flow.time)}"))
     return None
 
 

@@ -65,6 +65,13 @@ class WaterSite:
         )
 
 
+def in_days(time: float) -> str:
+    """A time [s] in words: "1 day", "2.5 days", "1200 days"."""
+    days = time / DAY
+    number = f"{days:.0f}" if days >= 100 else f"{days:.3g}"
+    return f"{number} day" if number == "1" else f"{number} days"
+
+
 def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> WaterSite:
     """Read a site of seepage and make its mesh. Collective.
 

@@ -28,7 +28,7 @@ from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, slide, slide_pictures
 from .slope_site import SlopeSite
-from .water_site import DAY
+from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
 comm = MPI.COMM_WORLD
@@ -70,7 +70,7 @@ def slide_of(
         result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
     if comm.rank == 0:
-        print(f"slide from {instant.time / DAY:.3g} days on: largest displacement {moved:.3f} m after "
+        print(f"slide from {in_days(instant.time)} on: largest displacement {moved:.3f} m after "
               f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
         if stopped:
             print(f"the slide ended early: {stopped}", file=sys.stderr)
@@ -80,7 +80,7 @@ def slide_of(
         "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
     }  # fmt: skip
-    movies = [particle_movie(f"slide after {instant.time / DAY:.3g} days", scene, result.frames)]
+    movies = [particle_movie(f"slide after {in_days(instant.time)}", scene, result.frames)]
     code = interrupt.exit_code or (1 if stopped else 0)
     return summary, movies, slide_pictures(a, result, scene, folder), code
 
@@ -118,7 +118,7 @@ def handed_over(
     fem = slope.elements(1, pressure, stronger, solver=bridge.Solver(tolerance=1e-10))
     fem.solve(site.load())
     if not fem.converged:
-        raise mpm.RunError(f"the particles find no initial equilibrium at {instant.time / DAY:.3g} days")
+        raise mpm.RunError(f"the particles find no initial equilibrium at {in_days(instant.time)}")
     model = site.particles(a.particles_per_cell, stronger, more=list(site.laws.values()))
     nodal = pressure(model.mesh.points)
 

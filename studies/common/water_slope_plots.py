@@ -12,7 +12,7 @@ from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, save_figure
 from .plots import CURVES, paper_style
 from .seepage_plots import PRESSURE, save_flow
-from .water_site import DAY
+from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
 CAPTIONS = {
@@ -30,7 +30,7 @@ def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[st
     if field is None:
         return {}
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
-    title = f"{worst.time / DAY:.3g} days: factor of safety {worst.safety.value:.2f}"
+    title = f"{in_days(worst.time)}: factor of safety {worst.safety.value:.2f}"
     return {
         "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
         "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),

@@ -19,7 +19,7 @@ from .results import open_results
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
-from .water_site import DAY
+from .water_site import DAY, in_days
 from .water_slides import slide_of
 from .water_slope_plots import CAPTIONS, slope_pictures
 from .water_slopes import failure_time, follow, lowest
@@ -68,8 +68,8 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     page = Page(movies=movies, captions=CAPTIONS | SLIDE_CAPTIONS)
     write_summary(folder, a, summary, comm, page, slope_pictures(folder, instants, values) | pictures)
     if comm.rank == 0:
-        fails = "stands" if failed is None else f"fails after {failed / DAY:.3g} days"
-        print(f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {worst.time / DAY:.3g} days")
+        fails = "stands" if failed is None else f"fails after {in_days(failed)}"
+        print(f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {in_days(worst.time)}")
         for name, value in values.items():
             print(f"{name}: {value:.3f}")
         if stopped:
