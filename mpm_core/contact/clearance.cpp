@@ -1,5 +1,7 @@
 #include "contact/clearance.h"
 
+#include "contact/triangle_parts.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +10,11 @@ namespace mpm::contact
 {
 namespace
 {
+constexpr double relative_keep = 0.25; ///< travel after which bounds are found again, over the reach of a cell
+constexpr double relative_sight = 1.0; ///< of a cell, over its reach: all of the cell is in sight after such a travel
+constexpr double relative_ceiling = 0.75; ///< likewise: the width of a particle, and some travel
+constexpr double fine_boxes = 0.05;       ///< size of a surface's boxes that are as good as their triangles; likewise
+
 template <int D>
 double apart(const Vector<D>& a, const Vector<D>& b)
 {
@@ -16,33 +23,140 @@ double apart(const Vector<D>& a, const Vector<D>& b)
     sum += (a[i] - b[i]) * (a[i] - b[i]);
   return std::sqrt(sum);
 }
+
+/// The box around a cell, as it lies to the surface at its start.
+template <int D>
+Region<D> box_of(const Mesh<D>& mesh, Index cell, const RigidBody<D>& body)
+{
+  const auto& nodes = mesh.cells[static_cast<std::size_t>(cell)];
+  const auto place = [&](Index node) { return as_at_start<D>(body, mesh.points[static_cast<std::size_t>(node)]); };
+  Region<D> box{place(nodes[0]), place(nodes[0])};
+  for (Index node : nodes)
+  {
+    const Vector<D> x = place(node);
+    for (int i = 0; i < D; ++i)
+    {
+      box.lower[i] = std::min(box.lower[i], x[i]);
+      box.upper[i] = std::max(box.upper[i], x[i]);
+    }
+  }
+  return box;
+}
+
+/// Height of the highest plane with a normal that all of a convex body is below.
+template <int D, class Shape>
+double height_of(const Shape&, const Vector<D>& x, const Distance<D>& nearest, const Region<D>&, double)
+{
+  return dot<D>(nearest.normal, x) - nearest.value;
+}
+
+double height_of(const Polyline& line, const Vector<2>&, const Distance<2>& nearest, const Region<2>& region, double)
+{
+  return highest(line, region, nearest.normal);
+}
+
+double height_of(const Triangles& triangles, const Vector<3>&, const Distance<3>& nearest, const Region<3>& region,
+                 double reach)
+{
+  return highest(triangles, region, nearest.normal, fine_boxes * reach);
+}
+
+/// Whether points of a cell may be nearest to the border of a surface: beyond it that goes on where it has no
+/// triangles, and nothing is known from the cell.
+/// @param x  its centre, as it lies to the surface at its start
+bool is_at_border(const Triangles& triangles, const Vector<3>& x, const Distance<3>& nearest, const Region<3>& own,
+                  double reach)
+{
+  const double apart = std::abs(nearest.value) * (1 + 1e-9) + 1e-9 * reach;
+  static constexpr Index root = 0;
+  if (!triangles.box_at_border[root])
+    return false;
+  const NearestOnTriangles found = nearest_on(triangles, x, std::span(&root, 1), apart * apart);
+  return !(found.squared < apart * apart) || has_border(triangles, widened(own, apart + 2 * reach));
+}
+
+/// What is known of the surface from a cell that is near to it.
+/// @param x  centre of the cell, as it lies to the surface at its start
+template <int D>
+void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Distance<D>& nearest, Contact<D>& contact,
+                 CellBound<D>& bound)
+{
+  const RigidBody<D>& body = contact.body;
+  bound.sight = relative_sight * bound.reach;
+  bound.ceiling = relative_ceiling * bound.reach;
+  const Region<D> own = box_of(mesh, cell, body), seen = widened(own, bound.sight),
+                  region = widened(own, bound.ceiling);
+  bound.first = bound.last = contact.parts.size();
+  if constexpr (D == 2)
+  {
+    if (const auto* line = std::get_if<Polyline>(&contact.surface))
+      add_segments(*line, seen, contact.parts);
+  }
+  else if (const auto* triangles = std::get_if<Triangles>(&contact.surface))
+  {
+    if (is_at_border(*triangles, x, nearest, own, bound.reach))
+    {
+      bound.blind = true;
+      return;
+    }
+    add_boxes(*triangles, seen, contact.parts);
+  }
+  bound.last = contact.parts.size();
+  // The cell may not be beyond the surface: its centre is outside and above all of the surface that is close, so that
+  // no line from there to another point of the cell that is above it, too, passes through the surface.
+  if (nearest.value <= 0)
+    return;
+  const auto height = [&](const auto& shape)
+  {
+    if constexpr (requires { height_of(shape, x, nearest, region, bound.reach); })
+      return height_of(shape, x, nearest, region, bound.reach);
+    else
+      return height_of<D>(shape, x, nearest, region, bound.reach);
+  };
+  const double highest = std::visit(height, contact.surface);
+  if (!(highest < dot<D>(nearest.normal, x)))
+    return;
+  bound.normal = rotated<D>(body.rotation, nearest.normal);
+  bound.height = highest;
+  for (int i = 0; i < D; ++i)
+    bound.height += bound.normal[i] * (mesh.shapes[cell].centre[i]) - nearest.normal[i] * x[i];
+}
 } // namespace
 
 template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
 {
-  if (!contact.clearance.empty() && contact.travel <= contact.cell_size)
+  if (!contact.bounds.empty() && contact.travel <= contact.keeps_for)
     return;
   const RigidBody<D>& body = contact.body;
-  contact.clearance.resize(static_cast<std::size_t>(mesh.owned_cells));
-  contact.cell_reach.resize(static_cast<std::size_t>(mesh.owned_cells));
-  contact.travel = 0;
-  contact.cell_size = std::numeric_limits<double>::infinity();
-  double farthest = 0;
+  const bool first = contact.bounds.empty();
+  contact.bounds.resize(static_cast<std::size_t>(mesh.owned_cells));
+  contact.parts.clear();
+  double smallest = std::numeric_limits<double>::infinity(), farthest = 0;
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
+    CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(c)];
     const Vector<D>& centre = mesh.shapes[c].centre;
-    double reach = 0;
+    bound.reach = 0;
     for (Index node : mesh.cells[c])
-      reach = std::max(reach, apart<D>(mesh.points[node], centre));
-    // A particle is no farther from the centre of its cell than the vertices are; as much again is for its radius and
-    // for its motion in a step.
-    const Vector<D> x = as_at_start<D>(body, centre);
-    contact.clearance[static_cast<std::size_t>(c)] = distance<D>(contact.surface, x).value - 3 * reach;
-    contact.cell_reach[static_cast<std::size_t>(c)] = reach;
-    contact.cell_size = std::min(contact.cell_size, reach);
-    farthest = std::max(farthest, apart<D>(x, body.centre) + reach);
+      bound.reach = std::max(bound.reach, apart<D>(mesh.points[node], centre));
+    smallest = std::min(smallest, bound.reach);
+    farthest = std::max(farthest, apart<D>(as_at_start<D>(body, centre), body.centre) + bound.reach);
   }
+  for (Index c = 0; c < mesh.owned_cells; ++c)
+  {
+    CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(c)];
+    bound = {bound.distance - contact.travel, bound.reach};
+    if (!first && !may_be_near(bound, relative_keep * smallest))
+      continue; // still far: the bound has become smaller by the surface's travel
+    const Vector<D> x = as_at_start<D>(body, mesh.shapes[c].centre);
+    const Distance<D> nearest = distance<D>(contact.surface, x);
+    bound.distance = nearest.value;
+    if (may_be_near(bound, relative_keep * smallest))
+      look_around<D>(mesh, c, x, nearest, contact, bound);
+  }
+  contact.travel = 0;
+  contact.keeps_for = relative_keep * smallest;
   contact.reach = std::min(rotation_reach<D>(contact.surface, body.centre), farthest);
 }
 

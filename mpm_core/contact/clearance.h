@@ -11,6 +11,14 @@ namespace mpm::contact
 template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact);
 
+/// Whether a particle of a cell may touch the surface before that has travelled so far. It is no farther from the
+/// centre of its cell than the vertices are; twice as much again is for its radius and for its motion in a step.
+template <int D>
+inline bool may_be_near(const CellBound<D>& bound, double travel)
+{
+  return bound.distance - 3 * bound.reach <= travel;
+}
+
 /// A point as it lies to the surface at its start.
 template <int D>
 inline Vector<D> as_at_start(const RigidBody<D>& body, const Vector<D>& x)

@@ -20,8 +20,24 @@
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
+#include <limits>
+
 namespace mpm::contact
 {
+/// What the particles of a cell need not ask the surface, as it was when these bounds were found.
+template <int D>
+struct CellBound
+{
+  double distance = 0; ///< of the centre from the surface; a lower bound where the cell is far from it [m]
+  double reach = 0;    ///< from the centre to the farthest vertex [m]
+  double sight = 0;    ///< from each point of the cell, all of the surface that is closer is among the parts [m]
+  double ceiling = 0;  ///< a point x of the cell is at least min(normal . x - height, ceiling) from the surface [m]
+  Vector<D> normal{};
+  double height = std::numeric_limits<double>::infinity(); ///< unknown [m]
+  std::size_t first = 0, last = 0;                         ///< parts of the surface; see `distance_within`
+  bool blind = false;                                      ///< whether `distance` alone is known
+};
+
 /// A rigid surface that touches the particles, how it moves, what it feels, and what it remembers.
 template <int D>
 struct Contact
@@ -39,12 +55,12 @@ struct Contact
   Vector<D> impulse{};    ///< of the soil on the surface since it was made; this rank's part [N s]
   Reaction<D> of_ranks{}; ///< over all ranks, where the motion depends on it; else zero
 
-  // Lower bounds of the gaps in each cell
-  std::vector<double> clearance;
-  std::vector<double> cell_reach; ///< from the centre of each cell to its farthest vertex [m]
-  double reach = 0;               ///< of the surface from its centre, as far as there is mesh [m]
-  double travel = 0;              ///< path of its fastest point since the bounds were found [m]
-  double cell_size = 0;           ///< travel after which they are found again [m]
+  // Lower bounds of the distances in each cell
+  std::vector<CellBound<D>> bounds;
+  std::vector<Index> parts;
+  double reach = 0;     ///< of the surface from its centre, as far as there is mesh [m]
+  double travel = 0;    ///< path of its fastest point since the bounds were found [m]
+  double keeps_for = 0; ///< travel after which they are found again [m]
 };
 
 /// A ball and another body that collide where they touch.

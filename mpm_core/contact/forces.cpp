@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace mpm::contact
@@ -16,7 +17,9 @@ struct Press
 {
   double dt;
   double stiffness; ///< per mass [1/s2]
-  Matrix<3> turn;   ///< rotation of the body in the step, less the identity
+  bool rotated;     ///< whether the body is
+  bool turns;       ///< whether it rotates in the step
+  Matrix<3> turn;   ///< its rotation in the step, less the identity
   double per_mass;  ///< translation of a free body under a force: 1/M [1/kg]
   double per_inertia;
   std::vector<Column>* slips;
@@ -37,6 +40,8 @@ Press<D> press_of(const Contact<D>& contact, double dt, Particles<D>& particles)
   const bool free = std::ranges::count(body.drive, Drive::free) > 0;
   return {dt,
           contact.penalty / (contact.stiff_step * contact.stiff_step),
+          body.rotation != rotation_by({}),
+          body.spin != Vector<3>{},
           turn,
           free ? 1 / body.mass : 0,
           body.rotates ? 1 / least : 0,
@@ -56,15 +61,16 @@ struct Touch
 };
 
 template <int D>
-Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Vector<D>& x, const Vector<D>& velocity)
+Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Distance<D>& nearest, const Vector<D>& x,
+                  const Vector<D>& velocity)
 {
   const RigidBody<D>& body = contact.body;
-  const auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
+  const auto& [apart, normal] = nearest;
   Touch<D> touch;
-  touch.normal = rotated<D>(body.rotation, normal);
+  touch.normal = press.rotated ? rotated<D>(body.rotation, normal) : normal;
   for (int i = 0; i < D; ++i)
     touch.arm[i] = x[i] - apart * touch.normal[i] - body.displacement[i] - body.centre[i];
-  const Vector<D> turned = rotated<D>(press.turn, touch.arm);
+  const Vector<D> turned = press.turns ? rotated<D>(press.turn, touch.arm) : Vector<D>{};
   for (int i = 0; i < D; ++i)
     touch.motion[i] = press.dt * (velocity[i] - body.velocity[i]) - turned[i];
   touch.before = apart;
@@ -89,11 +95,11 @@ void leave_slip(const Press<D>& press, Index p)
 
 /// Force on a particle that is tied to the surface, by all of its motion relative to the body.
 template <class G, int D = G::dim>
-Vector<D> bond_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles, Index p,
-                     Contact<D>& contact)
+std::optional<Vector<D>> bond_force(const Press<D>& press, const Distance<D>& nearest, const Vector<D>& velocity,
+                                    const Particles<D>& particles, Index p, Contact<D>& contact)
 {
   const Vector<D> x = at<D>(particles.position, p);
-  const Touch<D> touch = touch_of<D>(contact, press, x, velocity);
+  const Touch<D> touch = touch_of<D>(contact, press, nearest, x, velocity);
   const Vector<D> stretch = difference<D>(x, as_it_is<D>(contact.body, anchor_of<D>(*press.bonds, p)));
   Vector<D> arm, force;
   for (int i = 0; i < D; ++i)
@@ -116,13 +122,10 @@ Vector<D> bond_force(const Press<D>& press, const Vector<D>& velocity, const Par
 
 /// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
 template <class G, int D = G::dim>
-std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& velocity, const Particles<D>& particles,
-                                        Index p, Contact<D>& contact)
+std::optional<Vector<D>> particle_force(const Press<D>& press, const Distance<D>& nearest, const Vector<D>& velocity,
+                                        const Particles<D>& particles, Index p, Contact<D>& contact)
 {
-  if (press.bonds)
-    return is_tied(*press.bonds, p) ? std::optional(bond_force<G, D>(press, velocity, particles, p, contact))
-                                    : std::nullopt;
-  const Touch<D> touch = touch_of<D>(contact, press, at<D>(particles.position, p), velocity);
+  const Touch<D> touch = touch_of<D>(contact, press, nearest, at<D>(particles.position, p), velocity);
   if (!is_near<G>(particles, p, touch.after))
   {
     leave_slip<D>(press, p);
@@ -162,24 +165,102 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Vector<D>& 
   return force;
 }
 
+/// Lower bound of the distance of a point of a cell from the surface, where it was when the bounds were found.
+template <int D>
+double height_over(const CellBound<D>& bound, const Vector<D>& x)
+{
+  return std::min(dot<D>(bound.normal, x) - bound.height, bound.ceiling);
+}
+
+/// Such a bound for all points of a cell.
+template <int D>
+double lowest_point(const Mesh<D>& mesh, Index cell, const CellBound<D>& bound)
+{
+  double lowest = std::numeric_limits<double>::infinity();
+  for (Index node : mesh.cells[static_cast<std::size_t>(cell)])
+    lowest = std::min(lowest, height_over<D>(bound, mesh.points[static_cast<std::size_t>(node)]));
+  return lowest;
+}
+
+/// What the particles of a cell know of the surface in this step.
+template <int D>
+struct Sight
+{
+  CellBound<D> bound;
+  std::span<const Index> parts;
+  double travelled; ///< by the surface since the bounds were found, up to the end of the step [m]
+  double motion;    ///< towards the surface since then, at most [m]
+  double width;     ///< of the largest particle, and its motion [m]
+};
+
+template <class G, int D = G::dim>
+Sight<D> sight_of(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double travelled,
+                  const Contact<D>& contact, const Particles<D>& particles)
+{
+  const CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(run.cell)];
+  double largest = 0;
+  for (Index p = run.first; p < run.last; ++p)
+    largest = std::max(largest, particle_cube<G>(particles, p));
+  const double motion = travelled + dt * fastest_node<D>(mesh, run.cell, velocity);
+  return {bound, std::span<const Index>(contact.parts).subspan(bound.first, bound.last - bound.first), travelled,
+          motion, motion + (D == 3 ? std::cbrt(largest) : std::sqrt(largest))};
+}
+
+/// Distance of a particle from the surface where it may matter, at the step's start; nothing where it is farther than
+/// its own size, also at the end.
+/// @param xi  from the centre of its cell [m]
+template <class G, int D = G::dim>
+std::optional<Distance<D>> near_distance(const Contact<D>& contact, const Press<D>& press, const Sight<D>& sight,
+                                         const Vector<D>& x, const Vector<D>& xi, double cube)
+{
+  const CellBound<D>& bound = sight.bound;
+  const double height = height_over<D>(bound, x), from_centre = norm<D>(xi);
+  const RigidBody<D>& body = contact.body;
+  const Vector<D> as_it_was = press.rotated ? as_at_start<D>(body, x) : difference<D>(x, body.displacement);
+  if (bound.blind)
+    return distance<D>(contact.surface, as_it_was);
+  if (!fits<D>(std::max(height, bound.distance - from_centre) - sight.motion, cube))
+    return std::nullopt;
+  // A particle is outside if it is above all of the surface that is close, or if there is none between it and the
+  // centre of its cell, which is outside.
+  const double visible = bound.sight - sight.travelled;
+  const bool above = height > sight.motion;
+  const double limit = above ? sight.width : std::max(from_centre + sight.travelled, sight.width);
+  if ((above || bound.distance > sight.travelled) && limit <= visible)
+    return distance_within<D>(contact.surface, as_it_was, sight.parts, limit);
+  if (const auto found = distance_within<D>(contact.surface, as_it_was, sight.parts, std::max(visible, 0.0)))
+    return found;
+  return distance<D>(contact.surface, as_it_was);
+}
+
 /// Forces on the particles of a run, by their moments.
 /// @returns whether any was in contact
 template <class G, int D = G::dim>
 bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, const Press<D>& press,
-               const Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
+               double travelled, Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
 {
-  const Vector<D>& centre = mesh.shapes[run.cell].centre;
+  const Sight<D> sight = sight_of<G, D>(mesh, run, velocity, press.dt, travelled, contact, particles);
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   const AffineField<D> field = affine_field<D>(mesh, run.cell, nodal);
   bool touched = false;
   for (Index p = run.first; p < run.last; ++p)
   {
-    Vector<D> xi, v;
-    for (int i = 0; i < D; ++i)
-      xi[i] = particles.position[i][p] - centre[i];
+    const Vector<D> x = at<D>(particles.position, p), xi = difference<D>(x, mesh.shapes[run.cell].centre);
+    if (press.bonds && !is_tied(*press.bonds, p))
+      continue;
+    const auto nearest = press.bonds
+                             ? distance<D>(contact.surface, as_at_start<D>(contact.body, x))
+                             : near_distance<G, D>(contact, press, sight, x, xi, particle_cube<G>(particles, p));
+    if (!nearest)
+    {
+      leave_slip<D>(press, p);
+      continue;
+    }
+    Vector<D> v;
     for (int i = 0; i < D; ++i)
       v[i] = field.value[i] + dot<D>(field.gradient[i], xi);
-    const std::optional<Vector<D>> force = particle_force<G, D>(press, v, particles, p, contact);
+    const auto force = press.bonds ? bond_force<G, D>(press, *nearest, v, particles, p, contact)
+                                   : particle_force<G, D>(press, *nearest, v, particles, p, contact);
     if (!force)
       continue;
     touched = true;
@@ -204,10 +285,10 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
   bool touched = false;
   for (const Run& run : runs)
   {
-    const double clearance = contact.clearance[static_cast<std::size_t>(run.cell)];
-    if (clearance > travelled || movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
+    const CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(run.cell)];
+    if (!may_be_near(bound, travelled) || movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
       continue;
-    const double gap = clearance + 2 * contact.cell_reach[static_cast<std::size_t>(run.cell)] - travelled;
+    const double gap = std::max(bound.distance - bound.reach, lowest_point<D>(mesh, run.cell, bound)) - travelled;
     if (!may_be_near<G, D>(mesh, run, velocity, dt, gap, particles))
     {
       for (Index p = run.first; p < run.last; ++p)
@@ -215,7 +296,7 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
       continue;
     }
     TractionMoments<D> moments{};
-    if (!press_run<G, D>(mesh, run, velocity, press, particles, contact, moments))
+    if (!press_run<G, D>(mesh, run, velocity, press, travelled, particles, contact, moments))
       continue;
     touched = true;
     for (int k = 0; k <= D; ++k)

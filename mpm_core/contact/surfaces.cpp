@@ -20,56 +20,6 @@ Vector<D> scaled(Vector<D> v, double factor)
   return v;
 }
 
-/// To the left of a segment, of length 1.
-Vector<2> left_normal(const Vector<2>& from, const Vector<2>& to)
-{
-  const Vector<2> e = difference<2>(to, from);
-  return scaled<2>({-e[1], e[0]}, 1 / norm<2>(e));
-}
-
-/// The nearest point on a segment: its number, and where along it, from 0 to 1 but beyond the ends of an open line.
-struct Nearest
-{
-  std::size_t segment = 0;
-  double along = 0;
-  double squared = std::numeric_limits<double>::infinity();
-  Vector<2> offset{}; ///< from there to the point
-};
-
-std::size_t segments_of(const Polyline& line) { return line.points.size() - (line.closed ? 0 : 1); }
-
-Nearest nearest_on(const Polyline& line, const Vector<2>& x)
-{
-  const std::size_t n = segments_of(line);
-  Nearest best;
-  for (std::size_t k = 0; k < n; ++k)
-  {
-    const Vector<2>& from = line.points[k];
-    const Vector<2> e = difference<2>(line.points[(k + 1) % line.points.size()], from), r = difference<2>(x, from);
-    const double low = !line.closed && k == 0 ? -endless : 0, high = !line.closed && k + 1 == n ? endless : 1;
-    const double along = std::clamp(dot<2>(r, e) / dot<2>(e, e), low, high);
-    const Vector<2> offset = difference<2>(r, scaled<2>(e, along));
-    if (const double squared = dot<2>(offset, offset); squared < best.squared)
-      best = {k, along, squared, offset};
-  }
-  return best;
-}
-
-/// The outward direction where a point is nearest: at a corner the sum of the normals of both segments, whose sign is
-/// right on either side however sharp the corner (Baerentzen & Aanaes 2005).
-Vector<2> side(const Polyline& line, const Nearest& at)
-{
-  const std::size_t n = segments_of(line), size = line.points.size();
-  const auto normal_of = [&](std::size_t k) { return left_normal(line.points[k], line.points[(k + 1) % size]); };
-  Vector<2> normal = normal_of(at.segment);
-  const bool first = at.along == 0 && (line.closed || at.segment > 0);
-  const bool last = at.along == 1 && (line.closed || at.segment + 1 < n);
-  if (!first && !last)
-    return normal;
-  const Vector<2> other = normal_of((at.segment + (first ? n - 1 : 1)) % n);
-  return {normal[0] + other[0], normal[1] + other[1]};
-}
-
 template <int D>
 Distance<D> distance_from(const Plane<D>& plane, const Vector<D>& x)
 {
@@ -103,10 +53,9 @@ Distance<D> distance_from(const Box<D>& box, const Vector<D>& x)
   return {beyond[axis], normal};
 }
 
-Distance<2> distance_from(const Polyline& line, const Vector<2>& x)
+Distance<2> distance_at(const Polyline& line, const NearestOnLine& nearest)
 {
-  const Nearest nearest = nearest_on(line, x);
-  const Vector<2> out = side(line, nearest);
+  const Vector<2> out = outward_at(line, nearest);
   const double length = std::sqrt(nearest.squared);
   if (length == 0)
     return {0, scaled<2>(out, 1 / norm<2>(out))};
@@ -114,15 +63,21 @@ Distance<2> distance_from(const Polyline& line, const Vector<2>& x)
   return {sign * length, scaled<2>(nearest.offset, sign / length)};
 }
 
-Distance<3> distance_from(const Triangles& triangles, const Vector<3>& x)
+Distance<3> distance_at(const Triangles& triangles, const NearestOnTriangles& nearest)
 {
-  const NearestOnTriangles nearest = nearest_on(triangles, x);
   const Vector<3> out = outward_at(triangles, nearest);
   const double height = dot<3>(out, nearest.offset), length = std::sqrt(nearest.squared);
   if (length == 0 || is_at_border(triangles, nearest))
     return {height, out};
   const double sign = height < 0 ? -1 : 1;
   return {sign * length, scaled<3>(nearest.offset, sign / length)};
+}
+
+Distance<2> distance_from(const Polyline& line, const Vector<2>& x) { return distance_at(line, nearest_on(line, x)); }
+
+Distance<3> distance_from(const Triangles& triangles, const Vector<3>& x)
+{
+  return distance_at(triangles, nearest_on(triangles, x));
 }
 
 Distance<3> distance_from(const Revolved& solid, const Vector<3>& x)
@@ -214,8 +169,23 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
   return std::visit(from, surface);
 }
 
+template <int D>
+std::optional<Distance<D>> distance_within(const Surface<D>& surface, const Vector<D>& x, std::span<const Index> parts,
+                                           double limit)
+{
+  const auto* divided = std::get_if<std::conditional_t<D == 2, Polyline, Triangles>>(&surface);
+  if (!divided)
+    return distance<D>(surface, x);
+  const auto nearest = nearest_on(*divided, x, parts, limit * limit);
+  return nearest.squared < limit * limit ? std::optional(distance_at(*divided, nearest)) : std::nullopt;
+}
+
 template Distance<2> distance<2>(const Surface<2>&, const Vector<2>&);
 template Distance<3> distance<3>(const Surface<3>&, const Vector<3>&);
+template std::optional<Distance<2>> distance_within<2>(const Surface<2>&, const Vector<2>&, std::span<const Index>,
+                                                       double);
+template std::optional<Distance<3>> distance_within<3>(const Surface<3>&, const Vector<3>&, std::span<const Index>,
+                                                       double);
 template double rotation_reach<2>(const Surface<2>&, const Vector<2>&);
 template double rotation_reach<3>(const Surface<3>&, const Vector<3>&);
 } // namespace mpm::contact

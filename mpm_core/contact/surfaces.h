@@ -2,8 +2,10 @@
 /// @file
 /// Rigid surfaces as plain values, with their signed distance and their normal.
 
+#include "contact/polyline.h"
 #include "contact/triangles.h"
 
+#include <optional>
 #include <variant>
 
 namespace mpm::contact
@@ -30,14 +32,6 @@ struct Box
   Vector<D> lower, upper;
 };
 
-/// Segments from point to point with the soil on their left. An open line goes on straight beyond its ends; a closed
-/// one returns from its last point to its first.
-struct Polyline
-{
-  std::vector<Vector<2>> points;
-  bool closed;
-};
-
 /// A solid of revolution: the closed section, which mirrors itself in the axis, in coordinates (r, z) from a point on
 /// it.
 struct Revolved
@@ -60,6 +54,13 @@ struct Distance
 
 template <int D>
 Distance<D> distance(const Surface<D>& surface, const Vector<D>& x);
+
+/// Distance of a point if it is at most `limit`, else nothing: by a search of some parts, which are segments of a
+/// polyline or boxes of triangles. Surfaces without parts always give it.
+/// @param parts  contain all of the surface that is so near
+template <int D>
+std::optional<Distance<D>> distance_within(const Surface<D>& surface, const Vector<D>& x, std::span<const Index> parts,
+                                           double limit);
 
 /// How far the surface moves at most when it rotates by one radian about a point [m]; infinite where it is endless.
 template <int D>

@@ -33,6 +33,19 @@ bool fits(double side, double volume)
   return side <= 0 || (D == 3 ? side * side * side : side * side) < volume;
 }
 
+/// Speed of the fastest node of a cell [m/s].
+template <int D>
+double fastest_node(const Mesh<D>& mesh, Index cell, std::span<const Vector<D>> velocity)
+{
+  double fastest = 0;
+  for (Index node : mesh.cells[static_cast<std::size_t>(cell)])
+  {
+    const Vector<D>& v = velocity[static_cast<std::size_t>(node)];
+    fastest = std::max(fastest, dot<D>(v, v));
+  }
+  return std::sqrt(fastest);
+}
+
 /// Whether any particle of a run can be near: not if the largest would not be where the cell, and the step, bring it
 /// nearest. Most cells that a surface may reach before their bounds are found again are not at it now.
 /// @param gap  smallest possible distance of the cell from the surface at the end of the step, if its nodes rest [m]
@@ -40,13 +53,10 @@ template <class G, int D = G::dim>
 bool may_be_near(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double gap,
                  const Particles<D>& particles)
 {
-  double fastest = 0, largest = 0;
-  for (Index node : mesh.cells[run.cell])
-    fastest =
-        std::max(fastest, dot<D>(velocity[static_cast<std::size_t>(node)], velocity[static_cast<std::size_t>(node)]));
+  double largest = 0;
   for (Index p = run.first; p < run.last; ++p)
     largest = std::max(largest, particle_cube<G>(particles, p));
-  return fits<D>(gap - dt * std::sqrt(fastest), largest);
+  return fits<D>(gap - dt * fastest_node<D>(mesh, run.cell, velocity), largest);
 }
 
 /// The part of a vector along a surface.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -9,7 +10,7 @@ namespace mpm::contact
 {
 namespace
 {
-constexpr Index most_in_leaf = 4;
+constexpr Index most_in_leaf = 2;
 
 Vector<3> plus(const Vector<3>& a, const Vector<3>& b, double factor)
 {
@@ -81,6 +82,23 @@ void find_neighbours(Triangles& surface)
     }
 }
 
+/// Children come after their box.
+void find_boxes_at_border(Triangles& surface)
+{
+  surface.box_at_border.assign(surface.boxes.size(), 0);
+  for (std::size_t number = surface.boxes.size(); number-- > 0;)
+  {
+    const TriangleBox& box = surface.boxes[number];
+    unsigned char any = 0;
+    for (Index t = box.first; t < box.first + box.count; ++t)
+      for (Index corner : surface.triangles[static_cast<std::size_t>(t)])
+        any |= surface.at_border[static_cast<std::size_t>(corner)];
+    if (box.count == 0)
+      any = surface.box_at_border[number + 1] | surface.box_at_border[static_cast<std::size_t>(box.first)];
+    surface.box_at_border[number] = any;
+  }
+}
+
 /// A box around triangles, with those of its halves behind it.
 /// @param order  numbers of the triangles, put in the order of the leaves
 void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, Index first, Index last,
@@ -119,12 +137,28 @@ void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, In
   add_box(surface, centres, middle, last, order, boxes);
 }
 
+/// Boxes that a search has still to look at, and their distances squared; the last one comes first.
+struct NearBoxes
+{
+  // Halves have as many triangles as each other, so that 64 levels suffice; the search begins with a few boxes.
+  std::array<std::pair<double, Index>, 64 + 2 * most_start_boxes> boxes;
+  std::size_t size = 0;
+
+  void push(const std::pair<double, Index>& box) { boxes[size++] = box; }
+  void nearest_last() { std::sort(boxes.begin(), boxes.begin() + size, std::greater<>{}); }
+  void order_last_two()
+  {
+    if (boxes[size - 2].first < boxes[size - 1].first)
+      std::swap(boxes[size - 2], boxes[size - 1]);
+  }
+};
+
 double squared_distance(const TriangleBox& box, const Vector<3>& x)
 {
   double sum = 0;
   for (std::size_t i = 0; i < 3; ++i)
   {
-    const double beyond = std::max({box.lower[i] - x[i], 0.0, x[i] - box.upper[i]});
+    const double beyond = std::max(std::max(box.lower[i] - x[i], x[i] - box.upper[i]), 0.0);
     sum += beyond * beyond;
   }
   return sum;
@@ -168,7 +202,7 @@ NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vecto
 
 Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles)
 {
-  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}};
+  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}, {}};
   std::vector<Vector<3>> centres;
   for (const auto& [a, b, c] : surface.triangles)
   {
@@ -187,20 +221,35 @@ Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array
   surface.triangles = std::move(sorted);
   find_neighbours(surface);
   find_vertex_normals(surface);
+  find_boxes_at_border(surface);
   return surface;
 }
 
 NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x)
 {
+  static constexpr Index root = 0;
+  return nearest_on(surface, x, std::span(&root, 1), std::numeric_limits<double>::infinity());
+}
+
+NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x, std::span<const Index> boxes,
+                              double squared)
+{
   NearestOnTriangles best;
-  best.squared = std::numeric_limits<double>::infinity();
-  std::array<std::pair<double, Index>, 64> stack; // halves have as many triangles as each other: 2^64 of them suffice
-  std::size_t size = 0;
-  stack[size++] = {0, 0};
-  while (size > 0)
+  best.squared = squared;
+  NearBoxes near;
+  const auto look_at = [&](Index number)
   {
-    const auto [squared, number] = stack[--size];
-    if (squared >= best.squared)
+    const double apart = squared_distance(surface.boxes[static_cast<std::size_t>(number)], x);
+    if (apart < best.squared)
+      near.push({apart, number});
+  };
+  for (Index number : boxes)
+    look_at(number);
+  near.nearest_last();
+  while (near.size > 0)
+  {
+    const auto [apart, number] = near.boxes[--near.size];
+    if (apart >= best.squared)
       continue;
     const TriangleBox& box = surface.boxes[static_cast<std::size_t>(number)];
     for (Index t = box.first; t < box.first + box.count; ++t)
@@ -208,12 +257,11 @@ NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x)
         best = found;
     if (box.count > 0)
       continue;
-    std::pair<double, Index> near{squared_distance(surface.boxes[static_cast<std::size_t>(number) + 1], x), number + 1};
-    std::pair<double, Index> far{squared_distance(surface.boxes[static_cast<std::size_t>(box.first)], x), box.first};
-    if (far.first < near.first)
-      std::swap(near, far);
-    stack[size++] = far;
-    stack[size++] = near;
+    const std::size_t before = near.size;
+    look_at(number + 1);
+    look_at(box.first);
+    if (near.size == before + 2)
+      near.order_last_two();
   }
   return best;
 }

@@ -4,6 +4,8 @@
 
 #include "base/tensor.h"
 
+#include <limits>
+#include <span>
 #include <vector>
 
 namespace mpm::contact
@@ -26,6 +28,7 @@ struct Triangles
   std::vector<Vector<3>> vertex_normals;        ///< normals of the triangles around it, weighted with their angles
   std::vector<unsigned char> at_border;         ///< per vertex
   std::vector<TriangleBox> boxes;               ///< the root first
+  std::vector<unsigned char> box_at_border;     ///< per box, whether any vertex in it is
 };
 
 /// @pre each side belongs to one triangle, or to two that pass it in opposite directions; no triangle without area
@@ -37,10 +40,18 @@ struct NearestOnTriangles
   Index triangle = 0;
   int feature = 0;    ///< 0 inside of it, 1 to 3 on the side from vertex k - 1, 4 to 6 at vertex k - 4
   Vector<3> offset{}; ///< from there to the other point [m]
-  double squared = 0; ///< its length squared [m2]
+  double squared = std::numeric_limits<double>::infinity(); ///< its length squared [m2]
 };
 
 NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x);
+
+/// Boxes from which a search may begin, at most.
+inline constexpr std::size_t most_start_boxes = 8;
+
+/// The nearest point on the triangles in some boxes, at most `most_start_boxes`; if one is nearer than a limit.
+/// @param squared  the limit, or what is returned without any [m2]
+NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x, std::span<const Index> boxes,
+                              double squared);
 
 /// The outward direction where a point is nearest, of length 1: its sign is right also where it is nearest to a side or
 /// to a vertex (Baerentzen & Aanaes 2005).

@@ -119,7 +119,7 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
     for (const Run& run : model.order.runs)
     {
       const auto cell = static_cast<std::size_t>(run.cell);
-      const double gap = contact.clearance[cell] + 2 * contact.cell_reach[cell] - travelled;
+      const double gap = contact.bounds[cell].distance - contact.bounds[cell].reach - travelled;
       if (!may_be_near<G, D>(model.mesh, run, velocity, time.dt, gap, model.particles))
         continue;
       const std::size_t before = trial.touching.size();

@@ -21,7 +21,7 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalI
   for (VelocityField<G>& field : model.fields)
     field = {};
   for (Contact<D>& contact : model.contacts)
-    contact.clearance.clear(); // of cells that have other numbers now
+    contact.bounds.clear(); // of cells that have other numbers now
   for (FieldContact<D>& contact : model.field_contacts)
   {
     contact.touching.clear();
