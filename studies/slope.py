@@ -53,6 +53,7 @@ from common.watch import Watch
 from mpi4py import MPI
 from mpm_core.output import PARTICLE_FIELDS, ModelOutput
 from mpm_core.probes import ParticleProbe, ProbeFile, SectionProbe, TotalsProbe
+from mpm_core.setup_warnings import keeps_volume
 
 import mpm_core as mpm
 
@@ -83,7 +84,8 @@ def parser() -> ArgumentParser:
     slide = p.add_argument_group("slide")
     add_number(slide, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_pic(slide, 0.0)
-    add_switch(slide, "--nmd", False, "average volumetric strains over nodes, against locking")
+    add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil keeps its "
+               "volume: friction angle 0, undrained, Poisson's ratio above 0.45; not with --paper)")  # fmt: skip
     add_number(slide, "--time", 34.8, "s", "duration of the slide", above=0)
     add_scheme_options(slide)
     add_number(slide, "--rebalance", 1.2, "-",
@@ -297,6 +299,8 @@ def main(arguments: list[str] | None = None) -> int:
     clock = {"start": perf_counter()}
     folder = open_results(a, comm)
     case = build_slope(a, comm)
+    if a.nmd is None:
+        a.nmd = not a.paper and keeps_volume(case.model.laws)
     check_frames(case.model, a, folder)
     clock["mesh_and_particles"] = perf_counter()
     if a.restart is not None:

@@ -13,6 +13,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 from mpm_core.output import ModelOutput
+from mpm_core.setup_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -95,11 +96,12 @@ def slide(
     """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective.
 
     Args:
-        a: options with time, frames, damping, pic and nmd.
+        a: options with time, frames, damping, pic and nmd; without a nmd, strains are averaged where the soil keeps its volume.
         update: called after each frame, such as for loads that change with the shape of the body.
         step: of the implicit scheme, in the place of the explicit one [s].
     """
-    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": a.nmd}
+    nmd = keeps_volume(model.laws) if a.nmd is None else a.nmd
+    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,

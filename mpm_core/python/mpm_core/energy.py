@@ -15,7 +15,7 @@ NOISE_ABOVE = 0.1
 """Fraction of the energy at work in motion of the particles against their nodes above which there is a warning"""
 
 LEAST_STEPS = 32
-"""Steps of a model before its energy is checked: in the first steps half a time step is a large part of it"""
+"""Steps of a model before its energy is checked: in the first explicit steps half a time step is a large part of it"""
 
 
 ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
@@ -34,11 +34,13 @@ class EnergyWatch:
         limit: `Report.unexplained_fraction` at which the run ends with an error; None for none.
         speaks: whether this rank issues the warning.
         advice: what its text ends with.
+        least_steps: steps of a model before its energy is checked.
     """
 
     limit: float | None
     speaks: bool
     advice: str = ADVICE
+    least_steps: int = LEAST_STEPS
     warned: float = WARN_ABOVE
     noisy: bool = False
     largest: float = 0.0  # of the energies at work so far: a body that swings back has little of it
@@ -55,7 +57,7 @@ class EnergyWatch:
         Raises:
             RunError: it has passed the limit.
         """
-        if report.steps < LEAST_STEPS:
+        if report.steps < self.least_steps:
             return
         fraction = abs(report.unexplained_fraction)
         if self.limit is not None and fraction > self.limit:

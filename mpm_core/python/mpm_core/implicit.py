@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import positive, within
-from .energy import ADVICE, EnergyWatch
+from .energy import ADVICE, LEAST_STEPS, EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
@@ -22,6 +22,9 @@ from .step_control import StepControl
 
 if TYPE_CHECKING:
     from .model import Model
+
+LEAST_EULER_STEPS = 4
+"""Steps of backward Euler after which a run is told of the energy that it dissipates"""
 
 FADING = 0.1
 """Factor on the ghost penalty between steps that only redistribute stresses"""
@@ -62,13 +65,14 @@ def implicit_options(
     return options
 
 
-def _energy_advice(options: Any) -> str:
-    """What to do about energy that an implicit run does not explain."""
+def _energy_check(options: Any) -> tuple[str, int]:
+    """What to do about energy that an implicit run does not explain, and the steps from which on it is looked at."""
     if options.second_order or options.damping:
-        return ADVICE
+        return ADVICE, LEAST_STEPS
     return (
         "steps of backward Euler dissipate motion that they resolve, and a slide ends too early: second_order=True with "
-        "integration=MIXED, or shorter steps, dissipate less (docs/implicit.md)"
+        "integration=MIXED, or shorter steps, dissipate less (docs/implicit.md)",
+        LEAST_EULER_STEPS,
     )
 
 
@@ -189,7 +193,7 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, _energy_advice(options))
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, *_energy_check(options))
     failure = FailureWatch(model, options.nmd)
 
     def report() -> ImplicitReport:

@@ -70,6 +70,11 @@ def _weight(model: Model) -> str:
     )
 
 
+def keeps_volume(laws: Iterable[Any]) -> bool:
+    """Whether a law hardly lets its soil change its volume, so that linear cells lock without averaged strains."""
+    return bool(locking(laws))
+
+
 def locking(laws: Iterable[Any]) -> str:
     """What a warning says of linear cells or elements without averaged strains; empty where no law keeps the volume of its soil."""
     reasons = sorted({reason for law in laws for reason in _reasons_to_lock(law)})
@@ -84,7 +89,7 @@ def locking(laws: Iterable[Any]) -> str:
 def locks_at_failure(laws: Iterable[Any]) -> bool:
     """Whether a law keeps the volume of its soil only as it fails: its dilation angle is below its friction angle."""
     laws = list(laws)
-    return not locking(laws) and any(_core.associated_fraction(law) < 1 for law in laws)
+    return not keeps_volume(laws) and any(_core.associated_fraction(law) < 1 for law in laws)
 
 
 class FailureWatch:

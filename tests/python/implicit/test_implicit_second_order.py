@@ -1,5 +1,6 @@
 """The implicit scheme of second order in time: its order, what energy it leaves, and its steps by an error estimate."""
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -80,6 +81,20 @@ def test_only_the_waves_of_a_sudden_load_lose_energy_in_a_slide():
         plastic[ramp] = report.plastic_work / report.external_work
     assert plastic[1.0] > 0.2
     assert lost[0.0] > 0.03 and abs(lost[1.0]) < 0.01
+
+
+def test_an_undamped_run_by_backward_euler_is_told_of_second_order():
+    for second_order in (False, True):
+        model = slope(weight=60e3, per_cell=3)
+        model.set_gravity((0, -9.81), ramp=1.0)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            model.implicit(
+                1.2, dt=0.1, every=0.3, second_order=second_order, nmd=True, integration=mpm.Integration.MIXED
+            ).last()
+        told = [str(each.message) for each in caught if issubclass(each.category, mpm.EnergyWarning)]
+        assert len(told) == (0 if second_order else 1)
+        assert all("second_order=True" in text for text in told)
 
 
 def test_the_accuracy_wanted_is_reached_by_shorter_steps():
