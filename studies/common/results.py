@@ -18,7 +18,7 @@ from typing import Any, TextIO
 
 from mpi4py import MPI
 
-from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError
+from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError, on_first_rank
 from .options import Options
 from .parameters import write_parameters
 
@@ -50,17 +50,14 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
     Note:
         Collective.
     """
-    folder, problem = None, None
     NOT_WRITTEN.clear()
-    if comm.rank == 0:
-        try:
-            folder = _opened(options, adds)
-            write_parameters(folder / "parameters.toml", options.parameters(), options.study, options.restarts)
-        except OutputError as error:
-            problem = str(error)
-    folder, problem = comm.bcast((folder, problem))
-    if problem is not None:
-        raise OutputError(problem)
+
+    def opened() -> Path:
+        folder = _opened(options, adds)
+        write_parameters(folder / "parameters.toml", options.parameters(), options.study, options.restarts)
+        return folder
+
+    folder = on_first_rank(comm, opened)
     _keep_compiler_lines(folder)
     return folder
 
@@ -80,16 +77,16 @@ def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
     Raises:
         OutputError: on all ranks, with path and reason.
     """
-    path, problem = folder / name, None
-    if comm.rank == 0:
+
+    def made() -> Path:
+        path = folder / name
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            problem = f"cannot write results to {path}: {error.strerror}"
-    problem = comm.bcast(problem)
-    if problem is not None:
-        raise OutputError(problem)
-    return path
+            raise OutputError(f"cannot write results to {path}: {error.strerror}") from None
+        return path
+
+    return on_first_rank(comm, made)
 
 
 def release_reserved_space(folder: Path) -> None:

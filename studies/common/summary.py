@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .figures import Pictures, draw_pictures
-from .files import NOT_WRITTEN, OutputError, expendable, write_text
+from .files import NOT_WRITTEN, expendable, on_first_rank, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
 from .results import note_what_was_written, release_reserved_space
@@ -45,15 +45,7 @@ def write_summary(
         OutputError: on all ranks, with path and reason, when ``summary.json`` cannot be written. A picture, a film or the page
             that cannot be written costs only itself.
     """
-    problem = None
-    if comm.rank == 0:
-        try:
-            _write(folder, options, results, comm, page, pictures or {})
-        except OutputError as error:
-            problem = str(error)
-    problem = comm.bcast(problem)
-    if problem is not None:
-        raise OutputError(problem)
+    on_first_rank(comm, lambda: _write(folder, options, results, comm, page, pictures or {}))
 
 
 def _write(

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import InputError
+from .collective import collectively
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -20,18 +21,11 @@ def agreed(comm: MPI.Comm, check: Callable[[], Arrays]) -> tuple[dict[str, np.nd
     Raises:
         InputError: on all ranks: that of `check` on any rank, or names or components that are not the same on all.
     """
-    arrays: dict[str, np.ndarray] = {}
-    error = None
-    try:
-        arrays = dict(check())
-    except InputError as failure:
-        error = str(failure)
+    arrays = dict(collectively(comm, check))
     shapes = [f"{name}:{'x'.join(map(str, values.shape[1:]))}" for name, values in arrays.items()]
     wide = {name for name, values in arrays.items() if values.dtype.kind == "i" and not _fits(values)}
     n = len(next(iter(arrays.values()), ()))
-    errors, names, counts, wides = zip(*comm.allgather((error, shapes, n, wide)))
-    if failures := [one for one in errors if one is not None]:
-        raise InputError(failures[0])
+    names, counts, wides = zip(*comm.allgather((shapes, n, wide)))
     if any(other != shapes for other in names):
         raise InputError(f"fields are not the same on all ranks; here: {', '.join(shapes)}")
     for name, values in arrays.items():

@@ -11,8 +11,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ._core import InputError, RunError
-from .collective import collectively
+from ._core import InputError
+from .collective import collectively, on_first_rank
 
 ROUNDING = 1e-8
 """Relative; times in the file have nine digits."""
@@ -72,16 +72,12 @@ class RowFile:
         Raises:
             RunError: on all ranks, with path and reason, when it cannot be written.
         """
-        problem = None
-        if self._file is not None:
-            try:
-                self._writer.writerow([f"{value:.9g}" for value in values])
-                self._file.flush()
-            except OSError as error:
-                problem = f"cannot write {self.path}: {error.strerror}"
-        problem = self._comm.bcast(problem)
-        if problem is not None:
-            raise RunError(problem)
+
+        def write() -> None:
+            self._writer.writerow([f"{value:.9g}" for value in values])
+            self._file.flush()
+
+        on_first_rank(self._comm, self.path, write)
 
     def close(self) -> None:
         """Close the file; nothing can be added after that. A row that the disk could not hold is left out."""
