@@ -111,7 +111,7 @@ class LinearSolver:
         self.iterations.append(0)
         failure, added = "", 0.0
         for part in [p for p in (0.0, *PARTS) if p >= self._part]:
-            if part > added:
+            if self._first is not None and part > added:
                 matrix.axpy(part - added, self._first, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
                 added = part
             solution.set(0.0)
