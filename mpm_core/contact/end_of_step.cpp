@@ -131,7 +131,7 @@ void slide(const Vector<D>& a, double longest, double by_radius, const Spring& s
 } // namespace
 
 template <int D>
-RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Vector<D>& driven)
+RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Motion<D>& driven)
 {
   RigidBody<D> body = contact.body;
   body.velocity = {};
@@ -140,8 +140,17 @@ RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool a
     prescribe_motion(step, contact.of_ranks, body);
   for (std::size_t i = 0; i < D; ++i)
     if (body.drive[i] != Drive::prescribed)
-      body.velocity[i] = driven[i];
+      body.velocity[i] = driven.velocity[i];
+  if (!body.rotates)
+  {
+    move_body(step.dt, body);
+    return body;
+  }
+  body.spin = driven.spin;
+  body.rotates = false; // as if the spin was prescribed: constant in the step
   move_body(step.dt, body);
+  body.rotates = true;
+  set_spin(driven.spin, body);
   return body;
 }
 
@@ -230,7 +239,7 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
 #define INSTANTIATE(D)                                                                                                 \
   template EndTouch<D> tied_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,         \
                                       const Vector<D>&, const Vector<D>&);                                             \
-  template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Vector<D>&);                    \
+  template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Motion<D>&);                    \
   template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,     \
                                   const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)

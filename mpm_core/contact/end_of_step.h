@@ -22,9 +22,9 @@
 namespace mpm::contact
 {
 /// The place and velocities of a body at the end of a step, by its prescribed motion; at rest where there is no time.
-/// @param driven  velocity along axes that are not prescribed [m/s]
+/// @param driven  velocity along axes that are not prescribed, and spin of a body that rotates freely
 template <int D>
-RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Vector<D>& driven);
+RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Motion<D>& driven);
 
 /// Moduli of soil [Pa].
 struct ContactModuli

@@ -42,7 +42,8 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
                               static_cast<Index>(run.cell),
                               {},
                               spring_of<G>(model.particles, p, moduli, contact.penalty),
-                              radius_at_end<G>(model.particles, p, volumetric, u)};
+                              radius_at_end<G>(model.particles, p, volumetric, u),
+                              u};
     bool touches = bonds;
     if (bonds)
       found.touch = tied_at_end<D>(contact, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
@@ -111,7 +112,7 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
     Contact<D>& contact = model.contacts[k];
     keep_clearance<D>(model.mesh, contact);
     TrialContact<D>& trial = step.surfaces[k];
-    trial.end = body_at_end<D>(contact, time, at_rest, driven_velocity<D>(bodies, k));
+    trial.end = body_at_end<D>(contact, time, at_rest, driven_motion<D>(bodies, k));
     trial.touching.clear();
     const auto* slips = columns_of(model.particles, contact.slip);
     const auto* tied = columns_of(model.particles, contact.bond);
@@ -187,7 +188,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     auto* slips = columns_of(model.particles, contact.slip);
     for (std::size_t i = 0; slips && i < D; ++i)
       std::ranges::fill((*slips)[i], 0.0);
-    for (const auto& [p, cell, touch, spring, radius] : step.contact.surfaces[k].touching)
+    for (const auto& [p, cell, touch, spring, radius, u] : step.contact.surfaces[k].touching)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];

@@ -14,6 +14,7 @@ struct TouchingParticle
   EndTouch<D> touch;
   Spring spring;
   EndRadius radius;
+  Vector<D> displacement; ///< in the step [m]
 };
 
 /// A surface in the trial.
@@ -32,17 +33,19 @@ struct CellContact
   std::array<Vector<D>, D + 1> by_volumetric{};             ///< -df/d theta of the vertices, by that strain of the cell
 };
 
-/// An axis along which forces move a body; see driven_bodies.h.
+/// An axis along which forces move a body, or about which they rotate it; see driven_bodies.h.
 template <int D>
 struct DrivenAxis
 {
   std::size_t surface; ///< number of the body
-  int axis;
-  double mass;                         ///< [kg]; 0 where the load is controlled
-  double start = 0;                    ///< velocity at the step's start [m/s]
-  double velocity = 0;                 ///< the iterate [m/s]
-  double applied = 0;                  ///< force and weight at the step's end [N]
-  double residual = 0;                 ///< R [N]
+  int axis;            ///< x, y (and z), then the axes of rotation: z, or x, y and z
+  double mass;         ///< [kg]; 0 where the load is controlled
+  double length = 1;   ///< of a rotation: the radius of gyration [m], by which it becomes a way and its moment a force
+  double start = 0;    ///< velocity at the step's start [m/s]
+  double velocity = 0; ///< the iterate [m/s]
+  double applied = 0;  ///< force and weight at the step's end [N]
+  double inertia = 0;  ///< of a rotation at constant spin, and its change of momentum over dt [N]
+  double residual = 0; ///< R [N]
   std::vector<Vector<D>> column{};     ///< of B, at the nodes [N/m]
   std::vector<Vector<D>> row{};        ///< of C [N/m]
   std::vector<double> row_by_strain{}; ///< the part of C by the nodes' averaged volumetric strains [N]

@@ -5,8 +5,13 @@
 ///
 ///     0 = F + M g - sum f_p - M (V_1 - V_0) / dt,
 ///
-/// with the applied force F and the forces f_p of contact on the particles. A controlled body has no mass. With the
-/// displacement q of these axes the system is
+/// with the applied force F and the forces f_p of contact on the particles. A controlled body has no mass. A body that
+/// rotates freely has its spin as unknowns, constant in the step, and the balance of its angular momentum about its
+/// centre,
+///
+///     0 = -sum a_p x f_p - (L_1 - L_0) / dt,   L = R I R^T omega,
+///
+/// both made a way and a force by its radius of gyration. With the displacement q of these axes the system is
 ///
 ///     [J  B] [du]   [r]
 ///     [C  E] [dq] = [R],   B = -dr/dq,  C = -dR/du,  E = -dR/dq,
@@ -19,7 +24,7 @@
 namespace mpm::implicit
 {
 /// Finds what moves in the step: from rest where it is quasi-static, else with the velocity of the step before.
-/// @pre no body rotates freely or collides, and the step has one stage
+/// @pre no body collides, and the step has one stage
 template <class G>
 void start_bodies(const Model<G>& model, ImplicitStep<G>& step);
 
@@ -32,7 +37,7 @@ void balance_bodies(Model<G>& model, bool tangents, ImplicitStep<G>& step);
 template <class G>
 void add_bodies(const ImplicitStep<G>& step, TrialReport& report);
 
-/// Velocities of a body along the axes on which forces move it; zero along the others.
+/// Velocities of a body along and about the axes on which forces move it; zero along the others.
 template <int D>
-Vector<D> driven_velocity(const DrivenBodies<D>& bodies, std::size_t surface);
+Motion<D> driven_motion(const DrivenBodies<D>& bodies, std::size_t surface);
 } // namespace mpm::implicit

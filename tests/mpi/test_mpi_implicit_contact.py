@@ -53,3 +53,22 @@ def test_a_load_settles_alike_on_any_partition(comm, owners_of):
     assert_same(*(all_by_id(model, (*FIELDS, "contact_slip_0")) for model, _ in runs))
     assert runs[0][1].displacement == pytest.approx(runs[1][1].displacement, rel=1e-7)
     assert runs[0][1].force == pytest.approx([-150.0, 900.0], rel=1e-6)
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_rotating_body_moves_alike_on_any_partition(comm, owners_of):
+    runs = []
+    for ranks in (comm, MPI.COMM_SELF):
+        mesh = spread_box((12, 8), (1.2, 0.8), ranks, owners_of)
+        model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+        grid = 0.05 * (np.indices((24, 8)).reshape(2, -1).T + 0.5) + (0.0037, 0.0)
+        model.seed_points(grid, np.full(len(grid), 0.05**2), density=1000.0)
+        model.fix(3)
+        model.set_gravity((3.0, -9.0))
+        disc = model.add_contact(mpm.Disc((0.5, 0.6), 0.2), friction=0.5, body=mpm.FreeBody(mass=60.0))
+        list(model.implicit(0.1, dt=0.02, solver=mpm.Newton(tolerance=1e-11)))
+        runs.append((model, disc))
+    assert_same(*(all_by_id(model, (*FIELDS, "contact_slip_0")) for model, _ in runs))
+    for name in ("displacement", "angle", "spin", "force"):
+        assert getattr(runs[0][1], name) == pytest.approx(getattr(runs[1][1], name), rel=1e-7), name
+    assert runs[0][1].angle[0] < -0.01

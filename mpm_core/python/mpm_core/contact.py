@@ -367,9 +367,8 @@ def refuse_driven_bodies(model: Model, scheme: str, *, second_order: bool) -> No
     """Raises InputError where an implicit step would leave out what moves a rigid body."""
     for number, entry in enumerate(model._contacts):
         body, kind = entry["body"], entry["surface"]["kind"]
-        if body["rotates"]:
-            raise InputError(f"the model has a {kind} that rotates freely, expected rotates=False in {scheme}")
-        if any(body["drive"]) and second_order:
+        driven = any(body["drive"]) or body["rotates"]
+        if driven and second_order:
             raise InputError(f"second_order is True, expected False with a {kind} that is a FreeBody or a Servo")
-        if any(body["drive"]) and any(number in (one["ball"], one["other"]) for one in model._collisions):
+        if driven and any(number in (one["ball"], one["other"]) for one in model._collisions):
             raise InputError(f"the model has a {kind} that collides with other bodies, which {scheme} does not support")

@@ -23,8 +23,7 @@ Velocity: TypeAlias = ArrayLike | tuple[Sequence[float], ArrayLike] | None
 class FreeBody:
     """A rigid body that gravity, contact and an applied force move: three degrees of freedom in two dimensions, six in three.
 
-    The model's gravity acts on it; local damping of an explicit run does not. Implicit steps know bodies that do not rotate
-    freely.
+    The model's gravity acts on it; local damping of an explicit run does not.
 
     Args:
         mass: [kg]; per metre in plane strain, per radian in axial symmetry.
