@@ -190,7 +190,7 @@ def drawn(runs: dict[str, dict], folder: Path) -> Pictures:
     converted = 100 * runs["coupled"]["history"][:, 3]
     return {
         "displacement": lambda: save_history(folder / "displacement.png", time, curves, "Displacement [m]",
-                                             limits=(0, 1.08 * highest)),
+                                             limits=(0, 1.08 * highest), dashed=[n for n in curves if KINDS["coupled"] in n]),
         "converted": lambda: save_history(folder / "converted.png", time, {"cells that have turned into particles": converted},
                                           "Part of all cells [%]", limits=(0, max(1.0, 1.1 * converted.max()))),
         "cells": lambda: save_kinds(folder / "cells.png", runs["coupled"]),

@@ -166,6 +166,7 @@ def save_history(
     *,
     limits: tuple[float, float] | None = None,
     markers: Sequence[tuple[float, float, str]] = (),
+    dashed: Sequence[str] = (),
 ) -> None:
     """Draw curves over time.
 
@@ -175,11 +176,13 @@ def save_history(
         label: of the vertical axis, with unit.
         limits: of the vertical axis.
         markers: single points to compare with: time, value, name.
+        dashed: names of curves in dashes, so that one below that coincides with it is seen.
     """
     with paper_style():
         figure, axes = plt.subplots(figsize=(4.6, 3.0), layout="constrained")
         for k, (name, values) in enumerate(curves.items()):
-            axes.plot(time, values, color=CURVES[k % len(CURVES)], label=name)
+            style = "--" if name in dashed else "-"
+            axes.plot(time, values, style, color=CURVES[k % len(CURVES)], label=name)
         for t, value, name in markers:
             axes.plot(t, value, "o", color="black", markersize=4, markerfacecolor="white", label=name)
         axes.set_xlabel("Time [s]")
