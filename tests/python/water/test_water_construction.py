@@ -155,3 +155,25 @@ def test_refuses_what_cannot_be_placed():
         model.reconfigure(off=["peat"])
     with pytest.raises(mpm.InputError, match="pore_pressure: got shape"):
         model.reconfigure(pore_pressure=lambda x: x)
+
+
+def test_particles_take_over_the_soil_that_is_there():
+    """A fill that drains at once is saturated soil at zero pressure to them."""
+    mesh = _ground(rows=10)
+    model = _model(mesh, water.Element.STABILISED)
+    model.reconfigure(off=[SECOND])
+    _run(model, 0.2, 0.05)
+    particles = mpm.Model(bridge.background_mesh(*mesh), LAW)
+    for tag, weight in ((CLAY, OF_WATER), (FIRST, WEIGHT)):
+        particles.seed(density=weight / 9.81, per_cell=3, cell_tag=tag)
+    for side in (LEFT, RIGHT):
+        particles.roller(side, (1, 0))
+    particles.fix(BASE)
+    particles.set_gravity((0.0, -9.81))
+    particles.add_water(porosity=0.5, conductivity=1e-8, modulus=np.inf)
+    particles.hold_pore_pressure(GROUND, level=1.0)
+    assert bridge.initialise(particles, model, equilibrate=False).unbalanced_ratio < 1e-9
+    p = particles.particles
+    in_fill = p.position[:, 1] > 1.0
+    excess = p.pore_pressure[~in_fill] - OF_WATER * (1.0 - p.position[~in_fill, 1])
+    assert np.abs(p.pore_pressure[in_fill]).max() < 1e-6 * OF_WATER and excess.max() > 0.5 * LAYER * WEIGHT
