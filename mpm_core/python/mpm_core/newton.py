@@ -18,7 +18,7 @@ EASY_ITERATIONS = 8
 
 NOT_HELD = (
     "nothing holds a rigid body that forces move: without inertia it must touch the soil from the start; Model.gap says how far "
-    "it is, and explicit steps bring a Servo there"
+    "it is, and explicit steps bring a Servo there; a smooth round body, which nothing keeps from turning, needs rotates=False"
 )
 
 FLOATING = 1e12

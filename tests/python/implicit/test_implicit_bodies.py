@@ -154,6 +154,14 @@ def test_a_disc_rolls_down_a_slope():
     assert -0.3 * disc.angle[0] == pytest.approx(disc.displacement[0], rel=0.001)
 
 
+def test_a_smooth_disc_that_may_turn_is_refused_without_inertia():
+    model, plate = loaded_layer(None)
+    body = mpm.FreeBody(mass=3.0, axes=(False, True), force=(0.0, -500.0))
+    model.add_contact(mpm.Disc((0.15, 0.8), 0.2), body=body)
+    with pytest.raises(mpm.RunError, match="nothing keeps from turning, needs rotates=False"):
+        list(model.implicit(1.0, dt=1.0, quasi_static=True))
+
+
 def tilt_of_a_footing(finer, young, poisson, half, load, offset):
     """Tilt of a smooth strip on a wide layer under an eccentric load, on cells of 0.125 m over `finer`."""
     size = 0.0625 / finer
