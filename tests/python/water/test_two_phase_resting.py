@@ -57,6 +57,22 @@ def require_same(ones, others, tolerance):
         np.testing.assert_allclose(one, other, rtol=0, atol=tolerance * np.abs(other).max())
 
 
+def require_same_steps(make, options):
+    """A step of resting cells and one of the particles that they turn into move soil and water alike."""
+    found = []
+    for converts in (False, True):
+        model = make()
+        dt = 0.2 * model.critical_time_step()
+        options = {"dt": dt, "conversion": None, "energy_limit": None, **options}
+        model.explicit(20 * dt, **options).last()
+        if converts:
+            model.convert()
+        report = model.explicit(model.time + dt, **options).last()
+        assert report.steps == 21
+        found.append((model.nodal("velocity"), model.nodal("acceleration"), *of_cells(model), model.water_inflow()))
+    require_same(*found, 1e-10)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_conversion_in_motion_leaves_soil_and_water_alone(dim):
     model = flowing(dim)
@@ -76,18 +92,16 @@ def test_conversion_in_motion_leaves_soil_and_water_alone(dim):
 @pytest.mark.parametrize("options", [{}, {"nmd": True}, {"pic": 0.02}, {"integration": mpm.Integration.MIXED}], ids=str)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_step_after_conversion_moves_soil_and_water_as_before(dim, options):
-    found = []
-    for converts in (False, True):
-        model = flowing(dim, kozeny_carman=True)
-        dt = 0.2 * model.critical_time_step()
-        options = {"dt": dt, "conversion": None, "energy_limit": None, **options}
-        model.explicit(20 * dt, **options).last()
-        if converts:
-            model.convert()
-        report = model.explicit(model.time + dt, **options).last()
-        assert report.steps == 21
-        found.append((model.nodal("velocity"), model.nodal("acceleration"), *of_cells(model), model.water_inflow()))
-    require_same(*found, 1e-10)
+    require_same_steps(lambda: flowing(dim, kozeny_carman=True), options)
+
+
+def test_a_step_after_conversion_under_standing_water_and_through_strata_is_that_before():
+    def strata():
+        model = flowing(2, anisotropy=[2.0, 0.5], drained_surface=True)
+        model.stand_water(1.5)
+        return model
+
+    require_same_steps(strata, {})
 
 
 @pytest.mark.parametrize("rests", [None, lambda x: x[:, 1] < 0.5], ids=["all", "half"])
