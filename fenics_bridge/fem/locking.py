@@ -12,14 +12,16 @@ if TYPE_CHECKING:
 
 
 def warn_of_locking(model: QuasiStatic) -> None:
-    """Warn where the laws of a new model keep the volume of the soil whatever happens. Not collective."""
-    if _is_plain(model) and (text := locking(model.laws)):
+    """Warn where the laws of a new model keep the volume of the soil whatever happens. Collective."""
+    text = locking(model.laws) if _is_plain(model) else ""  # on all ranks, since `laws` is collective
+    if text and model.domain.comm.rank == 0:
         warnings.warn(f"{text}; elements of degree=2 or 4 hardly lock", RuntimeWarning, stacklevel=3)
 
 
 def warn_of_locking_at_failure(model: Any) -> None:
-    """Warn where the soil keeps its volume as it fails, before a collapse load or a factor of safety is found. Not collective."""
-    if _is_plain(model) and locks_at_failure(model.laws):
+    """Warn where the soil keeps its volume as it fails, before a collapse load or a factor of safety is found. Collective."""
+    locks = _is_plain(model) and locks_at_failure(model.laws)  # on all ranks, since `laws` is collective
+    if locks and model.domain.comm.rank == 0:
         warnings.warn(
             "linear elements without averaged strains are too strong for soil whose dilation angle is below its friction angle, "
             "since it keeps its volume as it fails: take nmd=True, or elements of degree=2 or 4 (docs/locking.md)",
@@ -29,4 +31,4 @@ def warn_of_locking_at_failure(model: Any) -> None:
 
 
 def _is_plain(model: Any) -> bool:
-    return getattr(model, "degree", 2) == 1 and not model._nmd and model.domain.comm.rank == 0
+    return getattr(model, "degree", 2) == 1 and not model._nmd
