@@ -191,7 +191,9 @@ def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
     body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
     with warnings.catch_warnings():  # the equilibrium is that of the particles' cells, which say themselves where they lock
         warnings.simplefilter("ignore", RuntimeWarning)
-        return bridge.QuasiStatic(body, case.soil, facet_tags, SUPPORTS, degree=1, solver=bridge.Solver(tolerance=1e-10))
+        return bridge.QuasiStatic(
+            body, case.soil, facet_tags, SUPPORTS, degree=1, solver=bridge.Solver(tolerance=1e-10)
+        )
 
 
 def elastic_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
