@@ -43,7 +43,7 @@ def test_particles_converge_to_the_finite_elements(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("handover", ["--cohesion", "0"], ["--cohesion", "no slope stands"]),
+        ("handover", ["--cohesion", "0"], ["--cohesion", "no slope is stable"]),
         (
             "compare_fem",
             ["--cohesion", "1", "--cell-size", "0.2", "--meshes", "1"],
