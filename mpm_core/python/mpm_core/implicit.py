@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 LEAST_EULER_STEPS = 4
-"""Steps of backward Euler after which a run is told of the energy that it dissipates"""
+"""Steps of backward Euler after which a warning may give the energy that a run dissipates"""
 
 FADING = 0.1
 """Factor on the ghost penalty between steps that only redistribute stresses"""

@@ -92,9 +92,9 @@ def test_an_undamped_run_by_backward_euler_is_told_of_second_order():
             model.implicit(
                 1.2, dt=0.1, every=0.3, second_order=second_order, nmd=True, integration=mpm.Integration.MIXED
             ).last()
-        told = [str(each.message) for each in caught if issubclass(each.category, mpm.EnergyWarning)]
-        assert len(told) == (0 if second_order else 1)
-        assert all("second_order=True" in text for text in told)
+        warned = [str(each.message) for each in caught if issubclass(each.category, mpm.EnergyWarning)]
+        assert len(warned) == (0 if second_order else 1)
+        assert all("second_order=True" in text for text in warned)
 
 
 def test_the_accuracy_wanted_is_reached_by_shorter_steps():
