@@ -127,8 +127,7 @@ def matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values
     return made
 
 
-def compressed(columns: NDArray[np.integer], values: Any) -> tuple[Any, ...]:
-    """Compressed rows of equal length."""
+def compressed(columns: NDArray[np.integer], values: NDArray[np.float64]) -> tuple[Any, ...]:
+    """Compressed rows of equal length, with their zeros: columns and values, both (rows, k)."""
     start = np.arange(0, columns.size + 1, columns.shape[1]) if columns.size else np.zeros(len(columns) + 1)
-    values = np.broadcast_to(values, columns.shape)
     return start.astype(np.int32), columns.ravel().astype(np.int32), np.ascontiguousarray(values).ravel()

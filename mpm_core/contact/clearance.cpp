@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 namespace mpm::contact
 {
@@ -32,33 +33,8 @@ Region<D> box_of(const Mesh<D>& mesh, Index cell, const RigidBody<D>& body)
   const auto place = [&](Index node) { return as_at_start<D>(body, mesh.points[static_cast<std::size_t>(node)]); };
   Region<D> box{place(nodes[0]), place(nodes[0])};
   for (Index node : nodes)
-  {
-    const Vector<D> x = place(node);
-    for (int i = 0; i < D; ++i)
-    {
-      box.lower[i] = std::min(box.lower[i], x[i]);
-      box.upper[i] = std::max(box.upper[i], x[i]);
-    }
-  }
+    include<D>(place(node), box);
   return box;
-}
-
-/// Height of the highest plane with a normal that all of a convex body is below.
-template <int D, class Shape>
-double height_of(const Shape&, const Vector<D>& x, const Distance<D>& nearest, const Region<D>&, double)
-{
-  return dot<D>(nearest.normal, x) - nearest.value;
-}
-
-double height_of(const Polyline& line, const Vector<2>&, const Distance<2>& nearest, const Region<2>& region, double)
-{
-  return highest(line, region, nearest.normal);
-}
-
-double height_of(const Triangles& triangles, const Vector<3>&, const Distance<3>& nearest, const Region<3>& region,
-                 double reach)
-{
-  return highest(triangles, region, nearest.normal, fine_boxes * reach);
 }
 
 /// Whether points of a cell may be nearest to the border of a surface: beyond it that goes on where it has no
@@ -106,18 +82,20 @@ void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Dist
   // no line from there to another point of the cell that is above it, too, passes through the surface.
   if (nearest.value <= 0)
     return;
-  const auto height = [&](const auto& shape)
+  const auto height_of = [&]<class Shape>(const Shape& shape)
   {
-    if constexpr (requires { height_of(shape, x, nearest, region, bound.reach); })
-      return height_of(shape, x, nearest, region, bound.reach);
-    else
-      return height_of<D>(shape, x, nearest, region, bound.reach);
+    if constexpr (std::is_same_v<Shape, Polyline>)
+      return highest(shape, region, nearest.normal);
+    else if constexpr (std::is_same_v<Shape, Triangles>)
+      return highest(shape, region, nearest.normal, fine_boxes * bound.reach);
+    else // all of a convex body is below the plane at its nearest point
+      return dot<D>(nearest.normal, x) - nearest.value;
   };
-  const double highest = std::visit(height, contact.surface);
-  if (!(highest < dot<D>(nearest.normal, x)))
+  const double height = std::visit(height_of, contact.surface);
+  if (!(height < dot<D>(nearest.normal, x)))
     return;
   bound.normal = rotated<D>(body.rotation, nearest.normal);
-  bound.height = highest;
+  bound.height = height;
   for (int i = 0; i < D; ++i)
     bound.height += bound.normal[i] * (mesh.shapes[cell].centre[i]) - nearest.normal[i] * x[i];
 }

@@ -14,6 +14,17 @@ struct Region
   Vector<D> lower, upper;
 };
 
+/// Lets a box grow to contain a point.
+template <int D, class B>
+void include(const Vector<D>& x, B& box)
+{
+  for (int i = 0; i < D; ++i)
+  {
+    box.lower[i] = std::min(box.lower[i], x[i]);
+    box.upper[i] = std::max(box.upper[i], x[i]);
+  }
+}
+
 template <int D>
 Region<D> widened(Region<D> region, double by)
 {

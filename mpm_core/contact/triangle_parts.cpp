@@ -8,27 +8,14 @@ namespace
 {
 double size_of(const TriangleBox& box) { return norm<3>(difference<3>(box.upper, box.lower)); }
 
-Vector<3> normal_of(const Triangles& surface, Index t)
-{
-  const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
-  const auto vertex = [&](std::size_t k) -> const Vector<3>&
-  { return surface.vertices[static_cast<std::size_t>(corners[k])]; };
-  const Vector<3> n = cross(difference<3>(vertex(1), vertex(0)), difference<3>(vertex(2), vertex(0)));
-  const double length = norm<3>(n);
-  return {n[0] / length, n[1] / length, n[2] / length};
-}
-
 Region<3> box_of(const Triangles& surface, Index t)
 {
   const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
-  Region<3> box{surface.vertices[static_cast<std::size_t>(corners[0])],
-                surface.vertices[static_cast<std::size_t>(corners[0])]};
+  const auto vertex = [&](Index corner) -> const Vector<3>&
+  { return surface.vertices[static_cast<std::size_t>(corner)]; };
+  Region<3> box{vertex(corners[0]), vertex(corners[0])};
   for (Index corner : corners)
-    for (std::size_t i = 0; i < 3; ++i)
-    {
-      box.lower[i] = std::min(box.lower[i], surface.vertices[static_cast<std::size_t>(corner)][i]);
-      box.upper[i] = std::max(box.upper[i], surface.vertices[static_cast<std::size_t>(corner)][i]);
-    }
+    include<3>(vertex(corner), box);
   return box;
 }
 
@@ -92,7 +79,8 @@ double highest(const Triangles& surface, const Region<3>& region, const Vector<3
         {
           const Vector<3>& corner =
               surface.vertices[static_cast<std::size_t>(surface.triangles[static_cast<std::size_t>(t)][0])];
-          height = std::max(height, highest_on_plane<3>(common(region, around), normal, normal_of(surface, t), corner));
+          height =
+              std::max(height, highest_on_plane<3>(common(region, around), normal, unit_normal(surface, t), corner));
         }
     return size_of(box) > fine;
   };

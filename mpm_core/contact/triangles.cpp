@@ -1,5 +1,7 @@
 #include "contact/triangles.h"
 
+#include "contact/region.h"
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -15,17 +17,6 @@ constexpr Index most_in_leaf = 2;
 Vector<3> plus(const Vector<3>& a, const Vector<3>& b, double factor)
 {
   return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
-}
-
-Vector<3> unit_normal(const Triangles& surface, Index t)
-{
-  const auto& [a, b, c] = surface.triangles[static_cast<std::size_t>(t)];
-  const Vector<3>& origin = surface.vertices[static_cast<std::size_t>(a)];
-  const Vector<3> e = difference<3>(surface.vertices[static_cast<std::size_t>(b)], origin);
-  const Vector<3> f = difference<3>(surface.vertices[static_cast<std::size_t>(c)], origin);
-  const Vector<3> n = cross(e, f);
-  const double length = norm<3>(n);
-  return {n[0] / length, n[1] / length, n[2] / length};
 }
 
 void find_vertex_normals(Triangles& surface)
@@ -106,26 +97,19 @@ void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, In
 {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   TriangleBox box{{infinite, infinite, infinite}, {-infinite, -infinite, -infinite}, first, last - first};
-  Vector<3> low = box.lower, high = box.upper; // of the centres
+  Region<3> of_centres{box.lower, box.upper};
   for (Index k = first; k < last; ++k)
   {
     const auto t = static_cast<std::size_t>(order[static_cast<std::size_t>(k)]);
-    for (std::size_t i = 0; i < 3; ++i)
-    {
-      for (Index vertex : surface.triangles[t])
-      {
-        box.lower[i] = std::min(box.lower[i], surface.vertices[static_cast<std::size_t>(vertex)][i]);
-        box.upper[i] = std::max(box.upper[i], surface.vertices[static_cast<std::size_t>(vertex)][i]);
-      }
-      low[i] = std::min(low[i], centres[t][i]);
-      high[i] = std::max(high[i], centres[t][i]);
-    }
+    for (Index vertex : surface.triangles[t])
+      include<3>(surface.vertices[static_cast<std::size_t>(vertex)], box);
+    include<3>(centres[t], of_centres);
   }
   const std::size_t number = boxes.size();
   boxes.push_back(box);
   if (box.count <= most_in_leaf)
     return;
-  const Vector<3> extent = difference<3>(high, low);
+  const Vector<3> extent = difference<3>(of_centres.upper, of_centres.lower);
   const auto axis = static_cast<std::size_t>(std::ranges::max_element(extent) - extent.begin());
   const Index middle = first + box.count / 2;
   std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last,
@@ -199,6 +183,17 @@ NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vecto
   return at(0, vb / sum, vc / sum);
 }
 } // namespace
+
+Vector<3> unit_normal(const Triangles& surface, Index t)
+{
+  const auto& [a, b, c] = surface.triangles[static_cast<std::size_t>(t)];
+  const Vector<3>& origin = surface.vertices[static_cast<std::size_t>(a)];
+  const Vector<3> e = difference<3>(surface.vertices[static_cast<std::size_t>(b)], origin);
+  const Vector<3> f = difference<3>(surface.vertices[static_cast<std::size_t>(c)], origin);
+  const Vector<3> n = cross(e, f);
+  const double length = norm<3>(n);
+  return {n[0] / length, n[1] / length, n[2] / length};
+}
 
 Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles)
 {

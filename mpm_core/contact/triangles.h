@@ -34,6 +34,9 @@ struct Triangles
 /// @pre each side belongs to one triangle, or to two that pass it in opposite directions; no triangle without area
 Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles);
 
+/// Normal of a triangle, of length 1, on the side of the soil.
+Vector<3> unit_normal(const Triangles& surface, Index t);
+
 /// The point of a surface that is nearest to another one.
 struct NearestOnTriangles
 {
