@@ -51,13 +51,13 @@ struct Contact
   std::string bond; ///< name of their field with 1 where they are tied to it, and where; empty where they only touch it
   double stiff_step = 0; ///< dt_c [s]; 0 before the first step
 
-  Reaction<D> reaction;   ///< in the last step; this rank's part
+  Reaction<D> reaction{}; ///< in the last step; this rank's part
   Vector<D> impulse{};    ///< of the soil on the surface since it was made; this rank's part [N s]
   Reaction<D> of_ranks{}; ///< over all ranks, where the motion depends on it; else zero
 
   // Lower bounds of the distances in each cell
-  std::vector<CellBound<D>> bounds;
-  std::vector<Index> parts;
+  std::vector<CellBound<D>> bounds{};
+  std::vector<Index> parts{};
   double reach = 0;     ///< of the surface from its centre, as far as there is mesh [m]
   double travel = 0;    ///< path of its fastest point since the bounds were found [m]
   double keeps_for = 0; ///< travel after which they are found again [m]
