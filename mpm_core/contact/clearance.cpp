@@ -102,6 +102,15 @@ void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Dist
 } // namespace
 
 template <int D>
+double reach_of(const Mesh<D>& mesh, Index cell)
+{
+  double reach = 0;
+  for (Index node : mesh.cells[cell])
+    reach = std::max(reach, apart<D>(mesh.points[node], mesh.shapes[cell].centre));
+  return reach;
+}
+
+template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
 {
   if (!contact.bounds.empty() && contact.travel <= contact.keeps_for)
@@ -115,9 +124,7 @@ void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
   {
     CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(c)];
     const Vector<D>& centre = mesh.shapes[c].centre;
-    bound.reach = 0;
-    for (Index node : mesh.cells[c])
-      bound.reach = std::max(bound.reach, apart<D>(mesh.points[node], centre));
+    bound.reach = reach_of<D>(mesh, c);
     smallest = std::min(smallest, bound.reach);
     farthest = std::max(farthest, apart<D>(as_at_start<D>(body, centre), body.centre) + bound.reach);
   }
@@ -138,6 +145,8 @@ void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
   contact.reach = std::min(rotation_reach<D>(contact.surface, body.centre), farthest);
 }
 
+template double reach_of<2>(const Mesh<2>&, Index);
+template double reach_of<3>(const Mesh<3>&, Index);
 template void keep_clearance<2>(const Mesh<2>&, Contact<2>&);
 template void keep_clearance<3>(const Mesh<3>&, Contact<3>&);
 } // namespace mpm::contact

@@ -4,19 +4,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace mpm::contact
 {
 template <class G>
-double particle_radius(const Particles<G::dim>& particles, Index p)
+double radius_of(double volume, [[maybe_unused]] double x)
 {
   if constexpr (G::dim == 3)
-    return 0.5 * std::cbrt(particles.volume[p]);
+    return 0.5 * std::cbrt(volume);
   else if constexpr (G::has_hoop)
-    return 0.5 * std::sqrt(particles.volume[p] / particles.position[0][p]);
+    return 0.5 * std::sqrt(volume / x);
   else
-    return 0.5 * std::sqrt(particles.volume[p]);
+    return 0.5 * std::sqrt(volume);
+}
+
+template <class G>
+double particle_radius(const Particles<G::dim>& particles, Index p)
+{
+  return radius_of<G>(particles.volume[p], particles.position[0][p]);
 }
 
 template <int D>
@@ -48,15 +53,6 @@ void end_step(double dt, Contact<D>& contact)
   contact.travel += step_travel(contact, contact.body, dt);
 }
 
-template <class G, int D>
-double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
-{
-  double gap = std::numeric_limits<double>::infinity();
-  for (Index p = 0; p < particles.size(); ++p)
-    gap = std::min(gap, distance<D>(surface, at<D>(particles.position, p)).value - particle_radius<G>(particles, p));
-  return gap;
-}
-
 #define INSTANTIATE_STEP(D)                                                                                            \
   template void begin_step<D>(const Mesh<D>&, const TimeStep&, Contact<D>&);                                           \
   template void accelerate<D>(const TimeStep&, const Vector<D>&, Contact<D>&);                                         \
@@ -64,8 +60,8 @@ double smallest_gap(const Particles<D>& particles, const Surface<D>& surface)
 INSTANTIATE_STEP(2)
 INSTANTIATE_STEP(3)
 #define INSTANTIATE(G)                                                                                                 \
-  template double particle_radius<G>(const Particles<G::dim>&, Index);                                                 \
-  template double smallest_gap<G, G::dim>(const Particles<G::dim>&, const Surface<G::dim>&);
+  template double radius_of<G>(double, double);                                                                        \
+  template double particle_radius<G>(const Particles<G::dim>&, Index);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

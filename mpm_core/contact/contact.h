@@ -72,6 +72,10 @@ struct Collision
 };
 
 /// Half the side of a square or cube as large as a particle [m].
+/// @param volume  per radian in axial symmetry [m^D]
+/// @param x       distance from the axis there; not used elsewhere [m]
+template <class G>
+double radius_of(double volume, double x);
 template <class G>
 double particle_radius(const Particles<G::dim>& particles, Index p);
 
@@ -109,8 +113,4 @@ template <class G, int D = G::dim>
 bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const Movers& movers,
                         std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
                         std::span<Vector<D>> forces);
-
-/// The smallest gap of this rank's particles; infinite without any [m].
-template <class G, int D = G::dim>
-double smallest_gap(const Particles<D>& particles, const Surface<D>& surface);
 } // namespace mpm::contact

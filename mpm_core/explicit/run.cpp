@@ -1,6 +1,7 @@
 #include "explicit/run.h"
 
 #include "materials/laws/substeps.h"
+#include "model/contacts.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
 
@@ -141,6 +142,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
         convert_failing(model, *run.conversion);
       const double critical = critical_time_step(model);
       dt = next_step(model, run, damped_time_step(options.rayleigh, critical));
+      convert_near_surfaces(model, control_interval * dt);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }
     explicit_step(model, of_step, dt);

@@ -1,9 +1,66 @@
 #include "model/contacts.h"
 
+#include "contact/clearance.h"
 #include "contact/collisions.h"
+#include "model/resting.h"
+#include "transfer/resting.h"
+
+#include <limits>
 
 namespace mpm::model
 {
+template <class G>
+double smallest_gap(const Model<G>& model, const Surface<G::dim>& surface)
+{
+  constexpr int D = G::dim;
+  const Particles<D>& particles = model.particles;
+  double gap = std::numeric_limits<double>::infinity();
+  const auto look = [&](const Vector<D>& x, double volume)
+  { gap = std::min(gap, distance<D>(surface, x).value - contact::radius_of<G>(volume, x[0])); };
+  Rules<D> rules;
+  for (Index p = 0; p < particles.size(); ++p)
+  {
+    if (!is_resting(particles, p))
+    {
+      look(at<D>(particles.position, p), particles.volume[p]);
+      continue;
+    }
+    const Rule<D>& points = rule_of<D>(static_cast<int>(particles.resting[0][p]), rules);
+    const std::vector<double> weights = rule_weights<G>(model.mesh, particles.cell[p], points);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      look(point_in_cell<D>(model.mesh, particles.cell[p], points[k]), weights[k] * particles.volume[p]);
+  }
+  return gap;
+}
+
+template <class G>
+void convert_near_surfaces(Model<G>& model, double ahead)
+{
+  constexpr int D = G::dim;
+  if (model.contacts.empty() || !model.particles.resting.present)
+    return;
+  std::vector<unsigned char> chosen(static_cast<std::size_t>(model.mesh.owned_cells), 0);
+  for (auto& contact : model.contacts)
+  {
+    keep_clearance<D>(model.mesh, contact);
+    contact::RigidBody<D> body = contact.body;
+    prescribe_motion(TimeStep{model.time, ahead}, contact.of_ranks, body);
+    const double travel = step_travel(contact, body, ahead);
+    const auto is_near = [&](Index cell)
+    {
+      const auto& bound = contact.bounds[static_cast<std::size_t>(cell)];
+      if (!may_be_near(bound, contact.travel + travel)) // bounds depend on when they were found: not what is near
+        return false;
+      const Vector<D> centre = as_at_start<D>(contact.body, model.mesh.shapes[cell].centre);
+      return distance<D>(contact.surface, centre).value - 3 * bound.reach <= travel;
+    };
+    for (Index p = 0; p < model.particles.size(); ++p)
+      if (const Index cell = model.particles.cell[p]; is_resting(model.particles, p) && is_near(cell))
+        chosen[static_cast<std::size_t>(cell)] = 1;
+  }
+  convert_cells<G>(model, chosen);
+}
+
 template <class G>
 void begin_contacts(Model<G>& model, const TimeStep& step)
 {
@@ -70,6 +127,8 @@ void add_contact_forces(Model<G>& model, double dt, VelocityField<G>& field)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template double smallest_gap(const Model<G>&, const Surface<G::dim>&);                                               \
+  template void convert_near_surfaces(Model<G>&, double);                                                              \
   template void begin_contacts(Model<G>&, const TimeStep&);                                                            \
   template void sum_reactions(Model<G>&);                                                                              \
   template void end_contacts(Model<G>&, const TimeStep&);                                                              \

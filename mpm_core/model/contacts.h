@@ -6,6 +6,19 @@
 
 namespace mpm::model
 {
+/// The smallest gap between this rank's particles, those that resting cells stand for included, and a surface;
+/// infinite without any [m].
+template <class G>
+double smallest_gap(const Model<G>& model, const Surface<G::dim>& surface);
+
+/// Turns the resting cells into particles that a surface is near to, or will be: surfaces touch particles only. They
+/// are those whose centre has the surface within three times the distance of their vertices, or where it moves there.
+/// @param ahead  how long until this is called again [s]
+/// @pre prepare(model) has been called
+/// @note Not collective
+template <class G>
+void convert_near_surfaces(Model<G>& model, double ahead);
+
 /// Begins a step of all contacts. @note Not collective
 template <class G>
 void begin_contacts(Model<G>& model, const TimeStep& step);

@@ -159,7 +159,7 @@ template <class G, int D = G::dim>
 void bind_contacts_of(py::module_& m)
 {
   m.def("smallest_gap",
-        [](const Model<G>& model, const Surface<D>& surface) { return smallest_gap<G>(model.particles, surface); });
+        [](const Model<G>& model, const Surface<D>& surface) { return smallest_gap<G>(model, surface); });
   m.def("add_contact",
         [](Model<G>& model, const Surface<D>& surface, double friction, double adhesion, double penalty,
            const RigidBody<D>& body, const std::string& slip, const std::string& bond)

@@ -3,6 +3,7 @@
 #include "explicit/run.h"
 #include "explicit/two_phase_step.h"
 #include "model/absorbing.h"
+#include "model/contacts.h"
 #include "model/far_field.h"
 #include "model/mapping.h"
 #include "model/placement.h"
@@ -279,6 +280,12 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              prepare(model);
              convert_failing(model, conversion);
+           })
+      .def("convert_near_surfaces",
+           [](M& model, double ahead)
+           {
+             prepare(model);
+             convert_near_surfaces(model, ahead);
            })
       .def_property_readonly("has_resting_cells", [](const M& model) { return model.particles.resting.present; })
       .def_property_readonly("converted_cells", [](const M& model) { return model.totals.converted_cells; })

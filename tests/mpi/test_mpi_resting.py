@@ -111,3 +111,21 @@ def test_water_with_its_own_velocity_is_the_same_in_resting_cells_on_all_ranks(c
         assert report.converted_cells > 0 and report.resting_cells > 0
     fields = (*FIELDS, "pore_pressure", "porosity", "water_velocity", "water_mass", "water_gradient")
     assert_same(*(all_by_id(model, fields) for model in models))
+
+
+def pressed_block(comm, owners_of=bands):
+    """A disc rolls over a block that rests, and presses on it."""
+    model = steep_block(comm, owners_of)
+    model.add_contact(mpm.Disc((0.2, 0.712), 0.1), friction=0.3, velocity=(2.0, -0.5), spin=-20.0)
+    return model
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_cells_turn_into_particles_under_a_body_on_all_ranks_as_on_one(comm, owners_of):
+    models = pressed_block(comm, owners_of), pressed_block(MPI.COMM_SELF)
+    reports = [model.explicit(0.1, energy_limit=None).last() for model in models]
+    assert reports[0].converted_cells == reports[1].converted_cells > 0 and reports[1].resting_cells > 0
+    assert_same(*(all_by_id(model, (*FIELDS, "contact_slip_0")) for model in models))
+    force, reference = (model.contacts[0].force for model in models)
+    assert abs(reference[1]) > 1
+    np.testing.assert_allclose(force, reference, rtol=0, atol=1e-8 * np.abs(reference).max())

@@ -269,7 +269,10 @@ def add_contact(
         )
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
-    tied = bonds_of(model, surface) if bonded else None
+    tied = None
+    if bonded:
+        convert_beside(model, surface)
+        tied = bonds_of(model, surface)
     set_contacts(model, [*model._contacts, new])
     if tied is not None:
         model.particles.set(bond_name(len(model._contacts) - 1), tied)
@@ -283,6 +286,14 @@ BOND_REACH = 1.5
 def bond_name(number: int) -> str:
     """The particles' field that says which of them are tied to a surface."""
     return f"contact_bond_{number}"
+
+
+def convert_beside(model: Model, surface: Surface) -> None:
+    """Turn resting cells into particles as far from a surface as the beginning of a run does."""
+    corners = model.mesh.points[model.mesh.cells[: model.mesh.owned_cells]]
+    centres = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1, initial=0.0)
+    model.convert(where=distances(surface, centres) < 3 * reach)
 
 
 def bonds_of(model: Model, surface: Surface) -> NDArray[np.float64]:

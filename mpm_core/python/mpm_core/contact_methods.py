@@ -77,7 +77,10 @@ class ContactMethods:
         )
 
     def gap(self, surface: Surface) -> float:
-        """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap."""
+        """Smallest distance of the particles from a surface less their radius V^(1/D)/2 [m]; negative where they overlap.
+
+        The particles that resting cells stand for count too.
+        """
         return smallest_gap(cast("Model", self), surface)
 
     @property

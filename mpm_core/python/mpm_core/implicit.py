@@ -208,6 +208,7 @@ def run_implicit(
         while until - model.time > close:
             if keep_balance(model, rebalance):
                 stepper.begin_anew()
+            model._core.convert_near_surfaces(dt)
             stepper.advance(until)
             if conversion is not None:
                 model._core.convert_failing(conversion)
@@ -229,6 +230,7 @@ def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, 
     at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but not of the particles', decrease
     from step to step.
     """
+    model._core.convert_near_surfaces(0.0)
     options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)
     control = stepper.control  # of the fraction of what is out of balance that a step applies

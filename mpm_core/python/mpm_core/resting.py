@@ -25,7 +25,7 @@ Where: TypeAlias = Callable[[NDArray[np.float64]], ArrayLike] | ArrayLike
 class Conversion:
     """When resting cells turn into particles; checked every 32 steps of an explicit run, and after each implicit step.
 
-    A cell that a particle enters turns into particles at once, whatever the criterion.
+    A cell that a particle enters, or that a rigid surface comes near to, turns into particles whatever the criterion.
 
     Args:
         plastic_strain: accumulated plastic deviatoric strain of a cell, or of a particle in it, above which the cell turns into
@@ -147,8 +147,6 @@ def checked_conversion(model: Any, conversion: Conversion | None, integration: A
     if conversion is not None and not isinstance(conversion, Conversion):
         raise InputError(f"conversion is {conversion!r}, expected a Conversion or None")
     if model._core.has_resting_cells:
-        if model._contacts:
-            refuse_resting(model, "contact with rigid surfaces")
         if integration == Integration.DUAL_DOMAIN:
             refuse_resting(model, "integration DUAL_DOMAIN")
     return None if conversion is None else conversion._as_core()

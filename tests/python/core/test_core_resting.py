@@ -380,12 +380,3 @@ def test_what_resting_cells_do_not_know_is_refused(use, message):
     assert model.rest() == 8
     with pytest.raises(mpm.InputError, match=message):
         use(model)
-
-
-def test_contact_with_rigid_surfaces_and_resting_cells_is_refused():
-    model = mpm.Model(box((2, 2), body=((0, 0), (1, 0.5))), ELASTIC)
-    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
-    model.rest()
-    model.add_contact(mpm.Plane((0.0, 0.9), normal=(0.0, -1.0)))
-    with pytest.raises(mpm.InputError, match="contact with rigid surfaces does not support resting cells"):
-        list(model.explicit(1.0))
