@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import nullcontext
 from pathlib import Path
 from time import process_time
 
@@ -17,7 +18,7 @@ import numpy as np
 from common.figures import Pictures, save_figure
 from common.files import OutputError
 from common.followed import cells_near, mean_displacement, numbers_in
-from common.movie import frame_of
+from common.movie import frame_of, particle_frame, particle_movie
 from common.options import add_count, add_number, check, study_parser
 from common.page import Page
 from common.plots import SHEAR_STRAIN, WIDTH, paper_style, save_history
@@ -29,6 +30,7 @@ from common.summary import write_summary
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from mpi4py import MPI
+from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -37,6 +39,8 @@ comm = MPI.COMM_WORLD
 FOLLOWED = 0.2
 """Crest and toe are means over the soil within this distance from them, over the height of the slope"""
 KINDS = {"particles": "particles everywhere", "coupled": "resting cells and particles"}
+FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
+"""In the files for ParaView; a threshold on ``resting`` tells resting cells from particles"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -123,8 +127,8 @@ def model_of(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------
 
 
-def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> dict:
-    """Slide to the end; history, time and the last frame."""
+def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool, folder: Path) -> dict:
+    """Slide to the end; history, time and frames, and files for ParaView of the run with resting cells."""
     model = model_of(a, mesh, fem, resting)
     run = a.height / np.tan(np.radians(a.angle))
     level = level_of(a)
@@ -134,14 +138,19 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> 
         name: numbers_in(model, cells_near(model, place, reach, [bridge.SOIL])) for name, place in places.items()
     }
     conversion = mpm.Conversion(plastic_strain=a.plastic_strain, displacement=a.displacement)
-    rows, seconds, started = [(0.0, 0.0, 0.0, 0.0)], 0.0, process_time()
-    for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, conversion=conversion):
-        seconds += process_time() - started
-        moved = [float(np.linalg.norm(mean_displacement(model, followed[name]))) for name in ("crest", "toe")]
-        rows.append(
-            (report.time, *moved, report.converted_cells / max(1, report.converted_cells + report.resting_cells))
-        )
-        started = process_time()
+    output = ModelOutput(model, folder / "particles", folder / "mesh", FIELDS) if resting else nullcontext()
+    rows, frames, seconds, started = [(0.0, 0.0, 0.0, 0.0)], [], 0.0, process_time()
+    with output as files:
+        for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, conversion=conversion):
+            seconds += process_time() - started
+            moved = [float(np.linalg.norm(mean_displacement(model, followed[name]))) for name in ("crest", "toe")]
+            rows.append(
+                (report.time, *moved, report.converted_cells / max(1, report.converted_cells + report.resting_cells))
+            )
+            if files is not None:
+                files.write()
+                frames.append(particle_frame(model, report.time))
+            started = process_time()
     if comm.rank == 0:
         print(f"{KINDS['coupled' if resting else 'particles']}: crest {rows[-1][1]:.4f} m, toe {rows[-1][2]:.4f} m, "
               f"{seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
@@ -157,6 +166,7 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool) -> 
         "seconds": seconds,
         "report": report,
         "frame": frame,
+        "frames": frames,
         "scene": scene_of(model, [bridge.SOIL]),
     }
 
@@ -205,7 +215,7 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     mesh = ground(a)
     fem = equilibrium(a, mesh)
-    runs = {kind: slide(a, mesh, fem, kind == "coupled") for kind in KINDS}
+    runs = {kind: slide(a, mesh, fem, kind == "coupled", folder) for kind in KINDS}
     last = {kind: run["history"][-1] for kind, run in runs.items()}
     report = runs["coupled"]["report"]
     summary = {
@@ -226,7 +236,8 @@ def main(arguments: list[str] | None = None) -> int:
         "displacement": "Displacement of the soil at crest and toe", "converted": "Cells that have turned into particles",
         "cells": "Resting cells (triangles) and particles at the end",
     }  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=captions), drawn(runs, folder))
+    movie = particle_movie(KINDS["coupled"], runs["coupled"]["scene"], runs["coupled"]["frames"])
+    write_summary(folder, a, summary, comm, Page(movies=[movie], captions=captions), drawn(runs, folder))
     if comm.rank == 0:
         print(f"crest {summary['relative_difference_of_crest']:.1%} and toe {summary['relative_difference_of_toe']:.1%} apart, "
               f"in {summary['ratio_of_seconds']:.0%} of the time; {summary['converted_fraction']:.0%} of the cells turned into "
