@@ -56,6 +56,7 @@ WITH_PARTICLES = (
     "compare_fem",
     "cone",
     "consolidation",
+    "coupled_slope",
     "earthquake",
     "embankment",
     "footing_push",
