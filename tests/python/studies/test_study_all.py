@@ -25,7 +25,8 @@ SMALL = {
     "cone": "--cell-size 0.006 --particles-per-cell 1 --penetration 0.01 --speed 0.02 --width 5 --frames 8",
     "consolidation": "--days 20 --first-step 5 --growth 2 --frames 2 --particles",
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
-    "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3",
+    "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3 "
+    "--displacement 1e-6",
     "drawdown": "--cell-size 3 --elements P1 --days 4 --factor-times 1",
     "earthquake": "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --motion ricker "
     "--peak 1 --duration 1 --rest 0 --frames 2",
