@@ -88,7 +88,7 @@ def parser() -> ArgumentParser:
 
 def start(case: SlopeCase) -> float:
     """Stresses and states of the intact slope, by elasto-plastic finite elements. Out-of-balance ratio of the particles."""
-    fem = soil_fem(case)
+    fem = soil_fem(case, case.args.nmd)
     fem.solve(bridge.Load(unit_weight=case.args.unit_weight))
     if not fem.converged:
         raise mpm.InputError(

@@ -307,7 +307,7 @@ def main(arguments: list[str] | None = None) -> int:
         case.model.restore(a.restart)
         start = a.notes["start"]
     else:
-        start = initialise(case, a.initial, a.initial_unit_weight)
+        start = initialise(case, a.initial, a.initial_unit_weight, a.nmd and a.scheme == "explicit")
     clock["initial_stress"] = perf_counter()
     if comm.rank == 0 and a.restart is not None:
         changed = a.restarts[-1]["changed"]

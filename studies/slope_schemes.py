@@ -118,7 +118,7 @@ class Run:
 def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | None) -> tuple[Run, Scene | None]:
     """Run one slide; implicit, with steps `multiple` times the critical one at the start. Collective."""
     case = build_slope(a, comm)
-    initialise(case, a.initial, a.initial_unit_weight)
+    initialise(case, a.initial, a.initial_unit_weight, a.nmd and scheme == "explicit")
     watch, run = Watch(case), Run(name)
     until = a.time
     dt = None if multiple is None else multiple * case.model.critical_time_step()

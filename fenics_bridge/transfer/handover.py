@@ -57,6 +57,8 @@ def initialise(
     smooth: bool = False,
     equilibrate: bool = True,
     resting: bool = False,
+    nmd: bool | None = None,
+    integration: mpm.Integration = mpm.Integration.PARTICLES,
 ) -> Handover:
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
 
@@ -86,6 +88,9 @@ def initialise(
             out-of-balance ratio of 5e-4.
         resting: let all cells rest (`Model.rest`) as the finite elements that they were; only what fails turns into particles.
             They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are.
+        nmd: whether the run that follows averages strains, in explicit steps: equilibrium is then one of forces of averaged mean
+            stresses. By default as in the finite elements. False for implicit steps, which average strains only.
+        integration: how the run that follows makes forces of stresses; see `mpm_core.Integration`.
 
     Returns:
         How far the particles are from equilibrium, and how many of them yield.
@@ -114,11 +119,13 @@ def initialise(
         _require_same_laws(model, fem, number)
     returned = _take_stress_and_state(model, fem, search, smooth)
     _displace(model, fem.displacement, search, move, count_displacement)
-    before = model.out_of_balance()
+    averaged = getattr(fem, "_nmd", False) if nmd is None else nmd
+    before = model.out_of_balance(nmd=averaged, integration=integration)
     had_yielded = int(np.sum(particles.plastic_strain > 0))
     after = None
     if equilibrate and not resting:
-        after = model.equilibrate(tolerance=_BALANCED, max_steps=_MOST_STEPS).unbalanced_ratio
+        settled = model.equilibrate(nmd=averaged, integration=integration, tolerance=_BALANCED, max_steps=_MOST_STEPS)
+        after = settled.unbalanced_ratio
     yielded = int(np.sum(particles.plastic_strain > 0)) - had_yielded  # what has yielded stays so
     count, returned, yielded = (model.comm.allreduce(n) for n in (len(particles), returned, yielded))
     return Handover(before, after, returned / count, yielded / count)

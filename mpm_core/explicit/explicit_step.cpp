@@ -168,15 +168,6 @@ namespace
 /// in full do not feel pressures that alternate from cell to cell: there these would cost the soil strength.
 constexpr double averaged_in_non_associated_soil = 0.5;
 
-/// Finds by law the fraction of averaging; empty without nodal mixed discretisation.
-/// @param filled  whether water with its own velocity fills the pores, whose pressure is most of what averages change
-void find_averaged_laws(const std::vector<Law>& laws, bool nmd, bool filled, std::vector<double>& averaged)
-{
-  averaged.clear();
-  for (std::size_t k = 0; nmd && k < laws.size(); ++k)
-    averaged.push_back(is_non_associated(laws[k]) && !filled ? averaged_in_non_associated_soil : 1);
-}
-
 template <class G>
 void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
@@ -195,13 +186,25 @@ void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 } // namespace
 
 template <class G>
-void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
+void choose_forces(Model<G>& model, Integration kind, bool averaged)
 {
+  const bool filled = model.water.has_value(); // its pressure is most of what averages change
   for (VelocityField<G>& field : model.fields)
   {
-    field.integration.kind = options.integration;
-    find_averaged_laws(model.laws, options.nmd, has_two_phases(model), field.integration.averaged_by_law);
+    field.integration.kind = kind;
+    field.integration.averaged_by_law.clear();
+    field.integration.averaged_everywhere = 1;
+    field.integration.averaged_of_cell.clear();
+    for (std::size_t k = 0; averaged && k < model.laws.size(); ++k)
+      field.integration.averaged_by_law.push_back(
+          is_non_associated(model.laws[k]) && !filled ? averaged_in_non_associated_soil : 1);
   }
+}
+
+template <class G>
+void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
+{
+  choose_forces(model, options.integration, options.nmd);
   model.exchange.reproducible = options.reproducible;
   if (options.reproducible)
     sum_rounded_moments(model);
@@ -334,6 +337,7 @@ double pic_fraction_of_step(double fraction, double dt, double critical)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template void choose_forces(Model<G>&, Integration, bool);                                                           \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
   template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
   template CriticalParticle critical_particle(const Model<G>&);                                                        \

@@ -28,6 +28,12 @@ struct ExplicitOptions
   bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
 };
 
+/// Chooses how steps make nodal forces of the particles' stresses, and find strains, from here on.
+/// @param averaged  whether mean stresses are averaged over nodes (nodal mixed discretisation), in each soil by the
+///                  fraction by which its strains are
+template <class G>
+void choose_forces(Model<G>& model, Integration kind, bool averaged);
+
 /// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.
 /// @pre prepare(model) has been called
 /// @post model.failure is set on every rank when it is on any; the step is then not whole

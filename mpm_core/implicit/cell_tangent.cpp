@@ -93,26 +93,26 @@ constexpr int normal_entry(int a)
   return a < G::dim ? a * G::dim + a : G::dim * G::dim;
 }
 
-/// Splits the mean of the normal components off a column of the tangent.
+/// Splits the averaged part of the mean of the normal components off a column of the tangent.
 template <class G>
-double split_mean(std::array<double*, G::n_normal> normal)
+double split_mean(std::array<double*, G::n_normal> normal, double averaged)
 {
   double mean = 0;
   for (const double* component : normal)
-    mean += *component / G::n_normal;
+    mean += averaged * *component / G::n_normal;
   for (double* component : normal)
     *component -= mean;
   return mean;
 }
 
-/// Volumetric strains are averaged: they count by themselves, not in the gradient.
+/// Volumetric strains are averaged: that fraction counts by itself, not in the gradient.
 template <class G>
-void split_volumetric(const std::array<Working<G>, G::n_working>& c, CellTangent<G>& tangent)
+void split_volumetric(const std::array<Working<G>, G::n_working>& c, double averaged, CellTangent<G>& tangent)
 {
   for (int k = 0; k < G::n_working; ++k)
   {
     for (int j : normal_component<G>)
-      tangent.by_volumetric[k] += c[k][j] / G::n_normal;
+      tangent.by_volumetric[k] += averaged * c[k][j] / G::n_normal;
     for (int a = 0; a < G::n_normal; ++a)
       tangent.by_gradient[k][normal_entry<G>(a)] -= tangent.by_volumetric[k];
   }
@@ -120,24 +120,24 @@ void split_volumetric(const std::array<Working<G>, G::n_working>& c, CellTangent
 
 /// So do mean stresses.
 template <class G>
-void split_mean_stress(CellTangent<G>& tangent)
+void split_mean_stress(double averaged, CellTangent<G>& tangent)
 {
   std::array<double*, G::n_normal> normal;
   for (int m = 0; m < n_gradient<G>; ++m)
   {
     for (int a = 0; a < G::n_normal; ++a)
       normal[a] = &tangent.by_gradient[normal_component<G>[a]][m];
-    tangent.mean_by_gradient[m] = split_mean<G>(normal);
+    tangent.mean_by_gradient[m] = split_mean<G>(normal, averaged);
   }
   for (int a = 0; a < G::n_normal; ++a)
     normal[a] = &tangent.by_volumetric[normal_component<G>[a]];
-  tangent.mean_by_volumetric = split_mean<G>(normal);
+  tangent.mean_by_volumetric = split_mean<G>(normal, averaged);
 }
 } // namespace
 
 template <class G, int D>
 CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
-                            const CellStrain<D>& strain, const ImplicitOptions& options)
+                            const CellStrain<D>& strain, const ImplicitOptions& options, double averaged)
 {
   CellTangent<G> tangent{};
   for (int k = 0; k < G::n_working; ++k)
@@ -151,15 +151,15 @@ CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const
   if (!options.hold_positions)
     add_spin(c, stress, strain, tangent);
   if (options.nmd)
-    split_volumetric(c, tangent);
+    split_volumetric(c, averaged, tangent);
   if (options.average_stress)
-    split_mean_stress(tangent);
+    split_mean_stress(averaged, tangent);
   return tangent;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>&, const Working<G>&,                 \
-                                       const CellStrain<G::dim>&, const ImplicitOptions&);
+                                       const CellStrain<G::dim>&, const ImplicitOptions&, double);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -10,7 +10,8 @@ namespace mpm::implicit
 /// @param c       sum V dsigma/dstrain over the cell's particles, of the components that do work
 /// @param stress  sum V sigma at the increment's end
 /// @param strain  strain and rotation of the increment
+/// @param averaged  fraction of nodal mixed discretisation in the cell, see `averaged_fraction`
 template <class G, int D = G::dim>
 CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
-                            const CellStrain<D>& strain, const ImplicitOptions& options);
+                            const CellStrain<D>& strain, const ImplicitOptions& options, double averaged);
 } // namespace mpm::implicit

@@ -51,8 +51,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   if (model.water)
     model.water->time = model.time + dt;
   step.has_contacts = !model.contacts.empty();
-  field.integration.kind = options.integration;
-  field.integration.averaged_by_law.assign(options.average_stress ? model.laws.size() : 0, 1.0);
+  explicit_scheme::choose_forces(model, options.integration, options.average_stress);
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   field.has_light_nodes = false; // the equations give them velocities, too

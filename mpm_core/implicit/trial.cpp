@@ -4,6 +4,7 @@
 #include "implicit/cell_tangent.h"
 #include "model/integration.h"
 #include "model/law_increment.h"
+#include "model/mapping.h"
 #include "particles/batches.h"
 #include "transfer/affine_field.h"
 #include "transfer/kinematics.h"
@@ -63,7 +64,7 @@ TrialStrain<D> cell_strain(const Mesh<D>& mesh, const VelocityField<G>& field, c
     add_hoop(strain, hoop);
   }
   if (step.options.nmd)
-    set_volumetric<G>(strain, mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain));
+    set_volumetric<G>(strain, averaged_strain<G>(mesh, field, cell, strain.volumetric));
   if (step.options.hold_positions)
   {
     make_small<D>(strain);
@@ -246,7 +247,8 @@ TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& materia
     return count;
   step.tangents.resize(cells);
   for (Index c : step.cells)
-    step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options);
+    step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options,
+                                       averaged_fraction(field.integration, c));
   return count;
 }
 

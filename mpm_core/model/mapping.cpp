@@ -235,7 +235,8 @@ template <class G, int D>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress)
 {
-  average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(stress[c]); });
+  average_mean_stress<G>(mesh, exchange, field,
+                         [&](Index c) { return averaged_fraction(field.integration, c) * mean_of<G>(stress[c]); });
   for (Index c : field.part.cells)
   {
     if (field.integration.mean_stress_of_cell[c].volume == 0)

@@ -210,9 +210,10 @@ void bind_model(py::module_& m, const std::string& suffix)
              return std::tuple(found.particle, found.altitude, std::sqrt(found.squared_time));
            })
       .def("out_of_balance",
-           [](M& model, const Vector<D>& gravity)
+           [](M& model, const Vector<D>& gravity, Integration integration, bool nmd)
            {
              prepare(model);
+             choose_forces(model, integration, nmd);
              map_to_nodes(model);
              return out_of_balance(model, gravity);
            })

@@ -81,7 +81,7 @@ def further_members(first: SlopeCase, history: History, stop: Callable[[], bool]
     rows = {name: [np.asarray(history[name])] for name in MEASURES}
     for member in range(1, a.ensemble):
         case = build_slope(a, first.model.comm)
-        initialise(case, a.initial, a.initial_unit_weight)
+        initialise(case, a.initial, a.initial_unit_weight, a.nmd and a.scheme == "explicit")
         perturb(case.model, a.height, member)
         watch = Watch(case)
         if a.scheme == "quasi-static":

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -89,6 +90,11 @@ class Slide:
             self.frames.append(frame)
 
 
+def averages(a: Namespace, laws: Iterable[Any]) -> bool:
+    """Whether the slide averages strains: as asked for, else where the soil keeps its volume."""
+    return keeps_volume(list(laws)) if a.nmd is None else a.nmd
+
+
 def slide(
     a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt, update: Callable[[], None] = lambda: None,
     step: float | None = None,
@@ -100,7 +106,7 @@ def slide(
         update: called after each frame, such as for loads that change with the shape of the body.
         step: of the implicit scheme, in the place of the explicit one [s].
     """
-    nmd = keeps_volume(model.laws) if a.nmd is None else a.nmd
+    nmd = averages(a, model.laws)
     options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
@@ -161,7 +167,8 @@ def site_slide(a: Namespace) -> int:
     start = perf_counter()
     folder = open_results(a, comm)
     site = read_site(a.site, comm)
-    fem = site.finite_elements(1, solver=bridge.Solver(tolerance=1e-10))
+    nmd = averages(a, site.laws.values())
+    fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10))
     steps = fem.solve(site.load())
     if not fem.converged:
         reason = next(step.report.reason for step in reversed(steps) if not step.converged)
@@ -169,7 +176,7 @@ def site_slide(a: Namespace) -> int:
         raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
     weaker = [bridge.reduced_strength(law, a.factor) for law in site.laws.values()]
     model = site.particles(a.particles_per_cell, more=weaker)
-    handover = bridge.initialise(model, fem, count_displacement=False)
+    handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)
     model.assign(model.particles.material + len(site.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt)

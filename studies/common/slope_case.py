@@ -131,34 +131,35 @@ def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
     return SlopeCase(args, domain, cell_tags, facet_tags, soil, model)
 
 
-def initialise(case: SlopeCase, kind: str, unit_weight: float) -> dict[str, float]:
-    """Give the particles their initial stresses: "fem", "elastic", "k0" or "zero".
+def initialise(case: SlopeCase, kind: str, unit_weight: float, nmd: bool = False) -> dict[str, float]:
+    """Give the particles their initial stresses: "fem", "elastic", "k0" or "zero"; in equilibrium for steps with or without
+    averaged forces (``nmd``; implicit steps do not average them).
 
     Returns its results for the summary, by name: the ratio of out-of-balance to external force under that unit weight [-]
     (1 without stresses) and, after "fem", how the hand-over went. Collective.
     """
     gravity = (0.0, -GRAVITY * unit_weight / case.args.unit_weight)
     if kind == "fem":
-        return hand_over(case, unit_weight, gravity)
+        return hand_over(case, unit_weight, gravity, nmd)
     particles = case.model.particles
     if kind == "elastic":
         particles.set("stress", elastic_stress(case, unit_weight))
     elif kind == "k0":
         k0 = bridge.k0_elastic(case.args.poisson)
         particles.set("stress", bridge.k0_stress(particles.position, case.surface, unit_weight, k0))
-    return {"initial_out_of_balance_ratio": case.model.out_of_balance(gravity)}
+    return {"initial_out_of_balance_ratio": case.model.out_of_balance(gravity, nmd=nmd)}
 
 
-def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float]) -> dict[str, float]:
+def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float], nmd: bool) -> dict[str, float]:
     """Stresses and states of elasto-plastic equilibrium under the initial unit weight, brought to rest in the particles.
 
     Linear triangles, the particles' own soil cells: so the particles balance their weight as soon as they have the stresses.
     Displacements count from the state that is handed over. Collective.
     """
     model = case.model
-    case.fem = fem = solved_fem(case, unit_weight)
+    case.fem = fem = solved_fem(case, unit_weight, nmd)
     model.set_gravity(gravity)
-    report = bridge.initialise(model, fem, count_displacement=False)
+    report = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)
     model.set_gravity((0.0, -GRAVITY))
     return {
         "initial_out_of_balance_ratio": report.unbalanced_ratio,
@@ -168,12 +169,12 @@ def hand_over(case: SlopeCase, unit_weight: float, gravity: tuple[float, float])
     }
 
 
-def solved_fem(case: SlopeCase, unit_weight: float) -> bridge.QuasiStatic:
+def solved_fem(case: SlopeCase, unit_weight: float, nmd: bool = False) -> bridge.QuasiStatic:
     """Elasto-plastic equilibrium of the soil body under a unit weight, on the particles' soil cells.
 
     Raises InputError, on all ranks, when the slope does not carry the unit weight. Collective.
     """
-    fem = soil_fem(case)
+    fem = soil_fem(case, nmd)
     fem.solve(bridge.Load(unit_weight=unit_weight))
     if not fem.converged:
         raise mpm.InputError(
@@ -183,7 +184,7 @@ def solved_fem(case: SlopeCase, unit_weight: float) -> bridge.QuasiStatic:
     return fem
 
 
-def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
+def soil_fem(case: SlopeCase, nmd: bool = False) -> bridge.QuasiStatic:
     """Finite elements, linear triangles, on the particles' soil cells, unloaded. Collective.
 
     Particles that take their stresses over are as far out of balance, so the tolerance is a tight one.
@@ -192,7 +193,7 @@ def soil_fem(case: SlopeCase) -> bridge.QuasiStatic:
     with warnings.catch_warnings():  # the equilibrium is that of the particles' cells, which say themselves where they lock
         warnings.simplefilter("ignore", RuntimeWarning)
         return bridge.QuasiStatic(
-            body, case.soil, facet_tags, SUPPORTS, degree=1, solver=bridge.Solver(tolerance=1e-10)
+            body, case.soil, facet_tags, SUPPORTS, degree=1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10)
         )
 
 

@@ -26,7 +26,7 @@ from .interrupt import Interrupt
 from .movie import particle_movie
 from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
-from .site_slides import add_slide_options, slide, slide_pictures
+from .site_slides import add_slide_options, averages, slide, slide_pictures
 from .slope_site import SlopeSite
 from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
@@ -65,7 +65,7 @@ def slide_of(
     if a.slide_water == "flows":
         step, act = a.slide_step, lambda: None
         let_water_flow(slope, instant, model)
-    unbalanced = model.out_of_balance()
+    unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and averages(a, model.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
@@ -115,7 +115,8 @@ def handed_over(
         return np.maximum(instant.pore_pressure(points), 0.0)
 
     stronger = bridge.reduced_strength(site.laws, HOLDING * instant.safety.value)
-    fem = slope.elements(1, pressure, stronger, solver=bridge.Solver(tolerance=1e-10))
+    nmd = averages(a, site.laws.values()) and a.slide_water == "still"  # implicit steps, where it flows, average strains only
+    fem = slope.elements(1, pressure, stronger, nmd=nmd, solver=bridge.Solver(tolerance=1e-10))
     fem.solve(site.load())
     if not fem.converged:
         raise mpm.RunError(f"the particles find no initial equilibrium at {in_days(instant.time)}")
@@ -126,6 +127,6 @@ def handed_over(
         model.particles.set("traction", seepage_forces(model, lambda points: nodal))
 
     act()
-    handover = bridge.initialise(model, fem, count_displacement=False)
+    handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)
     model.assign(model.particles.material + len(site.laws))
     return model, handover, act

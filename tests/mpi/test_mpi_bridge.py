@@ -10,6 +10,7 @@ from bridge_cases import (
     POISSON,
     UNIT_WEIGHT,
     YOUNG,
+    clay_block,
     column,
     column_stress,
     interior_points,
@@ -258,3 +259,15 @@ def test_axisymmetric_hand_over_between_different_partitions(degree, options):
     assert_same_hand_over(results, 1e-8)
     report = bridge.initialise(cylinder_particles(8, headroom=0.25), cylinder_fem(8, degree=degree), **options)
     assert report.equilibrated_ratio < 1e-3
+
+
+@pytest.mark.parametrize("geometry", [bridge.Geometry.PLANE_STRAIN, bridge.Geometry.AXISYMMETRIC, bridge.Geometry.SOLID])
+def test_averaged_elements_hand_over_in_equilibrium_for_averaged_steps(geometry):
+    """Means over nodes that ranks share are the same in elements and particles: nothing moves in the steps that follow."""
+    fem, model = clay_block(geometry, COMM)
+    report = bridge.initialise(model, fem, count_displacement=False, equilibrate=False)
+    assert report.unbalanced_ratio < 1e-9
+    settlement = COMM.allreduce(float(np.abs(fem.displacement.x.array).max(initial=0.0)), MPI.MAX)
+    model.explicit(0.01, nmd=True).last()
+    moved = COMM.allreduce(float(np.abs(model.particles.displacement).max(initial=0.0)), MPI.MAX)
+    assert moved < 1e-6 * settlement

@@ -76,3 +76,29 @@ def slope_particles(unit_weight, cell_size=0.1, kind="crossed", law=None, comm=M
     model.fix(bridge.BASE)
     model.set_gravity((0, -9.81))
     return model
+
+
+CLAY = {"young": 1e6, "poisson": 0.45, "cohesion": 8e3, "friction_angle": 0.0}
+
+
+def clay_block(geometry, comm=MPI.COMM_WORLD, law=None):
+    """(finite elements, particles in their cells) of clay that stands free on rough ground; both average strains."""
+    axisymmetric = geometry == bridge.Geometry.AXISYMMETRIC
+    dim = 3 if geometry == bridge.Geometry.SOLID else 2
+    domain, tags, facet_tags = bridge.box_mesh(comm, [1.0] * dim, [3 if dim == 3 else 6] * dim)
+    law = law or mpm.MohrCoulomb(**CLAY)
+    base = 2 * dim - 1
+    supports = [bridge.roller(1, np.eye(dim)[0]), bridge.fixed(base)]
+    fem = bridge.QuasiStatic(
+        domain, law, facet_tags, supports, 1, geometry=geometry if axisymmetric else None, nmd=True,
+        solver=bridge.Solver(tolerance=1e-11),
+    )  # fmt: skip
+    fem.solve(bridge.Load(unit_weight=18e3))
+    assert fem.converged
+    mesh = bridge.background_mesh(domain, tags, facet_tags)
+    model = mpm.Model(mesh, law, **({"geometry": geometry} if axisymmetric else {}))
+    model.seed(density=18e3 / 9.81, per_cell={3: 4, 2: 3}[dim])
+    model.roller(1, np.eye(dim)[0])
+    model.fix(base)
+    model.set_gravity([0.0] * (dim - 1) + [-9.81])
+    return fem, model

@@ -39,8 +39,9 @@ def implicit_options(
     ghost: GhostPenalty | None,
     small_displacements: bool = False,
     second_order: bool = False,
+    averaged_forces: bool = False,
 ) -> Any:
-    """The core's options of the scheme; see `Model.implicit`."""
+    """The core's options of the scheme; see `Model.implicit` and `Model.equilibrate`."""
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic = within("pic", pic, 0, 1)
@@ -61,7 +62,7 @@ def implicit_options(
     if small_displacements and not quasi_static:
         raise InputError("small_displacements is True, expected False unless quasi_static is True")
     options.hold_positions = bool(small_displacements)
-    options.average_stress = bool(small_displacements and nmd)
+    options.average_stress = bool(nmd and (small_displacements or averaged_forces))
     return options
 
 

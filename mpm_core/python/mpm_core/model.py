@@ -122,14 +122,22 @@ class Model(ContactMethods, Body):
         """Critical time step (16): smallest h_min / c_d over the particles [s]; `critical_cell` finds the cell that sets it."""
         return self._core.critical_time_step()
 
-    def out_of_balance(self, gravity: ArrayLike | None = None) -> float:
+    def out_of_balance(
+        self,
+        gravity: ArrayLike | None = None,
+        *,
+        nmd: bool = False,
+        integration: Integration = Integration.PARTICLES,
+    ) -> float:
         """Out-of-balance over external force of the particles as they are: |f_ext - f_int| / |f_ext| over the nodes [-].
 
         Args:
             gravity: [m/s2], shape (D,), to weigh the particles with; by default the model's own, without its ramp.
+            nmd: take forces of averaged mean stresses, as explicit steps with ``nmd`` and small displacements do.
+            integration: how stresses become forces in the steps that are meant; see `Integration`.
         """
         g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
-        return self._core.out_of_balance(g)
+        return self._core.out_of_balance(g, integration, bool(nmd))
 
     def report(self) -> Report:
         """State of the run at the present time."""
@@ -335,6 +343,7 @@ class Model(ContactMethods, Body):
         tolerance: float = 1e-6,
         max_steps: int = 20,
         small_displacements: bool = False,
+        averaged_forces: bool = True,
     ) -> ImplicitReport:
         """Bring the particles to equilibrium under the present loads, by quasi-static steps without duration.
 
@@ -344,12 +353,15 @@ class Model(ContactMethods, Body):
 
         Args:
             solver: solver of each step; Newton's method by default.
-            nmd: average volumetric strains over nodes (nodal mixed discretisation).
+            nmd: average volumetric strains over nodes, and mean stresses for the nodal forces (nodal mixed discretisation), as
+                explicit steps with ``nmd`` do.
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: out-of-balance ratio |f_ext - f_int| / |f_ext| to reach, in the state after a step.
             max_steps: largest number of steps.
             small_displacements: change the particles' stresses but not their positions and volumes; see ``implicit``.
+            averaged_forces: false for implicit steps with ``nmd`` that move particles: they average strains only, so that forces
+                without averages balance the loads.
 
         Raises:
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
@@ -358,7 +370,10 @@ class Model(ContactMethods, Body):
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
         options = collectively(
-            self.comm, lambda: implicit_options(0.0, 0.0, nmd, integration, True, ghost, small_displacements)
+            self.comm,
+            lambda: implicit_options(
+                0.0, 0.0, nmd, integration, True, ghost, small_displacements, averaged_forces=averaged_forces
+            ),
         )
         return find_equilibrium(
             self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bridge_cases import MESHES, POISSON, YOUNG, column, slope_model, slope_particles
+from bridge_cases import MESHES, POISSON, YOUNG, clay_block, column, slope_model, slope_particles
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -161,3 +161,35 @@ def test_newton_converges_quadratically():
 def test_quadratic_elements_are_not_averaged():
     with pytest.raises(bridge.InputError, match="nmd.*degree=2"):
         slope_model(degree=2, nmd=True)
+
+
+@pytest.mark.parametrize("geometry", [mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC, mpm.Geometry.SOLID])
+def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry):
+    """The forces of the hand-over are those of the steps that follow: they are in balance, and nothing moves."""
+    fem, model = clay_block(geometry)
+    assert bridge.initialise(model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio < 1e-9
+    assert model.out_of_balance() > 1e-3  # of forces that the steps do not have
+    report = model.explicit(0.02, nmd=True, courant=0.25).last()
+    settlement = np.abs(fem.displacement.x.array).max()
+    assert np.abs(model.particles.displacement).max() < 1e-6 * settlement and report.unbalanced_ratio < 1e-6
+
+
+def test_soil_whose_averages_differ_between_both_is_brought_to_equilibrium_for_the_steps():
+    """Elements of soil without dilation have plain forces, explicit steps averages by half: equilibrium is of the latter."""
+    law = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=6e3, friction_angle=20.0, dilation_angle=0.0)
+    fem, model = clay_block(mpm.Geometry.PLANE_STRAIN, law=law)
+    report = bridge.initialise(model, fem, count_displacement=False)
+    assert report.equilibrated_ratio < 5e-4 < report.unbalanced_ratio
+    assert model.out_of_balance(nmd=True) == pytest.approx(report.equilibrated_ratio, rel=1e-6)
+    before = model.particles.displacement.copy()
+    model.explicit(0.05, nmd=True).last()
+    settlement = np.abs(fem.displacement.x.array).max()
+    assert np.abs(model.particles.displacement - before).max() < 2e-3 * settlement
+
+
+def test_particles_equilibrate_by_the_forces_of_the_steps_that_follow():
+    """Explicit steps average forces, implicit ones that move particles do not; either is at rest after its own equilibrium."""
+    for averaged in (True, False):
+        _, model = clay_block(mpm.Geometry.PLANE_STRAIN)
+        model.equilibrate(nmd=True, tolerance=1e-9, averaged_forces=averaged)
+        assert model.out_of_balance(nmd=averaged) < 1e-8 < 1e-4 < model.out_of_balance(nmd=not averaged)

@@ -187,9 +187,8 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
     """The upper metre, which stands free with 2 c / (gamma H) = 1, so with c = 9 kPa, has 36 kPa.
 
     Divided by 1.2 nothing yields, and all stays where the elements had it; divided by 8 it falls, by the order of g t^2 / 2.
-    With averaged strains, the default in such soil, forces are averaged, too, but the stresses of the elements are not: soil that
-    does not yield moves by a part of its elastic settlement. By hand that is 18 kPa 2 m / M below, with the weight of 10 kN/m3 of
-    this soil itself, and that of the upper metre.
+    So it does with averaged strains, the default in such soil, since elements and particles average forces alike. The settlement
+    by hand is 18 kPa 2 m / M below, with the weight of 10 kN/m3 of this soil itself, and that of the upper metre.
     """
     slope, path = importlib.import_module("slope"), site_in(tmp_path, SITE.replace("9e3", "36e3"))
     (tmp_path / "block.geo").write_text(
@@ -206,8 +205,7 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
         assert (folder / "report.html").exists() and not list(folder.glob("*.png"))
     lower, upper = (5e6 * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) for nu in (0.45, 0.3))
     settlement = (18e3 * 2 + 10e3 * 2**2 / 2) / lower + 18e3 / 2 / upper
-    assert moved[1.2, "--no-nmd"] < 1e-6
-    assert moved[1.2, "--nmd"] < 0.1 * settlement
+    assert max(moved[1.2, "--no-nmd"], moved[1.2, "--nmd"]) < 1e-5 * settlement
     assert 0.05 < moved[8.0, ""] < 9.81 / 2 * 0.4**2
 
 
