@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from mpm_core import InputError
 
-T = TypeVar("T")
-
-__all__ = ["InputError", "agree", "is_finite", "on_root"]
+__all__ = ["InputError", "agree", "is_finite"]
 
 
 def agree(comm: MPI.Comm, message: str | None) -> None:
@@ -33,29 +30,6 @@ def agree(comm: MPI.Comm, message: str | None) -> None:
     first = next((text for text in comm.allgather(message) if text is not None), None)
     if first is not None:
         raise InputError(first)
-
-
-def on_root(comm: MPI.Comm, task: Callable[[], T]) -> T | None:
-    """Carry out a task on rank 0; its `InputError` reaches every rank.
-
-    Args:
-        comm: the ranks.
-        task: function without arguments.
-
-    Returns:
-        The result on rank 0, None elsewhere.
-
-    Note:
-        Collective.
-    """
-    result, message = None, None
-    if comm.rank == 0:
-        try:
-            result = task()
-        except InputError as error:
-            message = str(error)
-    agree(comm, message)
-    return result
 
 
 def is_finite(value: Any) -> bool:

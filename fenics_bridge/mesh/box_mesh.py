@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.errors import InputError
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
 from fenics_bridge.types import MeshTags
 
@@ -45,7 +46,7 @@ def box_mesh(
         Collective.
     """
     dim = len(np.atleast_1d(lengths))
-    result = on_root(comm, lambda: _arrays(lengths, counts, diagonals, body))
+    result = on_first_rank(comm, lambda: _arrays(lengths, counts, diagonals, body))
     return distributed_mesh(comm, result if result is not None else empty_arrays(dim), dim)
 
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 
-from fenics_bridge.errors import InputError, agree, on_root
+from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh import gmsh_reader
 from fenics_bridge.mesh.checks import check_cells_fit, check_conforming
 from fenics_bridge.mesh.gmsh_process import Limits, read_apart
@@ -62,7 +63,7 @@ def read_mesh(
     """
     _check_arguments(comm, path, dim, parameters)
     limits = Limits(time_limit, memory_limit, allow_commands)
-    arrays = on_root(comm, lambda: _arrays_from_file(Path(path), dim, parameters or {}, limits))
+    arrays = on_first_rank(comm, lambda: _arrays_from_file(Path(path), dim, parameters or {}, limits))
     return distributed_mesh(comm, arrays if arrays is not None else empty_arrays(dim), dim)
 
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.errors import InputError
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.names import name_tags
@@ -77,7 +78,7 @@ def slope_mesh(
             raise InputError(f"kind: got {kind!r}, expected one of {', '.join(makers)}")
         return makers[kind](*shape)
 
-    result = on_root(comm, arrays)
+    result = on_first_rank(comm, arrays)
     domain, cell_tags, facet_tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
     return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mpm_core.collective import on_first_rank
 from numpy.typing import NDArray
 
 import mpm_core as mpm
-from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.errors import InputError
 from fenics_bridge.terrain.raster import Raster
 
 
@@ -48,7 +49,7 @@ def seed_slide(
         Collective.
     """
     surface = rupture.triangles()
-    found = on_root(model.comm, lambda: _points(before, rupture, surface, spacing))
+    found = on_first_rank(model.comm, lambda: _points(before, rupture, surface, spacing))
     points, volumes, lift = model.comm.bcast(found)
     model.seed_points(points, volumes, density=density, material=material)
     return model.add_contact(surface, friction=friction, adhesion=adhesion), lift

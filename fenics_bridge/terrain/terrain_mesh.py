@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 
-from fenics_bridge.errors import InputError, on_root
+from fenics_bridge.errors import InputError
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
@@ -58,7 +59,7 @@ def terrain_mesh(
         plan = _plan(ground, cell_size, coarse, fine)
         return _extruded(plan, ground, below, height, max(1, round((height + below) / cell_size)))
 
-    result = on_root(comm, arrays)
+    result = on_first_rank(comm, arrays)
     return distributed_mesh(comm, result if result is not None else empty_arrays(3), 3)
 
 

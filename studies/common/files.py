@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
 
-if TYPE_CHECKING:
-    from mpi4py import MPI
-
-T = TypeVar("T")
 ROOT = Path(__file__).parents[2]
 IN_SOURCES = (ROOT / "CMakeLists.txt").exists()
 """Whether the studies are those of the source tree, not of an installed package"""
@@ -25,24 +20,6 @@ PROGRAM = os.environ.get("TALUS_PROGRAM", "studies/run")
 
 class OutputError(RuntimeError):
     """The results cannot be written; the message names the path and the reason."""
-
-
-def on_first_rank(comm: MPI.Comm, work: Callable[[], T]) -> T:
-    """Run a function on the first rank only; what it returns is returned on all ranks. Collective.
-
-    Raises:
-        OutputError: on all ranks, if the function raised it.
-    """
-    result, problem = None, None
-    if comm.rank == 0:
-        try:
-            result = work()
-        except OutputError as error:
-            problem = str(error)
-    result, problem = comm.bcast((result, problem))
-    if problem is not None:
-        raise OutputError(problem)
-    return result  # type: ignore[return-value]
 
 
 @contextlib.contextmanager

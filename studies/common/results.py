@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 
-from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError, on_first_rank
+from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError
 from .options import Options
 from .parameters import write_parameters
 
@@ -57,7 +58,7 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
         write_parameters(folder / "parameters.toml", options.parameters(), options.study, options.restarts)
         return folder
 
-    folder = on_first_rank(comm, opened)
+    folder = comm.bcast(on_first_rank(comm, opened, OutputError))
     _keep_compiler_lines(folder)
     return folder
 
@@ -86,7 +87,7 @@ def subfolder(folder: Path, name: str, comm: MPI.Comm = MPI.COMM_WORLD) -> Path:
             raise OutputError(f"cannot write results to {path}: {error.strerror}") from None
         return path
 
-    return on_first_rank(comm, made)
+    return comm.bcast(on_first_rank(comm, made, OutputError))
 
 
 def release_reserved_space(folder: Path) -> None:

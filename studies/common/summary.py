@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.collective import on_first_rank
 
 from .figures import Pictures, draw_pictures
-from .files import NOT_WRITTEN, expendable, on_first_rank, write_text
+from .files import NOT_WRITTEN, OutputError, expendable, write_text
 from .options import Options
 from .page import Page, seconds_since_start, write_page
 from .results import note_what_was_written, release_reserved_space
@@ -45,7 +46,7 @@ def write_summary(
         OutputError: on all ranks, with path and reason, when ``summary.json`` cannot be written. A picture, a film or the page
             that cannot be written costs only itself.
     """
-    on_first_rank(comm, lambda: _write(folder, options, results, comm, page, pictures or {}))
+    on_first_rank(comm, lambda: _write(folder, options, results, comm, page, pictures or {}), OutputError)
 
 
 def _write(

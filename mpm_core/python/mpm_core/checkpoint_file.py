@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import RunError
-from .collective import check_same_path, collectively, on_first_rank
+from .collective import check_same_path, collectively, write_on_first_rank
 from .hdf5 import RowsFile
 
 Arrays = dict[str, NDArray[Any]]
@@ -58,7 +58,7 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
         file.close(durable=True)
         _rename(aside, path)
 
-    on_first_rank(comm, path, put_in_place)
+    write_on_first_rank(comm, path, put_in_place)
 
 
 def _rename(aside: str, path: str) -> None:

@@ -35,21 +35,41 @@ def collectively(comm: MPI.Comm, work: Callable[[], T], kind: type[Exception] = 
     return result  # type: ignore[return-value]
 
 
-def on_first_rank(comm: MPI.Comm, path: str | os.PathLike[str], work: Callable[[], object]) -> None:
+def on_first_rank(comm: MPI.Comm, work: Callable[[], T], kind: type[Exception] = InputError) -> T | None:
+    """Run ``work`` on the first rank only.
+
+    Returns:
+        Its result on the first rank, None on the others.
+
+    Raises:
+        kind: on all ranks, with the message of the error of that kind that ``work`` raised.
+    """
+    result, failure = None, None
+    if comm.rank == 0:
+        try:
+            result = work()
+        except kind as error:
+            failure = str(error)
+    failure = comm.bcast(failure)
+    if failure is not None:
+        raise kind(failure)
+    return result
+
+
+def write_on_first_rank(comm: MPI.Comm, path: str | os.PathLike[str], work: Callable[[], object]) -> None:
     """Run ``work``, which writes a file, on the first rank.
 
     Raises:
         RunError: on all ranks, with the path of the error, or the given one, and the reason why the system refused.
     """
-    failure: str | None = None
-    if comm.rank == 0:
+
+    def write() -> None:
         try:
             work()
         except OSError as error:
-            failure = f"cannot write {error.filename or os.fspath(path)}: {error.strerror}"
-    failure = comm.bcast(failure)
-    if failure is not None:
-        raise RunError(failure)
+            raise RunError(f"cannot write {error.filename or os.fspath(path)}: {error.strerror}") from None
+
+    on_first_rank(comm, write, RunError)
 
 
 def check_same_path(comm: MPI.Comm, path: str | os.PathLike[str]) -> None:

@@ -6,13 +6,13 @@ import csv
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from mpi4py import MPI
 
 from ._core import InputError
-from .collective import collectively, on_first_rank
+from .collective import on_first_rank, write_on_first_rank
 
 ROUNDING = 1e-8
 """Relative; times in the file have nine digits."""
@@ -44,13 +44,10 @@ class RowFile:
         self._file: Any = None
         self.kept: list[list[str]] = []
         """Rows that were kept, as texts; on the first rank"""
-        collectively(comm, self._on_first(lambda: self._begin(list(columns), keep_before)))
+        on_first_rank(comm, lambda: self._begin(list(columns), keep_before))
 
     def __repr__(self) -> str:
         return f"<RowFile: {self.path}>"
-
-    def _on_first(self, work: Callable[[], None]) -> Callable[[], None]:
-        return work if self._comm.rank == 0 else lambda: None
 
     def _begin(self, columns: list[str], keep_before: float | None) -> None:
         aside = f"{self.path}.part"
@@ -77,7 +74,7 @@ class RowFile:
             self._writer.writerow([f"{value:.9g}" for value in values])
             self._file.flush()
 
-        on_first_rank(self._comm, self.path, write)
+        write_on_first_rank(self._comm, self.path, write)
 
     def close(self) -> None:
         """Close the file; nothing can be added after that. A row that the disk could not hold is left out."""

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import InputError, RunError
-from .collective import check_same_path, on_first_rank
+from .collective import check_same_path, write_on_first_rank
 from .hdf5 import HeldRows, RowsFile
 
 _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
@@ -71,7 +71,7 @@ class Series:
         self.shared: dict[str, Any] = {}
         """What frames that are on the disk have for later ones to refer to; a frame that failed had perhaps stored it"""
         check_same_path(comm, text)
-        on_first_rank(comm, text, self._begin)
+        write_on_first_rank(comm, text, self._begin)
 
     def __str__(self) -> str:
         return f"{self._xdmf}, {self.n_frames} frames on the disk{', closed' if self._closed else ''}"
@@ -173,7 +173,7 @@ class Series:
             return
         (work, text), self._unfinished = self._unfinished, None
         try:
-            on_first_rank(self.comm, self._xdmf, work)
+            write_on_first_rank(self.comm, self._xdmf, work)
         except RunError:
             self.shared.clear()
             raise
@@ -191,7 +191,7 @@ class Series:
         """
         self._closed = True
         comm = MPI.COMM_SELF if self._thread is None else self.comm
-        on_first_rank(comm, self._xdmf, self._complete)
+        write_on_first_rank(comm, self._xdmf, self._complete)
 
     def abandon(self) -> None:
         """Complete the files as far as possible, without communication: this rank ends with an error."""
