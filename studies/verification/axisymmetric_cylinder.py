@@ -1,10 +1,9 @@
 """Thick-walled elastic cylinder as a half section of one radian: Lamé's solution, and the order of convergence of each method.
 
-A ring from r = a to b = 2a between smooth plates, under a pressure from inside. Finite elements with linear, averaged
-and quadratic displacements are loaded by this pressure on the wall. Particles in quasi-static steps, on the nodes of
-linear elements, are driven by the displacement of the wall, and their stresses are compared as means over rings as
-thick as a cell; a pressure would act on the particles a third of a cell inside of the wall, which is an error of first
-order.
+A ring from r = a to b = 2a lies between smooth plates under a pressure from inside. Finite elements with linear, averaged and
+quadratic displacements are loaded by this pressure on the wall. Particles in quasi-static steps, on the nodes of linear
+elements, are driven by the displacement of the wall, and their stresses are compared as means over rings as thick as a cell;
+a pressure would act on the particles a third of a cell inside of the wall, which is an error of first order.
 """
 
 import numpy as np

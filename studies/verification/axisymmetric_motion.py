@@ -116,7 +116,7 @@ def run(quick: bool, folder) -> Result:
                         ("Time [s]", "Energy per radian [J]"), limits=((None, None), (0.0, 4.6)), joined=True)  # fmt: skip
     return Result(checks, {
         "ring.png": "Radial momentum of a thin ring that breathes",
-        "energy.png": "Energies of an elastic cylinder that is let go on rough ground",
+        "energy.png": "Energies of an elastic cylinder that is released on rough ground",
     })  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Vibrating bar: period and energy of the lowest mode, in plane strain and in 3D.
 
-Fixed at one end, free at the other, rollers at the sides, so that it moves along its axis only. It starts with the
-velocity of its lowest mode and is neither damped nor driven.
+The bar is fixed at one end, free at the other, and has rollers at its sides, so that it moves along its axis only. It starts
+with the velocity of its lowest mode, without damping or load.
 """
 
 import numpy as np

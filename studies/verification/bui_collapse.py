@@ -1,9 +1,9 @@
 """Collapse of a column of aluminium bars: the experiment of Bui et al. (2008).
 
-A block of 200 x 100 mm of bars, which behave as cohesionless soil in the plane, is released on one side on rough
-ground. Expected values are points of the final surface and the run-out, digitised from the paper. The soil has the
-parameters of the paper's own simulation. A PIC fraction keeps single particles from being thrown ahead: by FLIP alone
-the soil runs out to 480 mm and some particles to 700.
+A block of 200 x 100 mm of bars, which behave as cohesionless soil in the plane, is released on one side on rough ground. The
+expected values are points of the final surface and the run-out, digitised from the paper. The soil has the parameters of the
+paper's own simulation. A PIC fraction keeps single particles from being thrown ahead: with FLIP alone the soil runs out to
+480 mm, and some particles to 700 mm.
 """
 
 import numpy as np

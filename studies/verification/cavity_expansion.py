@@ -1,19 +1,18 @@
 """Expansion of a cylindrical cavity in undrained clay: the limit pressure s_u (1 + ln I_r).
 
-A ring of Tresca soil between smooth plates, as a half section, whose inner wall is pushed outwards. Soil that keeps
-its volume moves by itself: r² - r0² = a² - a0². With the rigidity index I_r = G / s_u it yields up to the radius c,
-c² = I_r (a² - a0²), and in ground of the outer radius b, which is free there,
+The inner wall of a ring of Tresca soil between smooth plates is pushed outwards; the ring is computed as a half section. The
+motion of soil that keeps its volume is known: r² - r0² = a² - a0². With the rigidity index I_r = G / s_u it yields up to the
+radius c, c² = I_r (a² - a0²), and in ground of the outer radius b, which is free there,
 
 p = s_u (1 + ln(I_r (1 - (a0/a)²)) - c²/b²)
 
-(Gibson and Anderson 1961; the last term is what the finite ground takes away). Particles expand the cavity to four
-times its radius in quasi-static steps, on a mesh that moves with them, because background nodes at a wall that moves
-away have no soil. At this expansion the exact pressure is 0.065 s_u below its limit, and the outer radius of 500 a0
-reduces it by 0.003 to 0.03 s_u. The pressure is that of the nodes at the wall, and for comparison that of the stresses
-in the ground, by equilibrium the integral of (σ_θ - σ_r) / r.
+(Gibson and Anderson 1961; the last term is what the finite ground takes away). Particles expand the cavity to four times its
+radius in quasi-static steps, on a mesh that moves with them, because background nodes at a wall that moves away have no soil.
+At this expansion the exact pressure is 0.065 s_u below its limit, and the outer radius of 500 a0 reduces it by 0.003 to 0.03
+s_u. The pressure is that of the nodes at the wall, and for comparison that of the stresses in the ground, by equilibrium the
+integral of (σ_θ - σ_r) / r.
 
-Finite elements of small strains have p = s_u (1 + ln(2 I_r u / a) - c²/b²), which is the limit pressure where 2 u =
-a.
+Finite elements of small strains have p = s_u (1 + ln(2 I_r u / a) - c²/b²), which is the limit pressure where 2 u = a.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """Rigid circular footing on clay: the bearing capacity factor N_c, smooth and rough, on finer and finer meshes.
 
-A half section of weightless Tresca soil under a plate of radius 0.5 m that settles; a smooth plate transfers pressure
-only, a rough one also prevents horizontal displacements. It settles, in steps of adaptive length, until the load no
-longer rises over the last half of the settlement, so that neither the steps nor the final settlement influence the
-result. Quadratic elements, and linear ones with averaged volumetric strains, are too stiff and converge from above.
-From mesh to mesh the error is more than halved, at different rates, so nothing is extrapolated.
+A half section of weightless Tresca soil is loaded by a plate of radius 0.5 m that settles. A smooth plate transfers pressure
+only, a rough one also prevents horizontal displacements. It settles, in steps of adaptive length, until the load no longer
+rises over the last half of the settlement, so that neither the steps nor the final settlement influence the result. Quadratic
+elements, and linear ones with averaged volumetric strains, are too stiff and converge from above. From mesh to mesh the error
+is more than halved, at different rates, so nothing is extrapolated.
 """
 
 import numpy as np

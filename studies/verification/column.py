@@ -1,8 +1,8 @@
 """Column under its own weight, small strains, in plane strain and in 3D.
 
-Rollers at the sides, fixed base. Particles vibrate under gravity with local damping until they are at rest. Expected
-values are stresses and settlement of the elastic column (oedometer). Each linear cell has one stress, so stresses are
-compared as means over rows of cells.
+The column has rollers at its sides and a fixed base. Its particles vibrate under gravity with local damping until they are at
+rest. Expected values are stresses and settlement of the elastic column (oedometer). Each linear cell has one stress, so
+stresses are compared as means over rows of cells.
 """
 
 import numpy as np

@@ -1,11 +1,11 @@
 """Bodies on a slope: a block of soil that slides or sticks on a rigid plane, and cylinders and spheres that roll on soil.
 
-The slope is made by the direction of gravity, which rises over 0.1 s so that nothing bounces. With the acceleration a of
-a rigid body and the rise T the way at the time T + u is a (T²/6 + T u/2 + u²/2), to which the leap-frog adds half a step of
-the last velocity. The block slides with a = g (sin θ - μ cos θ) on a plane that lies along the cells, is inclined to them, or
-runs through irregular ones; below the angle of friction it stays. A cylinder rolls with 2/3 g sin θ where
-μ ≥ tan θ / 3, a sphere with 5/7 g sin θ where μ ≥ 2/7 tan θ; else they slide and spin up by 2 μ g cos θ and 5/2 μ g cos θ over
-their radius. A block that falls must not feel the plane before it touches it.
+The slope is modelled by the direction of gravity, which rises over 0.1 s so that bodies do not bounce. A rigid body with the
+acceleration a, which rises during the time T, has travelled the distance a (T²/6 + T u/2 + u²/2) at the time T + u, to which
+the leap-frog scheme adds half a step of the last velocity. The block slides with a = g (sin θ - μ cos θ) on a plane that lies
+along the cells, is inclined to them, or runs through irregular ones; below the angle of friction it stays. A cylinder rolls
+with 2/3 g sin θ where μ ≥ tan θ / 3, a sphere with 5/7 g sin θ where μ ≥ 2/7 tan θ; else they slide and spin up by 2 μ g cos
+θ and 5/2 μ g cos θ over their radius. The plane must not act on a falling block before they touch.
 """
 
 import numpy as np

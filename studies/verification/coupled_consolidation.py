@@ -1,13 +1,14 @@
 """Consolidation of a layer, Mandel's slab, Cryer's ball and the ground under a strip load, by elements and particles.
 
-Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains
-at its top. Between the rigid plates of Mandel's slab, and inside Cryer's ball, the pressure first rises above its
-initial value, because the soil at the drained surface consolidates and becomes softer: uncoupled flow does not have
-this effect. The motion of Mandel's plates is prescribed, and the force on them is compared. The ball is axisymmetric. A
-strip load acts on a layer that is so deep and wide that it represents a half-plane.
+Displacement and pore pressure are coupled; water and grains are incompressible. A layer under a load (Terzaghi) drains at its
+top. Between the rigid plates of Mandel's slab, and inside Cryer's ball, the pressure first rises above its initial value,
+because the soil at the drained surface consolidates and becomes softer: uncoupled flow does not have this effect. The motion
+of Mandel's plates is prescribed, and the force on them is compared. The ball is axisymmetric. A strip load acts on a layer
+that is so deep and wide that it represents a half-plane.
 
-Quadratic displacement with linear pressure (Taylor-Hood), linear displacement and pressure with the polynomial pressure
-projection, and implicit particles with the latter's nodes, three per cell; backward Euler with steps that grow with the time.
+Three methods are compared: finite elements with quadratic displacement and linear pressure (Taylor-Hood), finite elements
+with linear displacement and pressure and the polynomial pressure projection, and implicit particles, three per cell, on the
+nodes of the latter. Time is integrated by backward Euler with steps that grow with the time.
 """
 
 from __future__ import annotations

@@ -1,15 +1,16 @@
 """Large bending of a clamped beam with a tip load, against the elastica.
 
-Implicit steps without inertia in plane strain; the load rises to P L²/EI' = 2, EI' = E I / (1 - ν²), and keeps its
-direction. L is the arm of the load, to the middle of the particles that carry it. Linear triangles are stiff in
-bending, which mixed discretisation does not remove; 4, 8 and 16 squares over the height show their convergence.
+The beam is computed in plane strain by implicit steps without inertia. The load rises to P L²/EI' = 2, EI' = E I / (1 - ν²),
+and keeps its direction. L is the distance from the clamped end to the centre of the particles that carry the load. Linear
+triangles are stiff in bending, which mixed discretisation does not remove; 4, 8 and 16 squares over the height show their
+convergence.
 
-Particles cross from cell to cell as the beam bends. At each crossing nodal forces jump, because the gradients of linear
-shape functions are discontinuous; this causes noise in the stresses of the particles, which is hardly smaller on finer
-meshes, where crossings are more frequent. Mixed integration does not help either: bending stresses are largest at the
-faces, where cells are not full and are integrated over their particles. A run whose mesh moves with the beam (it is
-rebuilt from its moved nodes after each step) has no crossings and shows their influence. The remaining error on fine
-meshes is due to shear, which the elastica does not include (0.8 %), and to the length of the steps (1 %).
+Particles cross from cell to cell as the beam bends. At each crossing nodal forces jump, because the gradients of linear shape
+functions are discontinuous; this causes noise in the stresses of the particles, which is hardly smaller on finer meshes,
+where crossings are more frequent. Mixed integration does not help either: bending stresses are largest at the faces, where
+cells are not full and are integrated over their particles. A run whose mesh moves with the beam (it is rebuilt from its moved
+nodes after each step) has no crossings and shows their influence. The remaining error on fine meshes is due to shear, which
+the elastica does not include (0.8 %), and to the length of the steps (1 %).
 """
 
 import numpy as np
@@ -31,8 +32,8 @@ BENDING = YOUNG / (1 - POISSON**2) * HEIGHT**3 / 12
 STEPS, PER_CELL = 40, 24
 LOADS = (1.0, 2.0)  # P L^2 / EI', the last at the end of the steps
 CROSSING = (
-    "Particles cross from cell to cell, where the gradients of linear shape functions jump; their stresses scatter, which finer "
-    "cells, crossed more often, hardly lessen."
+    "The gradients of linear shape functions jump where particles cross from cell to cell, so that stresses scatter. Finer "
+    "cells hardly reduce the scatter, because they are crossed more often."
 )
 CROSSES = "mesh stays"
 STRESS = Quantity("Stress along the beam over that of the elastica at the clamp", "-", colours="viridis")
@@ -172,7 +173,7 @@ def run(quick: bool, folder) -> Result:
         "error.png": f"Error of the tip's deflection at P L²/EI' = {LOADS[-1]:g}, and scatter of the stress among particles that "
                      "began in one cell, over the number of squares over the height",
         "stress.png": f"Stress along the beam, {meshes[-2]} squares over the height: particles that cross cells, and a mesh that "
-                      "goes with the beam",
+                      "moves with the beam",
     })  # fmt: skip
 
 

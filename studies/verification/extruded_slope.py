@@ -1,10 +1,10 @@
 """A slope that slides between two smooth planes in three dimensions, against the same slope in plane strain.
 
-The paper's slope under 60 kN/m³, released at once, as a slice of two cubes of cells between rollers: the motion is the
-same in all planes of the slice, and equal to that in plane strain. The two computations have different cells, shape
-functions and numbers of particles per cell, so that they differ by the error of the cells, which must decrease with
-their size. The particles are on a regular grid, with mixed integration and averaged strains; the soil is that of the
-case on convergence, whose strength rises with the rate, so that a converged solution exists.
+The paper's slope under 60 kN/m³, released at once, is computed as a slice, two cubes of cells thick, between rollers: the
+motion is the same in all planes of the slice, and equal to that in plane strain. The two computations have different cells,
+shape functions and numbers of particles per cell, so that they differ by the error of the cells, which must decrease with
+their size. The particles are on a regular grid, with mixed integration and averaged strains; the soil is that of the case on
+convergence, whose strength rises with the rate, so that a converged solution exists.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Load on deep elastic ground: the ground beyond the particles as a stiffness of their border.
 
-Half of a strip load, or of a circular one, of 1 m on ground 20 m wide and 10 m deep. Particles everywhere are compared
-with particles in the 5 m by 4 m under the load, whose mesh is the same, and linear or quadratic elements beyond, with
-the same nodes and with others. Large linear elements are stiffer than the cells that they stand for, and quadratic ones softer.
+Half of a strip load, or of a circular one, of 1 m acts on ground 20 m wide and 10 m deep. Particles in all of the ground are
+compared with particles in the 5 m by 4 m under the load, on the same mesh, and linear or quadratic elements beyond, with the
+same nodes or with other ones. Large linear elements are stiffer than the cells that they replace, and quadratic ones are
+softer.
 """
 
 import matplotlib.pyplot as plt

@@ -1,13 +1,14 @@
 """Column under its own weight, finite strains: 50 m high, it settles by a metre.
 
-Cauchy stress follows a rate law and ν = 0, so σ = E ln(stretch) and σ = -w (H - X) at the place that was X above the base:
-u(X) = ∫ exp(-w (H - s) / E) ds - X, -0.986801 m at the top. The weight rises in ten implicit steps without inertia.
+Cauchy stress follows a rate law and ν = 0, so σ = E ln(stretch) and σ = -w (H - X) at the point that was at the height X
+before the deformation: u(X) = ∫ exp(-w (H - s) / E) ds - X, -0.986801 m at the top. The weight rises in ten implicit steps
+without inertia.
 
-Particles do not become more accurate with smaller cells: these are crossed more often, and each crossing moves the
-fraction 1 / (particles in a cell) of the cell's force to its neighbour, which strains both. The error therefore grows
-with the number of cells crossed and with the number of steps, and decreases with the number of particles per cell.
-Mixed integration removes it: a full cell integrates its mean stress over its own volume, whichever particles are in it.
-With a mesh that moves with the particles there are no crossings, and only the error of the step length remains.
+Particles do not become more accurate with smaller cells: these are crossed more often, and each crossing moves the fraction 1
+/ (particles in a cell) of the cell's force to its neighbour, which strains both. The error therefore grows with the number of
+cells crossed and with the number of steps, and decreases with the number of particles per cell. Mixed integration removes it:
+a full cell integrates its mean stress over its own volume, whichever particles are in it. With a mesh that moves with the
+particles there are no crossings, and only the error of the step length remains.
 """
 
 import numpy as np
@@ -22,8 +23,8 @@ import mpm_core as mpm
 HEIGHT, WEIGHT, YOUNG, GRAVITY = 50.0, 800.0, 1e6, 10.0  # m, N/m3, Pa, m/s2
 STEPS = 10
 CROSSING = (
-    "Particles that cross cells shift forces between them; more particles in a cell, not more cells, make that less. Mixed "
-    "integration removes it."
+    "Particles that cross from cell to cell shift forces between the cells. More particles per cell reduce this error, more"
+    " cells do not; mixed integration removes it."
 )
 PLAIN, MIXED = mpm.Integration.PARTICLES, mpm.Integration.MIXED
 

@@ -2,10 +2,10 @@
 
 Dupuit's discharge of a dam with vertical faces, k (h₁² - h₂²) / 2L, is exact in spite of the seepage face (Charny 1951); the
 flow under a sheet pile at the depth s in a layer T is that of conformal mapping, q / (k h) = K' / 2K with the modulus sin(π s
-/ 2T) (Polubarinova-Kochina 1962). The singular point at the tip of the pile leaves an error in proportion to the size of the
-cells, and the ends of a slope one in proportion to its length, so that two sizes give the limit. Lowering water that stands
-over level ground changes no effective stress and moves nothing, whatever the conductivity: the load on the surface falls by
-as much as the pressure in the pores.
+/ 2T) (Polubarinova-Kochina 1962). The singularity at the tip of the pile causes an error in proportion to the cell size, and
+the ends of a slope one in inverse proportion to its length, so that the limit is extrapolated from two sizes. Lowering water
+that stands over level ground changes no effective stress and moves nothing, whatever the conductivity: the load on the
+surface falls by as much as the pressure in the pores.
 """
 
 from __future__ import annotations

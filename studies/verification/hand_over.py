@@ -1,11 +1,10 @@
 """From finite elements to particles: the equilibrium is preserved, and the load rises further.
 
-The paper's slope under 16 kN/m³, where a part of it yields. Linear and quadratic elements on the cells of the
-particles: their stresses balance the weight of the particles exactly, whatever the law, so that nothing moves in
-explicit steps without damping. Then the weight rises to 19 kN/m³: in quasi-static steps with small displacements,
-particles are equivalent to the finite elements and must have the same stresses, also where the soil yields. Stresses
-from elements on another, unstructured mesh balance only up to the error of both meshes; one step without load restores
-equilibrium.
+A part of the paper's slope yields under 16 kN/m³. It is computed by linear and by quadratic elements on the cells of the
+particles. Their stresses balance the weight of the particles exactly, whatever the law, so that nothing moves in explicit
+steps without damping. Then the weight rises to 19 kN/m³: in quasi-static steps with small displacements, particles are
+equivalent to the finite elements and must have the same stresses, also where the soil yields. Stresses from elements on
+another, unstructured mesh balance only up to the error of both meshes; one step without load restores equilibrium.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
 """A bar that hits a wall, or is pulled from it: a finite-strain law in a large dynamic motion.
 
-All of the bar moves with one velocity, about a fifth of its wave speed, when its end is stopped. Between rollers it
-moves along its axis only, and its stretch λ determines the stress: Hencky's law has the Cauchy stress M ln λ / λ, M = K
-+ 4G/3. Compression stiffens it, so that hitting the wall sends a shock into the bar, with the speed U in the undeformed
-bar that follows from the balance of momentum across it, ρ U² = [σ] / [λ], and the velocity U (1 - λ). Tension softens
-it: the wave spreads into a fan, and dv = c(λ) dλ with c² = (dσ/dλ) / ρ gives the velocity 2/3 c₀ (1 - (1 - ln
-λ)^(3/2)). Behind the wave the bar is at rest with one stretch and one stress. A law that is linear in the Cauchy stress
-has a tenth less of it after the impact.
+The whole bar moves with the same velocity, about a fifth of its wave speed, when its end is stopped. Between rollers it moves
+along its axis only, and its stretch λ determines the stress: Hencky's law has the Cauchy stress M ln λ / λ, M = K + 4G/3.
+Compression stiffens it, so that hitting the wall sends a shock into the bar, with the speed U in the undeformed bar that
+follows from the balance of momentum across it, ρ U² = [σ] / [λ], and the velocity U (1 - λ). Tension softens it: the wave
+spreads into a fan, and dv = c(λ) dλ with c² = (dσ/dλ) / ρ gives the velocity 2/3 c₀ (1 - (1 - ln λ)^(3/2)). Behind the wave
+the bar is at rest with one stretch and one stress. A law that is linear in the Cauchy stress gives a stress that is a tenth
+lower after the impact.
 
-The shock rings in the particles that it has passed; PIC of 20 % keeps the mean free of this. Particles cross their cells.
+Behind the shock particles oscillate; a PIC fraction of 20 % damps this, so that the means are not affected. Particles cross
+from cell to cell.
 """
 
 import numpy as np

@@ -1,12 +1,12 @@
 """Drainage of a sand column: soil that dries and shrinks (Liakopoulos), and rain on its way to a water table.
 
-Liakopoulos (1965) let a column of Del Monte sand, 1 m high, with water seeping through it under its weight alone, drain at
-its base from one moment on, its top closed. Its retention curve and permeability are S = 1 - 1.9722e-11 s^2.4279 (suction s
-in Pa) and k_r = 1 - 2.207 (1 - S)^1.0121; k = 4.41e-6 m/s, n = 0.2975, and, as is customary, E = 1.3 MPa and ν = 0.4 (Lewis
-and Schrefler 1998). The expected values are those of OpenGeoSys, quadratic displacement with linear pressure and lumped
-storage, whose test RichardsMechanics/LiakopoulosHM keeps its smallest pressure and its largest displacement after 600 and
-7,200 s; the steps in time here are the same, by backward Euler in both. Air stays at atmospheric pressure, and effective
-stresses are those of Bishop.
+In the experiment of Liakopoulos (1965) water first seeped through a column of Del Monte sand, 1 m high, under its weight
+alone; then the inflow at the top was closed, and the column drained at its base. Its retention curve and permeability are S =
+1 - 1.9722e-11 s^2.4279 (suction s in Pa) and k_r = 1 - 2.207 (1 - S)^1.0121; k = 4.41e-6 m/s, n = 0.2975, and, as is
+customary, E = 1.3 MPa and ν = 0.4 (Lewis and Schrefler 1998). The expected values are those of OpenGeoSys with quadratic
+displacement, linear pressure and lumped storage: its test RichardsMechanics/LiakopoulosHM records the smallest pressure and
+the largest displacement after 600 and 7,200 s. Both programs use backward Euler with the same time steps. Air stays at
+atmospheric pressure, and effective stresses are those of Bishop.
 
 Steady rain of half the conductivity above a water table, with k_r = e^(αψ), has a closed form (Gardner 1958; Srivastava and
 Yeh 1991). On particles it falls on the free surface.

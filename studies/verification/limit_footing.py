@@ -1,9 +1,9 @@
 """Strip footing: the bearing capacity factors Nc and Nq of weightless ground.
 
-Half of a smooth, flexible strip; associated flow. Nc: the pressure that ground with cohesion carries, over the
-cohesion. Nq: the pressure that ground without cohesion carries beside a surcharge, over the surcharge. Finite elements
-converge from above; their load steps begin with the cohesion or the surcharge and are bisected to 0.2 % of the
-pressure.
+Half of a smooth, flexible strip footing is computed with associated flow. Nc is the ratio of the limit pressure of ground
+with cohesion to the cohesion; Nq is the ratio of the limit pressure of ground without cohesion, beside a surcharge, to the
+surcharge. Finite elements converge from above; their load steps begin with the cohesion or the surcharge and are bisected to
+0.2 % of the pressure.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """Manufactured solutions: order of accuracy in space (finite elements, particles) and in time (explicit, implicit).
 
-A displacement is chosen and the body force that it needs is applied. In space: u = A sin(πx) sin(πy) (1, -1/2) on a
-square that is held all around; finite elements of both degrees, and one quasi-static step of particles that start
-evenly in every cell. In time: one triangle with one particle whose equation of motion is exact, driven so that u =
-A (1 - cos ωt)².
+A displacement is chosen, and the body force that belongs to it is applied. The error in space is found with u = A sin(πx)
+sin(πy) (1, -1/2) on a square that is fixed on all sides, by linear and quadratic finite elements and by one quasi-static step
+of particles that are evenly distributed in each cell. The error in time is found for a triangle with one particle, whose
+equation of motion is known exactly and whose load makes it move by u = A (1 - cos ωt)².
 """
 
 import numpy as np

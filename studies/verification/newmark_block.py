@@ -1,13 +1,12 @@
 """Newmark's sliding block: soil on a shaken rigid plane, with frictional contact.
 
-A block of soil, stiff enough to move as one, lies on a plane that moves along itself. On level ground the plane is
-accelerated by a rectangular pulse A above μ g, and the block slips by V² / (2 μ g) (1 - μ g / A). On a plane inclined
-by 15° that shakes by band-limited noise the block slides downhill whenever the plane accelerates uphill by more than g
-(μ cos β - sin β), until both have the same velocity again; the slip is integrated exactly for a piecewise linear
-velocity.
+A block of soil, stiff enough to move as one, lies on a plane that moves in its own direction. On level ground the plane is
+accelerated by a rectangular pulse A above μ g, and the block slips by V² / (2 μ g) (1 - μ g / A). On a plane inclined by 15°
+that shakes by band-limited noise the block slides downhill whenever the plane accelerates uphill by more than g (μ cos β -
+sin β), until both have the same velocity again; the slip is integrated exactly for a piecewise linear velocity.
 
-The block's own vibrations are damped in proportion to its stiffness. A rigid block has none; undamped ones change the
-pressure on the plane and make a block that sticks creep downhill, by another tenth of the slip.
+The block's own vibrations are damped in proportion to its stiffness. A rigid block has none. Without damping they change the
+pressure on the plane, so that a block that sticks creeps downhill, by another tenth of the slip.
 """
 
 import numpy as np

@@ -1,14 +1,14 @@
 """The paper: its slope, Figures 2 to 6, by both schemes, with and without mixed discretisation, on finer meshes.
 
-A slope 1 m high under 80 kN/m3, 3.5 times the unit weight at which it collapses, zero initial stress, local damping
-0.75. Expected are the displacements of the particle at the crest by an independent explicit code with plain triangles; they
+A slope 1 m high under 80 kN/m3, 3.5 times the unit weight at which it collapses, zero initial stress, local damping 0.75. The
+expected values are the displacements of the particle at the crest by an independent explicit code with plain triangles; they
 agree with the paper's Figure 6 as far as that can be read. Plain triangles lock; with nodal mixed discretisation (NMD) the
 slope slides farther.
 
-The slow creep comes from local damping, which holds back elastic oscillations too. Its speed depends on what excites
-these, that is on locking, on the size of cells and on the noise of cell crossing (see the case on integration): with
-the standard method it does not converge on finer meshes. Mixed integration removes most of that noise, and the final
-displacement hardly depends on the mesh.
+The slow creep comes from local damping, which holds back elastic oscillations too. Its speed depends on what excites these,
+that is on locking, on the size of cells and on the noise of cell crossing (see the case on integration): with the standard
+method it does not converge on finer meshes. Mixed integration removes most of that noise, and the final displacement hardly
+depends on the mesh.
 """
 
 import numpy as np
@@ -43,8 +43,8 @@ END = 34.8  # s
 READING = 0.005  # m: half of the last digit of the expected numbers
 SOURCE = "an independent explicit code, which agrees with the paper's Figure 6"
 CREEP = (
-    "creep under local damping depends on the mesh where the standard method integrates; the paper's curve is that of its mesh. "
-    "Take mixed integration."
+    "creep under local damping depends on the mesh with the standard method, and the paper's curve is that of its mesh; "
+    "mixed integration removes most of this dependence."
 )
 FIGURES = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN, "vertical_stress": VERTICAL_STRESS}
 MIXED = mpm.Integration.MIXED

@@ -1,15 +1,15 @@
 """Factors of safety of published slopes, without dilation, by strength reduction.
 
-The examples of Griffiths and Lane (1999), Géotechnique 49, 387–403, with a Poisson's ratio of 0.3 and no dilation: a slope
-1:2 of c'/γH = 0.05 and φ' = 20°, on rock and on half its height of the same soil, and an undrained slope of
-c_u/γH = 0.25 on a layer as thick as the slope is high, of another strength. Their own factors, by
-quadratic quadrilaterals and a loose tolerance, are 1.4 for the first two (1.380 by Bishop and Morgenstern, 1960). For the
-undrained slope 1.448 (one soil) and 2.032 (a foundation 1.5 and 4 times as strong) are the values that Code_Aster's
-validation V6.03.507 takes from limit equilibrium; it calls them the reference of the fourth example. Undrained flow is
-associated, so that the best slip circle, found here, is an upper bound. On a stronger foundation the slope slides along it,
-in a band that is as wide as a cell: quadratic triangles of 2, 1 and 0.5 m, a fifth to a twentieth of the height, then come to
-2.222, 2.113 and 2.062. The undrained slope therefore has triangles of degree 4, of a fifth, a seventh and a tenth.
-Flow without dilation has no theorem by which the factor were one number: it falls by 1 to 2 % as the cells are halved,
+The examples of Griffiths and Lane (1999), Géotechnique 49, 387–403, are computed with a Poisson's ratio of 0.3 and without
+dilation. They are a slope 1:2 of c'/γH = 0.05 and φ' = 20°, on rock and on half its height of the same soil, and an undrained
+slope of c_u/γH = 0.25 on a layer as thick as the slope is high, of another strength. Their own factors, by quadratic
+quadrilaterals and a loose tolerance, are 1.4 for the first two (1.380 by Bishop and Morgenstern, 1960). For the undrained
+slope 1.448 (one soil) and 2.032 (a foundation 1.5 and 4 times as strong) are the values that Code_Aster's validation
+V6.03.507 takes from limit equilibrium; it calls them the reference of the fourth example. Undrained flow is associated, so
+that the best slip circle, found here, is an upper bound. On a stronger foundation the slope slides along it, in a band that
+is as wide as a cell: quadratic triangles of 2, 1 and 0.5 m, a fifth to a twentieth of the height, then come to 2.222, 2.113
+and 2.062. The undrained slope is therefore computed by triangles of degree 4, whose sizes are a fifth, a seventh and a tenth
+of the height. No theorem makes the factor unique for flow without dilation: it falls by 1 to 2 % as the cells are halved,
 since shear bands become thinner, and it depends on the steps by some 0.5 %.
 """
 

@@ -1,11 +1,11 @@
 """Rigid footings pushed into clay as bodies that touch particles: the bearing capacity factor N_c, smooth and rough.
 
-The study footing_push with stiff clay, so that the soil has yielded all around before the footing is embedded: load
-over area and shear strength at settlements of 0.6 to 1.2 % of the width for a strip, and of half of that for a circular
-footing. Cells at the edge make the footing wider by about half of their size: 1 % of the width, and of the area of a
-circle, which has cells half as large. The rest comes from the cells below it and from the settlement: a strip gains
-about 1 % when it is embedded by 1 % of its width. The factors therefore converge from above, and the error decreases
-with the cell size.
+This case runs the study footing_push with stiff clay, so that the soil has yielded all around before the footing is embedded.
+The factor is the load over area and shear strength at settlements of 0.6 to 1.2 % of the width for a strip, and of half of
+that for a circular footing. Cells at the edge make the footing wider by about half of their size, which is 1 % of the width
+of the strip, and 1 % of the area of the circular footing, whose cells are half as large. The rest comes from the cells below
+it and from the settlement: a strip gains about 1 % when it is embedded by 1 % of its width. The factors therefore converge
+from above, and the error decreases with the cell size.
 """
 
 import footing_push

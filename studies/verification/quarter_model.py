@@ -1,11 +1,11 @@
 """A half section against a quarter of the same body in three dimensions: an elastic cylinder, and a collapsing one.
 
-Two computations of one body by code that has only the laws in common: rings of one radian, and tetrahedra between two
-planes of symmetry. First an elastic cylinder, as high as its radius, on rough ground under its weight, by particles in
-a quasi-static step; then the same cylinder of sand with a little cohesion, which is released and computed by the
-explicit scheme with averaged strains until it has spread. The difference must be the error of the cells, and decrease
-with their size. Tetrahedra between chords fill slightly less than the cylinder, and in the collapse the quarter is cut
-out of a mesh of cubes; energies and moments are therefore compared per mass.
+One body is computed twice, by code that has only the laws in common: as rings of one radian, and as tetrahedra between two
+planes of symmetry. The first body is an elastic cylinder, as high as its radius, on rough ground under its weight, by
+particles in a quasi-static step. The second is the same cylinder of sand with a little cohesion, which is released and
+computed by the explicit scheme with averaged strains until it has spread. The difference must be the error of the cells, and
+decrease with their size. Tetrahedra between chords fill slightly less than the cylinder, and in the collapse the quarter is
+cut out of a mesh of cubes; energies and moments are therefore compared per mass.
 """
 
 import numpy as np

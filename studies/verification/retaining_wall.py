@@ -1,12 +1,12 @@
 """Rigid walls that move away from sand and into it: active and passive pressure, smooth and rough.
 
-The study wall: sand with a friction angle of 30 degrees on rock, and walls that are contact bodies. Behind smooth walls
-Rankine's coefficients are exact. Behind rough ones they lie between a field of stresses and a mechanism: 2 % apart for
-the active pressure, while the passive pressure of the plane wedge is far too high; soil that turns on a log-spiral is a much
-closer upper bound. Both theorems hold for sand that dilates by its friction angle. It slides on the wall by 17 to 20 degrees
-of the 20 that are there, and by less at the foot, where the rock holds it. Sand that does not dilate hardly rises along the
-lower half of the wall and does not mobilise its friction, so its passive pressure is compared with the stress field for the
-friction that acts.
+This case runs the study wall: sand with a friction angle of 30 degrees lies on rock beside walls that are contact bodies.
+Behind smooth walls Rankine's coefficients are exact. Behind rough walls they lie between the lower bound of a stress field
+and the upper bound of a mechanism. For the active pressure these are 2 % apart. For the passive pressure a plane wedge is far
+too high, and a body that rotates on a log-spiral is a much closer upper bound. Both theorems hold for sand that dilates by
+its friction angle. The friction that it mobilises on the wall is 17 to 20 of the 20 degrees available, and less at the foot,
+where the rock holds it. Sand that does not dilate hardly rises along the lower half of the wall and does not mobilise its
+friction, so its passive pressure is compared with the stress field for the friction that acts.
 """
 
 import numpy as np

@@ -35,7 +35,9 @@ VISCOUS = ["--material", "viscoplastic", "--viscosity", "1000"]
 END, STEP = 2.0, 0.05  # s: of the slide, of the implicit scheme
 SMOOTH_END = 0.6  # s: of the slide on a smooth base
 MIXED, PARTICLES = mpm.Integration.MIXED, mpm.Integration.PARTICLES
-CROSSINGS = "crossings of cells dissipate energy where stresses are summed over particles; take mixed integration"
+CROSSINGS = (
+    "particles that cross cells dissipate energy if stresses are summed over particles; mixed integration avoids this"
+)
 
 
 class Slide(NamedTuple):

@@ -1,10 +1,10 @@
 """Stresses while particles cross cells: the standard method does not converge; mixed and dual domain integration do.
 
-A column settles under its weight by a twentieth of its height and comes to rest. The weight above a particle does not
-change, so its vertical stress is w (H - X) wherever it moves. The standard method integrates forces by particles, with
-gradients that jump at the sides of cells: each crossing is an error of the size of a particle's stress, on fine meshes
-as on coarse ones. Then the paper's slope slides: its vertical stress is fitted by a plane through the nearest
-particles, and the distance from it is its roughness.
+A column settles under its weight by a twentieth of its height and comes to rest. The weight above a particle does not change,
+so its vertical stress is w (H - X) wherever it moves. The standard method integrates forces by particles, with gradients that
+jump at the sides of cells: each crossing is an error of the size of a particle's stress, on fine meshes as on coarse ones. In
+a second part the paper's slope slides: its vertical stress is fitted by a plane through the nearest particles, and the
+distance from it is its roughness.
 """
 
 import matplotlib.pyplot as plt
@@ -29,8 +29,8 @@ MODES = {
 }
 NEIGHBOURS = 12
 NOT_CONVERGING = (
-    "the standard method with linear shape functions has errors from particles that cross cells, which finer cells do not"
-    " make less (Steffen, Kirby & Berzins 2008); take Integration.MIXED or DUAL_DOMAIN where stresses matter."
+    "the standard method with linear shape functions has errors from particles that cross cells, which finer cells do not "
+    "reduce (Steffen, Kirby & Berzins 2008); use Integration.MIXED or DUAL_DOMAIN where stresses matter."
 )
 
 

@@ -1,10 +1,10 @@
 """Thick-walled cylinder of Mohr-Coulomb soil under internal pressure: plastic ring, expansion, and limit pressure.
 
-A quarter of the cylinder, plane strain, flow without dilation. The pressure is the one at which the ring between
-the inner wall and a chosen radius is plastic. Quadratic finite elements, and particles in quasi-static steps with
-nodal mixed discretisation, whose inner cells carry the pressure; in these it is spread over a cell, so their
-stresses are not compared. The largest pressure that is carried is found by finite elements,
-in steps that begin with the cohesion and are bisected to 0.2 %.
+A quarter of the cylinder is computed in plane strain, with plastic flow without dilation, under the pressure at which the
+ring between the inner wall and a chosen radius is plastic. The methods are quadratic finite elements, and particles in
+quasi-static steps with nodal mixed discretisation. On particles the pressure acts over the width of the innermost cells, so
+that stresses there are not compared. Finite elements give the limit pressure, by load steps that begin with the cohesion and
+are bisected to 0.2 %.
 """
 
 import numpy as np

@@ -43,7 +43,7 @@ UPPER = HEIGHT * np.array([(0.8, 1.0), (3.6, -0.4), (4.8, -0.4), (5.2, 0.0)])
 LOWER = HEIGHT * np.array([(0.6, 1.0), (3.8, -0.6), (4.8, -0.6), (5.4, 0.0)])
 PUBLISHED = {1.0: 1.5, 0.8: 1.45, 0.6: 1.4, 0.5: 1.25, 0.4: 1.05, 0.2: 0.6}
 """Factors of the paper's finite elements by c_u2/c_u1, as read off its figure"""
-READ_OFF = "the paper's factors are read to 0.05, from two elements across the layer; see above"
+READ_OFF = "the paper's factors can be read to 0.05 only, and its meshes have two elements across the layer; see above"
 XSLOPE = {1.0: 1.447, 0.8: 1.41, 0.6: 1.38, 0.5: 1.19, 0.4: 0.96}
 """Factors of XSLOPE's finite elements on the same coordinates"""
 

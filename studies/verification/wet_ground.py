@@ -1,15 +1,15 @@
 """Heavy soil and its pore water: own weight, upward flow, large strains, and the limits of no drainage and of full drainage.
 
-A fresh fill settles under its own weight as its water leaves on top (Gibson's linear limit). Water that flows up
-through a layer takes the effective stress away in proportion to its gradient, and all of it at the critical one. A
-slope that hardly drains moves like undrained soil in total stresses, and a slope under water that drains at once like
-soil under its buoyant weight: these are compared with quadratic elements without flow. All by quadratic displacement
-with linear pressure (P2-P1), by linear displacement and pressure with the polynomial pressure projection (P1-P1), and
-by implicit particles, three per cell.
+A fresh fill settles under its own weight as its water drains at the top (Gibson's linear limit). Water that flows up through
+a layer reduces the effective stress in proportion to its gradient, to zero at the critical gradient. A slope that hardly
+drains moves like undrained soil in total stresses, and a slope under water that drains at once moves like soil under its
+buoyant weight: these two are compared with quadratic elements without flow. Each problem is computed by finite elements with
+quadratic displacement and linear pressure (P2-P1), by finite elements with linear displacement and pressure and the
+polynomial pressure projection (P1-P1), and by implicit particles, three per cell.
 
-A layer that is compressed by up to 39 % has a closed form where stress follows a rate law and the conductivity the
-square of the stretch (Xie and Leo 2004). Particles cross up to six rows of cells there, with mixed integration; water
-leaves at the free surface wherever it is.
+A layer that is compressed by up to 39 % has a closed form if stress follows a rate law and the conductivity is proportional
+to the square of the stretch (Xie and Leo 2004). Particles cross up to six rows of cells in this case, with mixed integration,
+and water leaves at the free surface as it moves.
 """
 
 from __future__ import annotations
