@@ -63,7 +63,9 @@ def build(site: Site, per_cell: int, factor: float, nmd: bool) -> tuple[bridge.P
         else []
     )
     model, materials = site.model(weaker)
-    particles = bridge.ParticleSite(model, materials, site.supports, per_cell=per_cell, small_displacements=True, nmd=nmd)
+    particles = bridge.ParticleSite(
+        model, materials, site.supports, per_cell=per_cell, small_displacements=True, nmd=nmd
+    )
     try:
         for report in bridge.carry_out(particles, site.stages):
             if comm.rank == 0:
@@ -104,7 +106,9 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_site(a.site, comm, a.cell_size)
     staged, rows, pictures, failed = carry_out(site, int(a.elements[1]), folder, comm)
     built = perf_counter()
-    particles, failed_particles = build(site, a.particles_per_cell, a.factor, site_slides.averages(a, site.laws.values()))
+    particles, failed_particles = build(
+        site, a.particles_per_cell, a.factor, site_slides.averages(a, site.laws.values())
+    )
     apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)

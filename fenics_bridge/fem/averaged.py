@@ -35,7 +35,8 @@ class AveragedKinematics:
 
     Soil with friction whose flow hardly dilates is an exception. Forces that are averaged do not feel pressures that alternate
     from cell to cell, and where flow does not change the volume a mechanism would pass through the cells of low pressure. So in
-    cells of such soil the forces are those of the stress itself, by the transpose of the plain strains.
+    cells of such soil the forces are those of the stress itself, by the transpose of the plain strains. Particles average strains
+    and forces of soil that dilates less than associated flow by half instead, and so do elements that are handed over to them.
 
     Args:
         increment: displacement function of degree 1 whose strain is taken.
@@ -43,6 +44,7 @@ class AveragedKinematics:
         constraints: the boundary conditions.
         laws: the laws, by number; see `follow`.
         geometry: plane strain, axial symmetry or a solid.
+        as_particles: average by the fractions of explicit steps.
         assembled: whether `stiffness` is a matrix of PETSc, for a direct solver; else it stays in factors, for an iterative one.
     """
 
@@ -53,9 +55,10 @@ class AveragedKinematics:
         constraints: Any,
         laws: Sequence[Law],
         geometry: Geometry | None = None,
+        as_particles: bool = False,
         assembled: bool = True,
     ) -> None:
-        self._increment, self._points = increment, points
+        self._increment, self._points, self._as_particles = increment, points, as_particles
         self._space = increment.function_space
         nodes, gradients, volumes, radii = self._cells(geometry == Geometry.AXISYMMETRIC)
         comm, n_nodes = self._space.mesh.comm, self._space.dofmap.index_map.size_local
@@ -68,13 +71,18 @@ class AveragedKinematics:
         self.follow(laws)
 
     def follow(self, laws: Sequence[Law]) -> None:
-        """Average forces as the laws ask for: in all cells but those of frictional soil with little dilation. Collective.
+        """Average as the laws ask for: forces in all cells but those of frictional soil with little dilation. Collective.
 
         Args:
             laws: the laws, by number.
         """
-        of_law = np.array([_core.associated_fraction(law) < LITTLE_DILATION for law in laws])
-        self._strain.averages_forces = ~of_law[np.maximum(self._points.material, 0)]
+        number = np.maximum(self._points.material, 0)
+        if self._as_particles:
+            fractions = np.array([_core.fraction_of_averages(law) for law in laws])[number]
+            self._strain.of_strains = self._strain.of_forces = fractions
+        else:
+            little = np.array([_core.associated_fraction(law) < LITTLE_DILATION for law in laws])
+            self._strain.of_forces = 1.0 - little[number]
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""

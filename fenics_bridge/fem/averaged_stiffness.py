@@ -36,14 +36,12 @@ class AssembledStiffness:
         change = strain.means[0].matMult(strain.means[1].matMult(divergence))
         change.axpy(-1.0, divergence)
         self._change = part.matMult(change)
-        self._whole = strain.plain.copy()
-        self._whole.axpy(1.0, self._change)
         components = size * (first + np.arange(n))[:, None] + np.arange(size)
         self._columns = np.repeat(components, size, axis=0)
         self._tangent = matrix(self._comm, (n * size, n * size), self._columns, 1.0)
         self._stresses: PETSc.Mat | None = None
         self._product: PETSc.Mat | None = None
-        self._averages: NDArray[np.bool_] | None = None
+        self._averages: NDArray[np.float64] | None = None
 
     def with_tangent(self, tangent: NDArray[np.float64]) -> PETSc.Mat:
         """The matrix of a tangent (n, S, S) [Pa]. Collective."""
@@ -58,19 +56,24 @@ class AssembledStiffness:
         return found
 
     def _follow(self) -> None:
-        """The transpose for the cells whose forces are averaged now."""
-        now = self._strain.averages_forces
+        """The strain, and the transpose for the forces, of the fractions by which cells are averaged now."""
+        now = np.stack([self._strain.of_strains, self._strain.of_forces])
         same = self._averages is not None and np.array_equal(now, self._averages)
         if self._comm.allreduce(same, MPI.LAND):
             return
         self._averages = now
+        self._whole = self._averaged_by(now[0])
+        # PETSc's triple product would add up what ranks send in the order in which it arrives.
+        self._transposed = self._averaged_by(now[1]).transpose(PETSc.Mat())
+        self._stresses = self._product = None
+
+    def _averaged_by(self, fractions: NDArray[np.float64]) -> PETSc.Mat:
+        """Strain of cells that are averaged by these fractions (n,)."""
         operator, rows = self._change.copy(), self._change.createVecLeft()
-        rows.array[:] = np.repeat(now, self._strain.size)
+        rows.array[:] = np.repeat(fractions, self._strain.size)
         operator.diagonalScale(L=rows)
         operator.axpy(1.0, self._strain.plain)
-        # PETSc's triple product would add up what ranks send in the order in which it arrives.
-        self._transposed = operator.transpose(PETSc.Mat())
-        self._product = None
+        return operator
 
 
 class FactoredStiffness:

@@ -47,8 +47,8 @@ class AveragedStrain:
         """Components that are averaged, the first ones"""
         self.volumes = volumes
         """Volumes of the cells (n,)"""
-        self.averages_forces = np.ones(n, dtype=bool)
-        """Whether the forces of a cell are averaged, (n,)"""
+        self.of_strains, self.of_forces = np.ones(n), np.ones(n)
+        """Fraction by which a cell's strains, and its forces, are averaged, (n,)"""
         dofs = (dim * nodes[:, :, None] + np.arange(dim)).reshape(n, -1)
         rows = _strain_rows(gradients, radii)
         self.plain = matrix(comm, (n * self.size, n_nodes * dim), np.repeat(dofs, self.size, axis=0), rows)
@@ -70,13 +70,13 @@ class AveragedStrain:
         strain = self._strain_of(displacement).reshape(-1, self.size)
         volumetric = strain[:, : self.normal].sum(axis=1)
         mean = self._mean_over_nodes(self._mean_around_nodes(volumetric))
-        strain[:, : self.normal] += (mean - volumetric)[:, None] / self.normal
+        strain[:, : self.normal] += (self.of_strains * (mean - volumetric))[:, None] / self.normal
         return strain
 
     def forces(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces on this rank's own dofs of a stress (n, S). Collective."""
         forces = self.volumes[:, None] * stress
-        pressure = self.averages_forces * forces[:, : self.normal].sum(axis=1) / self.normal
+        pressure = self.of_forces * forces[:, : self.normal].sum(axis=1) / self.normal
         forces[:, : self.normal] += (self._to_cells(self._to_nodes(pressure)) - pressure)[:, None]
         return self._forces_of(forces.ravel())
 

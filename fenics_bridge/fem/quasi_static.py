@@ -56,6 +56,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         options_prefix: prefix of the PETSc options of the linear solver.
         cell_tags: tags of the cells; needed where laws or unit weights are given by cell tag.
         solver: tolerances; by default `Solver()`, and `PRACTICE` is the usual level of practice.
+        as_particles: average strains and forces as explicit steps of particles do, in frictional soil by half, for a hand-over.
         geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose nodes on the axis need a roller; by
             default plane strain in two dimensions.
 
@@ -78,6 +79,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         cell_tags: MeshTags | None = None,
         solver: Solver | None = None,
         geometry: Geometry | None = None,
+        as_particles: bool = False,
     ) -> None:
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""
@@ -105,7 +107,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """The boundary conditions in force"""
         self.off: Sequence[int] = ()
         """Tags of the cells that are inactive"""
-        self._nmd, self._options_prefix = nmd, options_prefix
+        agree(domain.comm, "as_particles: is for elements with nmd=True" if as_particles and not nmd else None)
+        self._nmd, self._as_particles, self._options_prefix = nmd, as_particles, options_prefix
         constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._materials = Materials(domain, law, cell_tags)
@@ -134,7 +137,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         parts = self.increment, self.points, constraints
         linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True, averaged=self._nmd)
         self._kinematics: Any = (
-            AveragedKinematics(*parts, self.laws, self.geometry, assembled=linear.direct)
+            AveragedKinematics(*parts, self.laws, self.geometry, self._as_particles, linear.direct)
             if self._nmd
             else Kinematics(*parts, self.geometry)
         )

@@ -164,10 +164,6 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
 
 namespace
 {
-/// Fraction of nodal mixed discretisation in frictional soil that hardly dilates. Forces of strains that are averaged
-/// in full do not feel pressures that alternate from cell to cell: there these would cost the soil strength.
-constexpr double averaged_in_non_associated_soil = 0.5;
-
 template <class G>
 void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
@@ -196,8 +192,7 @@ void choose_forces(Model<G>& model, Integration kind, bool averaged)
     field.integration.averaged_everywhere = 1;
     field.integration.averaged_of_cell.clear();
     for (std::size_t k = 0; averaged && k < model.laws.size(); ++k)
-      field.integration.averaged_by_law.push_back(
-          is_non_associated(model.laws[k]) && !filled ? averaged_in_non_associated_soil : 1);
+      field.integration.averaged_by_law.push_back(filled ? 1 : fraction_of_averages(model.laws[k]));
   }
 }
 

@@ -168,7 +168,7 @@ def site_slide(a: Namespace) -> int:
     folder = open_results(a, comm)
     site = read_site(a.site, comm)
     nmd = averages(a, site.laws.values())
-    fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10))
+    fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
     steps = fem.solve(site.load())
     if not fem.converged:
         reason = next(step.report.reason for step in reversed(steps) if not step.converged)

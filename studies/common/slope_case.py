@@ -193,7 +193,14 @@ def soil_fem(case: SlopeCase, nmd: bool = False) -> bridge.QuasiStatic:
     with warnings.catch_warnings():  # the equilibrium is that of the particles' cells, which say themselves where they lock
         warnings.simplefilter("ignore", RuntimeWarning)
         return bridge.QuasiStatic(
-            body, case.soil, facet_tags, SUPPORTS, degree=1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10)
+            body,
+            case.soil,
+            facet_tags,
+            SUPPORTS,
+            degree=1,
+            nmd=nmd,
+            solver=bridge.Solver(tolerance=1e-10),
+            as_particles=nmd,
         )
 
 

@@ -6,6 +6,7 @@ Particles take over from finite elements, under the pore pressures of failure.
 from __future__ import annotations
 
 import sys
+import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
@@ -32,8 +33,9 @@ from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
 comm = MPI.COMM_WORLD
-HOLDING = 0.9
-"""Part of the factor of safety by which the strength is divided in the equilibrium that particles take over"""
+HOLDING = 0.9, 0.75, 0.6
+"""Parts of the factor of safety by which the strength is divided in the equilibrium that particles take over: the first one with
+which linear cells, of averaged strains or without, stand"""
 
 
 def add_optional_slide(parser: ArgumentParser) -> None:
@@ -114,11 +116,18 @@ def handed_over(
     def pressure(points: np.ndarray) -> np.ndarray:
         return np.maximum(instant.pore_pressure(points), 0.0)
 
-    stronger = bridge.reduced_strength(site.laws, HOLDING * instant.safety.value)
-    nmd = averages(a, site.laws.values()) and a.slide_water == "still"  # implicit steps, where it flows, average strains only
-    fem = slope.elements(1, pressure, stronger, nmd=nmd, solver=bridge.Solver(tolerance=1e-10))
-    fem.solve(site.load())
-    if not fem.converged:
+    nmd = (
+        averages(a, site.laws.values()) and a.slide_water == "still"
+    )  # implicit steps, where it flows, average strains only
+    for part in HOLDING:
+        stronger = bridge.reduced_strength(site.laws, part * instant.safety.value)
+        fem = slope.elements(1, pressure, stronger, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
+        with warnings.catch_warnings():  # of a load that is not reached: said below
+            warnings.simplefilter("ignore", RuntimeWarning)
+            fem.solve(site.load())
+        if fem.converged:
+            break
+    else:
         raise mpm.RunError(f"the particles find no initial equilibrium at {in_days(instant.time)}")
     model = site.particles(a.particles_per_cell, stronger, more=list(site.laws.values()))
     nodal = pressure(model.mesh.points)

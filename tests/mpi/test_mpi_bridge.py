@@ -261,7 +261,9 @@ def test_axisymmetric_hand_over_between_different_partitions(degree, options):
     assert report.equilibrated_ratio < 1e-3
 
 
-@pytest.mark.parametrize("geometry", [bridge.Geometry.PLANE_STRAIN, bridge.Geometry.AXISYMMETRIC, bridge.Geometry.SOLID])
+@pytest.mark.parametrize(
+    "geometry", [bridge.Geometry.PLANE_STRAIN, bridge.Geometry.AXISYMMETRIC, bridge.Geometry.SOLID]
+)
 def test_averaged_elements_hand_over_in_equilibrium_for_averaged_steps(geometry):
     """Means over nodes that ranks share are the same in elements and particles: nothing moves in the steps that follow."""
     fem, model = clay_block(geometry, COMM)

@@ -81,8 +81,8 @@ def slope_particles(unit_weight, cell_size=0.1, kind="crossed", law=None, comm=M
 CLAY = {"young": 1e6, "poisson": 0.45, "cohesion": 8e3, "friction_angle": 0.0}
 
 
-def clay_block(geometry, comm=MPI.COMM_WORLD, law=None):
-    """(finite elements, particles in their cells) of clay that stands free on rough ground; both average strains."""
+def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, **options):
+    """(finite elements, particles in their cells) of clay, or another soil, that stands free on rough ground; both average strains."""
     axisymmetric = geometry == bridge.Geometry.AXISYMMETRIC
     dim = 3 if geometry == bridge.Geometry.SOLID else 2
     domain, tags, facet_tags = bridge.box_mesh(comm, [1.0] * dim, [3 if dim == 3 else 6] * dim)
@@ -91,7 +91,7 @@ def clay_block(geometry, comm=MPI.COMM_WORLD, law=None):
     supports = [bridge.roller(1, np.eye(dim)[0]), bridge.fixed(base)]
     fem = bridge.QuasiStatic(
         domain, law, facet_tags, supports, 1, geometry=geometry if axisymmetric else None, nmd=True,
-        solver=bridge.Solver(tolerance=1e-11),
+        solver=bridge.Solver(tolerance=1e-11), **options,
     )  # fmt: skip
     fem.solve(bridge.Load(unit_weight=18e3))
     assert fem.converged

@@ -47,4 +47,6 @@ double fraction(const Hencky& law) { return fraction(law.law); }
 double associated_fraction(const Law& law) { return fraction(law); }
 
 bool is_non_associated(const Law& law) { return !(fraction(law) >= 1); }
+
+double fraction_of_averages(const Law& law) { return is_non_associated(law) ? 0.5 : 1; }
 } // namespace mpm::materials

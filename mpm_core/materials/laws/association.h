@@ -15,4 +15,8 @@ double associated_fraction(const Law& law);
 /// flow would. False for elastic and undrained soil; true for laws written in Python and UMATs that do not name their
 /// dilation angle.
 bool is_non_associated(const Law& law);
+
+/// Fraction of nodal mixed discretisation in a soil: less in frictional soil that hardly dilates. Forces of strains that
+/// are averaged in full do not feel pressures that alternate from cell to cell: there these would cost the soil strength.
+double fraction_of_averages(const Law& law);
 } // namespace mpm::materials

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ._core import InputError, RunError
@@ -33,13 +34,13 @@ class EnergyWatch:
     Args:
         limit: `Report.unexplained_fraction` at which the run ends with an error; None for none.
         speaks: whether this rank issues the warning.
-        advice: what its text ends with.
+        advice: what its text ends with; called on all ranks alike.
         least_steps: steps of a model before its energy is checked.
     """
 
     limit: float | None
     speaks: bool
-    advice: str = ADVICE
+    advice: Callable[[], str] = lambda: ADVICE
     least_steps: int = LEAST_STEPS
     warned: float = WARN_ABOVE
     noisy: bool = False
@@ -61,11 +62,11 @@ class EnergyWatch:
             return
         fraction = abs(report.unexplained_fraction)
         if self.limit is not None and fraction > self.limit:
-            raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {self.advice}")
+            raise RunError(f"{_said(report)}, above energy_limit, {100 * self.limit:g} %; {self.advice()}")
         if fraction > self.warned:
-            self.warned = 10 * fraction
+            self.warned, advice = 10 * fraction, self.advice()
             if self.speaks:
-                warnings.warn(f"{_said(report)}; {self.advice}", EnergyWarning, stacklevel=4)
+                warnings.warn(f"{_said(report)}; {advice}", EnergyWarning, stacklevel=4)
         self.largest = max(self.largest, report.energy_scale)
         if not self.noisy and _is_noisy(report, self.largest):
             self.noisy = True

@@ -12,12 +12,12 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError
 from .checks import positive, within
-from .energy import EnergyWatch
+from .energy import ADVICE, EnergyWatch
 from .partition import keep_balance
 from .rayleigh import Rayleigh
 from .report import Report
 from .setup_warnings import FailureWatch
-from .space import SpaceWatch
+from .space import SpaceWatch, swollen
 
 if TYPE_CHECKING:
     from .model import Model
@@ -110,7 +110,8 @@ def run_explicit(
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    energy, failure = EnergyWatch(energy_limit, model.comm.rank == 0), FailureWatch(model, options.nmd)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or ADVICE)
+    failure = FailureWatch(model, options.nmd)
     if model._space_watch is None:
         model._space_watch = SpaceWatch(model)
 

@@ -18,6 +18,7 @@ from .partition import keep_balance
 from .report import ImplicitReport
 from .setup_warnings import FailureWatch
 from .solution import Solution
+from .space import swollen
 from .step_control import StepControl
 
 if TYPE_CHECKING:
@@ -194,7 +195,8 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, *_energy_check(options))
+    advice, least_steps = _energy_check(options)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice, least_steps)
     failure = FailureWatch(model, options.nmd)
 
     def report() -> ImplicitReport:

@@ -18,6 +18,9 @@ LEAST_PART = 0.01
 """Fraction of the mass above which a piece of the body counts as a part"""
 
 
+SWOLLEN = 2.0
+"""Volume of a particle over that of its cell above which it counts as swollen"""
+
 STEPS_BETWEEN = 256
 """Steps after which a run checks its space and parts again"""
 
@@ -44,6 +47,28 @@ def space(model: Model) -> Space:
     filled = np.minimum(held[: mesh.owned_cells], model.cell_volumes[: mesh.owned_cells])
     sums = model.comm.allreduce(np.array([p.volume.sum(), filled.sum()]))
     return Space(float(sums[0]), float(sums[1]))
+
+
+def swollen(model: Model) -> str:
+    """Text on the particle that is largest relative to its cell, where that is more than twice the cell's volume, else none.
+
+    Where a surface cuts off a sliver of a cell, a node beyond it has hardly any mass. Averaged mean stresses push it away, while the
+    few particles there are at the apex of their strength and expand without resistance. Pressed together again they resist with
+    the volume that they have reached, which generates energy.
+
+    Note:
+        Collective.
+    """
+    p = model.particles
+    largest = float(np.max(p.volume / model.cell_volumes[p.cell], initial=0.0))
+    largest = max(model.comm.allgather(largest))
+    if largest <= SWOLLEN:
+        return ""
+    return (
+        f"a particle has {largest:.3g} times the volume of its cell: soil in a sliver of a cell has expanded without resistance, and "
+        "resists with that volume when it is pressed together. Use nmd=False, or let rigid surfaces follow the sides of cells "
+        "(docs/howto/limits.md)"
+    )
 
 
 def parts(model: Model) -> NDArray[np.float64]:

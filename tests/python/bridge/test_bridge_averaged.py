@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bridge_cases import MESHES, POISSON, YOUNG, clay_block, column, slope_model, slope_particles
+from bridge_cases import CLAY, MESHES, POISSON, YOUNG, clay_block, column, slope_model, slope_particles
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -163,10 +163,14 @@ def test_quadratic_elements_are_not_averaged():
         slope_model(degree=2, nmd=True)
 
 
+SAND = {"young": 1e6, "poisson": 0.3, "cohesion": 6e3, "friction_angle": 20.0, "dilation_angle": 0.0}
+
+
+@pytest.mark.parametrize("soil", [CLAY, SAND], ids=["clay", "sand"])
 @pytest.mark.parametrize("geometry", [mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC, mpm.Geometry.SOLID])
-def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry):
+def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry, soil):
     """The forces of the hand-over are those of the steps that follow: they are in balance, and nothing moves."""
-    fem, model = clay_block(geometry)
+    fem, model = clay_block(geometry, law=mpm.MohrCoulomb(**soil), as_particles=True)
     assert bridge.initialise(model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio < 1e-9
     assert model.out_of_balance() > 1e-3  # of forces that the steps do not have
     report = model.explicit(0.02, nmd=True, courant=0.25).last()
@@ -176,8 +180,7 @@ def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry):
 
 def test_soil_whose_averages_differ_between_both_is_brought_to_equilibrium_for_the_steps():
     """Elements of soil without dilation have plain forces, explicit steps averages by half: equilibrium is of the latter."""
-    law = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=6e3, friction_angle=20.0, dilation_angle=0.0)
-    fem, model = clay_block(mpm.Geometry.PLANE_STRAIN, law=law)
+    fem, model = clay_block(mpm.Geometry.PLANE_STRAIN, law=mpm.MohrCoulomb(**SAND))
     report = bridge.initialise(model, fem, count_displacement=False)
     assert report.equilibrated_ratio < 5e-4 < report.unbalanced_ratio
     assert model.out_of_balance(nmd=True) == pytest.approx(report.equilibrated_ratio, rel=1e-6)

@@ -1,10 +1,13 @@
 """The space that particles take, and the pieces of a body that has come apart."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from core_cases import DIMS, box, run
+from mpm_core.energy import EnergyWatch
+from mpm_core.space import swollen
 
 import mpm_core as mpm
 
@@ -65,3 +68,16 @@ def test_particles_that_crowd_are_said_to_lose_space():
         warnings.simplefilter("error")
         once.particles.set("velocity", np.full((len(once.particles), 2), 1e-3))
         run(once, 1e-3, dt=1e-3 / 256)
+
+
+def test_energy_that_swollen_particles_may_generate_is_reported_with_their_size():
+    """A quarter of a cell in each direction, blown up to three cells; others than the largest do not matter."""
+    model = blocks(2, ([0.25, 0.25], [0.75, 0.75]))
+    assert not swollen(model)
+    volume = model.particles.volume.copy()
+    volume[3] = 3.0 * model.cell_volumes[model.particles.cell[3]]
+    model.particles.set("volume", volume)
+    assert "a particle has 3 times the volume of its cell" in swollen(model) and "nmd=False" in swollen(model)
+    report = replace(model.report(), steps=100, unexplained_energy=-1.0, energy_scale=2.0)
+    with pytest.raises(mpm.RunError, match="50 % .* generated .* a particle has 3 times the volume of its cell"):
+        EnergyWatch(0.2, True, lambda: swollen(model)).look(report)
