@@ -2,8 +2,8 @@
 
 The sphere of radius R is a contact body, the half space a half section of 40 contact radii that is finest where they touch.
 For an indentation d the contact radius is a = sqrt(R d), and the force F = 4/3 E* sqrt(R) d^1.5 with E* = E / (1 - nu^2). The
-ground beyond 40 a, which is missing, would reduce the force by 1 to 2 %. The springs of contact, which let particles penetrate the
-sphere by a fraction of the pressure over the stiffness of a cell, reduce the computed force by about as much.
+ground beyond 40 a, which is missing, would reduce the force by 1 to 2 %. The springs of contact, which let particles
+penetrate the sphere by a fraction of the pressure over the stiffness of a cell, reduce the computed force by about as much.
 
 The pressure p_0 sqrt(1 - (r / a)^2), p_0 = 2 E* a / (pi R), is that of implicit steps with a hundredth of the indentation,
 since Hertz' strains are small. Particles that share nodes share the force on these, so that the pressure is a mean over

@@ -1,19 +1,18 @@
 """Run-out of granular columns over their aspect ratio: the scaling of Lube et al. (2005).
 
-A column of sand, a times as high as it is wide, is released on one side on rough ground. Lube et al. found for
-channels, whatever the sand, a run-out past its foot of 1.2 a widths where a < 1.8 and of 1.9 a^(2/3) widths where a >
-2.8.
+A column of sand, a times as high as it is wide, is released on one side on rough ground. Lube et al. found for channels,
+whatever the sand, a run-out past its foot of 1.2 a widths where a < 1.8 and of 1.9 a^(2/3) widths where a > 2.8.
 
-Sand whose angle of repose is 31° slides on its layers with the friction tan 31°. In plane strain and without dilation
-a layer of Mohr-Coulomb soil that shears carries the fraction sin φ of the pressure on it (Davis 1968), so that φ is
-arcsin(tan 31°) = 36.9°. With φ = 31° it would slide as sand of 27° and run out a fifth to a third farther.
+Sand whose angle of repose is 31° slides on its layers with the friction tan 31°. In plane strain and without dilation a layer
+of Mohr-Coulomb soil that shears carries the fraction sin φ of the pressure on it (Davis 1968), so that φ is arcsin(tan 31°) =
+36.9°. With φ = 31° it would slide as sand of 27° and run out a fifth to a third farther.
 
 There is no damping except the PIC fraction, 0.6 % in a critical time step, which is a rate: the run-out is the same for
-Courant numbers from 0.1 to 0.5. Without any, grains that fall apart do not come to rest; with 2 %, columns run out a
-sixth less, and with smaller cells, in which such a fraction has less influence, somewhat farther (picture). These run-outs are
-therefore not accurate to a few per cent. Kumar (2015, Multi-scale multiphase modelling of granular flows, Cambridge, ch. 4) found particles of Mohr-Coulomb soil to run out farther than
-discrete elements above a = 1.7: friction alone loses less energy than grains that collide where a column first falls
-freely.
+Courant numbers from 0.1 to 0.5. Without any, grains that fall apart do not come to rest; with 2 %, columns run out a sixth
+less, and with smaller cells, in which such a fraction has less influence, somewhat farther (picture). These run-outs are
+therefore not accurate to a few per cent. Kumar (2015, Multi-scale multiphase modelling of granular flows, Cambridge, ch. 4)
+found particles of Mohr-Coulomb soil to run out farther than discrete elements above a = 1.7: friction alone loses less energy
+than grains that collide where a column first falls freely.
 """
 
 import numpy as np
