@@ -31,7 +31,7 @@ class _CompilerLines(logging.Filter):
 
 
 def redirect_compiler_lines() -> None:
-    """From now on the compiler's lines go to `LOGGER`, and Python shows warnings. Calls after the first change nothing."""
+    """Send the compiler's lines to `LOGGER` from now on, and show warnings by Python. Calls after the first change nothing."""
     root = logging.getLogger()
     if not any(isinstance(each, _CompilerLines) for each in root.filters):
         root.addFilter(_CompilerLines())

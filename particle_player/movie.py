@@ -16,9 +16,9 @@ from particle_player.scene import Quantity, Scene, axis_labels, disc_diameter
 LEVELS = 65534
 ABSENT = 65535
 MOST_BYTES = 60e6
-"""Of one movie before it is packed; of a longer one some frames are left out."""
+"""Largest size of a movie before it is packed; frames of a longer one are left out."""
 MOST_PARTICLES = 200_000
-"""In one movie; of more particles every second, third ... is drawn, larger."""
+"""Largest number of particles in a movie; of more particles every second, third ... is drawn, larger."""
 
 Frame = Mapping[str, NDArray]
 

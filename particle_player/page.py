@@ -51,7 +51,7 @@ startPlayer(JSON.parse(document.getElementById("data").textContent)).then((playe
 
 @dataclass(frozen=True)
 class Parts:
-    """What a page needs for the player.
+    """Parts of the player on a page.
 
     Its script has to call ``startPlayer(data)``, which gives a promise of the player, with ``data`` as they are here or with
     further entries.

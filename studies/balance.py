@@ -32,7 +32,7 @@ RANK = Quantity("Rank", "-", colours="viridis")
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_slope_options(p)
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
@@ -50,7 +50,7 @@ def parser() -> ArgumentParser:
 
 @dataclass
 class Slide:
-    """One slide; `imbalance` is the load imbalance at each time."""
+    """Result of one slide; `imbalance` is the load imbalance at each time."""
 
     time: list[float] = field(default_factory=list)
     imbalance: list[float] = field(default_factory=list)

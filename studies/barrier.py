@@ -52,7 +52,7 @@ FULL = 2.0
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--depth", 0.5, "m", "depth of the flow", above=0)
     add_number(p, "--length", 14.0, "-", "length of the flow over its depth", at_least=4)
@@ -101,7 +101,7 @@ def gravity_of(a: Namespace) -> tuple[float, float]:
 
 
 def velocity(a: Namespace) -> float:
-    """Of the flow [m/s]."""
+    """Velocity of the flow [m/s]."""
     return float(a.froude * np.sqrt(gravity_of(a)[1] * a.depth))
 
 

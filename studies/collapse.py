@@ -40,7 +40,7 @@ comm = MPI.COMM_WORLD
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
     add_ground_option(p)

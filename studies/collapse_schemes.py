@@ -38,7 +38,7 @@ MAX_ITERATIONS = 15
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
     add_count(p, "--particles-per-cell", 1, "particles in each cell: 1, 3, 4, 6, 10, 12, ...")
@@ -94,7 +94,7 @@ def particle_curve(a: Namespace, cell_size: float, nmd: bool, first_step: float,
 
 
 def runs(a: Namespace, cell_size: float, first_step: float, end: float) -> dict[str, dict[str, object]]:
-    """What carries how much on one mesh: by name, with its curve and processor time [s]."""
+    """Collapse load by each method on one mesh: by name, with its curve and processor time [s]."""
     found: dict[str, dict[str, object]] = {}
     for name, nmd in (("particles", False), ("particles, NMD", True)):
         start = process_time()

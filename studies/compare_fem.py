@@ -55,7 +55,7 @@ AT_REST = 1e-4
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_geometry_options(p, cell_size=0.05)
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")

@@ -48,7 +48,7 @@ STEADY = 0.15
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--radius", 0.018, "m", "radius of the cone and of its shaft", above=0)
     add_number(p, "--penetration", 0.18, "m", "depth of the cone's shoulder in the end", above=0)
@@ -99,12 +99,12 @@ def soil(a: Namespace) -> mpm.MohrCoulomb:
 
 
 def speed_of(a: Namespace) -> float:
-    """Of the cone [m/s]."""
+    """Speed of the cone [m/s]."""
     return float(a.speed * np.sqrt(soil(a).p_wave_modulus / a.density))
 
 
 def way(a: Namespace) -> float:
-    """From where the tip touches the ground until the shoulder is at the depth wanted [m]."""
+    """Displacement from the first touch of the tip until the shoulder is at the final depth [m]."""
     return float(a.penetration + STEEPNESS * a.radius)
 
 

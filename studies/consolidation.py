@@ -49,7 +49,7 @@ ELEMENTS = {"P2-P1": water.Element.TAYLOR_HOOD, "P1-P1": water.Element.STABILISE
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     elements = "P1-P1", tuple(ELEMENTS), "quadratic displacement (P2-P1), or stabilised linear one"
     add_site_file(p, "fill", "soils, water and pressures", elements)
@@ -66,7 +66,7 @@ def parser() -> ArgumentParser:
 
 
 class Files(FieldFiles):
-    """What is written as time goes on: frames for ParaView, and the history of the settlements."""
+    """Files that are written during the run: frames for ParaView, and the history of the settlements."""
 
     def __init__(
         self, model: water.Consolidation, site: ConsolidationSite, folder: Path, particles: ParticleGround | None

@@ -54,7 +54,7 @@ MULTIPLES = (20, 200, 2000)
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_slope_options(p)
     p.set_defaults(unit_weight=20e3, particles_per_cell=3, water_modulus=2.2e9, porosity=0.5)
@@ -131,7 +131,7 @@ def settled_explicitly(a: Namespace, model: mpm.Model) -> None:
 
 
 def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> dict[str, object]:
-    """One row of the table: what it took one method to bring the slope to equilibrium."""
+    """A row of the table: the cost of one method to bring the slope to equilibrium."""
     case = prepared(a, soil, stress)
     model, iterations = case.model, [0]
     if name == "explicit":
@@ -230,7 +230,7 @@ def save_costs(path: Path, rows: list[dict]) -> None:
 
 
 def speed_up(rows: list[dict]) -> dict[str, float]:
-    """How many times longer the explicit scheme takes than Newton's method on the finest mesh, at least, for each soil."""
+    """Least ratio of the time of the explicit scheme to that of Newton's method on the finest mesh, for each soil."""
     finest = max(row["cells"] for row in rows)
     time = {(row["soil"], row["method"]): row["cpu_seconds"] for row in rows if row["cells"] == finest}
     return {soil: time[soil, "explicit"] / time[soil, "Newton"] for soil in SOILS}

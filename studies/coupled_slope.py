@@ -40,14 +40,14 @@ FOLLOWED = 0.2
 """Crest and toe are means over the soil within this distance from them, over the height of the slope"""
 KINDS = {"particles": "particles everywhere", "coupled": "resting cells and particles"}
 FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
-"""In the files for ParaView; a threshold on ``resting`` tells resting cells from particles"""
+"""Fields in the files for ParaView; a threshold on ``resting`` tells resting cells from particles"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--height", 1.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 45.0, "degrees", "inclination of the slope", above=11, at_most=90)

@@ -26,7 +26,7 @@ from fenics_bridge import water
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_water_slope_options(p, "drawdown", days=60.0, suction=False)
     add_optional_slide(p)

@@ -62,7 +62,7 @@ COLUMNS = [
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--height", 10.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 35.0, "degrees", "inclination of the slope", above=11, at_most=78)
@@ -143,7 +143,7 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
 
 
 def frame_at(model: mpm.Model, time: float) -> dict | None:
-    """All rows on the first rank, None on the others; resting cells are where they have moved to. Collective."""
+    """Gather all rows to the first rank, None on the others; resting cells are at their present places. Collective."""
     p = model.particles
     frame = own_frame(model, time)
     frame["position"] = np.where(p.is_resting[:, None], p.position + p.displacement, p.position).astype(np.float32)
@@ -196,7 +196,7 @@ def amplified(a: Namespace, motion: mpm.Motion, history: History) -> tuple[tuple
 
 def drawn(a: Namespace, folder: Path, record: tuple, history: History, slips: dict, ratios: tuple, frames: list,
           scene: object) -> Pictures:  # fmt: skip
-    """All pictures, and the film; on the first rank."""
+    """Draw all pictures and the film, on the first rank."""
     if scene is None:
         return {}
     time, last = history["time_s"], frames[-1]

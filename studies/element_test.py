@@ -34,7 +34,7 @@ COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", 
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_choice(p, "--test", "drained", TESTS, "compression without lateral strain; triaxial with constant lateral "
                "stress; triaxial at constant volume; simple shear at constant volume")  # fmt: skip
@@ -60,7 +60,7 @@ def increment(kind: str, size: float) -> list[float | None]:
 
 
 def row(test: mpm.ElementTest) -> dict[str, float]:
-    """What is looked at: invariants of the effective stress where there is pore water, else of the stress."""
+    """Quantities of interest: invariants of the effective stress where there is pore water, else of the stress."""
     names = test.law.state_names
     pore = test.state[names.index("excess_pore_pressure")] if "excess_pore_pressure" in names else 0.0
     p = -test.stress[:3].mean()
@@ -74,7 +74,7 @@ def row(test: mpm.ElementTest) -> dict[str, float]:
 
 
 def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
-    """All increments; why it ended early, if it did."""
+    """Apply all increments; returns why the test ended early, if it did."""
     history.add(**row(test))
     for _ in range(a.steps):
         try:

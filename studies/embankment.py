@@ -44,7 +44,7 @@ CAPTIONS = {
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_stage_options(p, "embankment", "P1")
     add_strength_factor(p)

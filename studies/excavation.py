@@ -34,7 +34,7 @@ comm = MPI.COMM_WORLD
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_stage_options(p, "excavation", "P2")
     add_switch(p, "--compare", True, "also compute elastic soil, and the final geometry in one stage, for comparison")

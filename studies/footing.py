@@ -34,7 +34,7 @@ AXIS, BASE, FAR, FOOTING = 1, 2, 3, 5
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--friction-angle", 0.0, "degrees", "friction angle", at_least=0, below=45)
     add_number(p, "--dilation-angle", None, "degrees",

@@ -51,7 +51,7 @@ yielded, and the footing is hardly embedded"""
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_choice(
         p, "--shape", "strip", ("strip", "circular"), "half of a strip, or the half section of a circular footing"
@@ -92,7 +92,7 @@ def clay(a: Namespace) -> mpm.MohrCoulomb:
 
 
 def speed_of(a: Namespace) -> float:
-    """Of the footing [m/s]."""
+    """Speed of the footing [m/s]."""
     return float(a.speed * np.sqrt(clay(a).p_wave_modulus / a.density))
 
 

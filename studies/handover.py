@@ -41,7 +41,7 @@ FRACTIONS = (0.0, 0.25, 0.5, 0.75, 0.9, 0.98)
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_slope_options(p)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
@@ -86,7 +86,7 @@ def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
 
 
 def run(a: Namespace, fraction: float, unit_weight: float) -> dict:
-    """One hand-over and slide; its results for the summary."""
+    """Compute one hand-over and slide; returns its results for the summary."""
     case = build_slope(a, comm)
     watch = Watch(case)  # of the particles as seeded, before the hand-over may move them
     report = hand_over(case, unit_weight)

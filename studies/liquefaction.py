@@ -48,7 +48,7 @@ COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "volume
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--height", 3.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 12.0, "degrees", "angle of the slope", above=0, below=60)
@@ -82,7 +82,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 def density(a: Namespace) -> float:
-    """Of the saturated sand [kg/m3]."""
+    """Density of the saturated sand [kg/m3]."""
     return float((1 - a.porosity) * GRAINS + a.porosity * WATER)
 
 
@@ -129,7 +129,7 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
 
 
 def front(x: np.ndarray, volume: np.ndarray) -> float:
-    """Where the front of the soil is [m]: beyond it lies `FRONT` of the volume of all particles. Collective.
+    """Position of the front of the soil [m]: beyond it lies `FRONT` of the volume of all particles. Collective.
 
     Args:
         x: positions along the slope (n,) of this rank's particles [m].

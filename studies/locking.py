@@ -47,7 +47,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     for name, known in (("cases", tuple(CASES)), ("schemes", SCHEMES)):
         p.add_argument(f"--{name}", default=",".join(known), metavar="NAME,...",
@@ -78,7 +78,7 @@ def compare(a: Namespace, case: ModuleType, scheme: str) -> tuple[list[dict], di
 
 
 def row(case: ModuleType, common: dict, elements: str, n: int, value: float, found: Found | None = None) -> dict:
-    """One line of the table, printed as it is made."""
+    """Print and return one line of the table."""
     result = {**common, "elements": elements, "divisions": n, "cell_size_m": case.cell_size(n), "value": value,
               "error": abs(value / common["reference"] - 1)}  # fmt: skip
     if found:

@@ -47,18 +47,18 @@ MEASURES = {
     "retrogression_m": "Failed length of the crest [m]", "runout_m": "Run-out past the toe [m]",
     "work_of_stresses_J_per_m": "Work of the stresses [MJ/m]",
 }  # fmt: skip
-"""What the mesh sizes are compared by. Nearly all of the stresses' work is dissipated in the slips: what the soil stores
-elastically changes little."""
+"""Quantities by which the mesh sizes are compared. Nearly all of the stresses' work is dissipated in the slips: the
+elastic energy of the soil changes little."""
 AT_REST, REST = 1e-3, 2.0
-"""At rest is a slope whose kinetic energy has stayed below this fraction of its maximum for so long [s]: a scarp may stand for
-a moment before it fails too."""
+"""A slope is at rest when its kinetic energy has stayed below this fraction of its maximum for this time [s]: a scarp
+may stand for a moment before it fails too."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_slope_options(p)
     p.set_defaults(
@@ -113,7 +113,7 @@ def disturb(case: SlopeCase) -> None:
 
 @dataclass
 class Slide:
-    """What came of one mesh size."""
+    """Result of the slide on one mesh size."""
 
     case: SlopeCase
     cell_size: float
@@ -148,7 +148,7 @@ def is_at_rest(history: History) -> bool:
 
 
 def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> Slide:
-    """One mesh size, to rest, to the end of the time or to an interruption."""
+    """Compute the slide on one mesh size, to rest, to the end of the time or to an interruption."""
     case = build_slope(Namespace(**{**vars(args), "cell_size": size}), comm)
     ratio = start(case)
     disturb(case)
@@ -214,7 +214,7 @@ def compare(results: list[Slide], folder: Path) -> None:
 
 
 def differences(results: list[Slide]) -> dict[str, float]:
-    """By how much the measures on the two mesh sizes differ in the end, as fractions of their mean."""
+    """Differences of the measures on the two mesh sizes in the end, as fractions of their mean."""
     if len(results) < 2:
         return {}
     ends = {column: [r.history[column][-1] for r in results] for column in MEASURES}

@@ -42,7 +42,7 @@ LABELS = {"deposit": "Thickness of the deposit [m]", "most": "Largest thickness 
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
                    help="heights of the ground before the slide: .asc, .tif, .xyz (default: a valley by formulas)")  # fmt: skip
@@ -118,7 +118,7 @@ def grounds(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
 
 
 def fine_part(before: terrain.Raster, rupture: terrain.Raster) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Where the mesh is fine: the slide, and the ground lower than its top within four of its lengths."""
+    """Region of the fine mesh: the slide, and the ground lower than its top within four of its lengths."""
     x, y = np.meshgrid(before.x, before.y)
     body = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape) > 0.05
     if not body.any():

@@ -43,7 +43,7 @@ comm = MPI.COMM_WORLD
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
     add_ground_option(p)
@@ -114,7 +114,7 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
 
 
 def particle_summary(found: bridge.ParticleSafety) -> dict[str, object]:
-    """What particles found, printed on the first rank as well."""
+    """Results of the particles, which are printed on the first rank as well."""
     if comm.rank == 0:
         end = f"flow at {found.failed_at:.3f}" if found.failed else f"at least: {found.reason}"
         print(f"particles on the finest mesh: {found.value:.3f}, {end}")

@@ -64,7 +64,7 @@ def parts_of(cells: np.ndarray, pairs: np.ndarray, count: int) -> np.ndarray:
 
 
 def counted(dim: int, cells: np.ndarray, pairs: np.ndarray, count: int) -> dict[str, float]:
-    """What the busiest of ``count`` ranks sends in an explicit step without nodal mixed discretisation."""
+    """Data that the busiest of ``count`` ranks sends in an explicit step without nodal mixed discretisation."""
     parts = parts_of(cells, pairs, count)
     touches = np.unique(np.column_stack([cells.ravel(), np.repeat(parts, dim + 1)]), axis=0)
     of_node = np.split(touches[:, 1], np.flatnonzero(np.diff(touches[:, 0])) + 1)

@@ -41,7 +41,7 @@ comm = MPI.COMM_WORLD
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_site_file(p, "dam", "soils and boundaries", ("P1", ("P1", "P2"), "linear or quadratic triangles"))
     add_number(p, "--days", 60.0, "days", "duration of transient flow, if boundary values change", above=0)
@@ -53,7 +53,7 @@ def parser() -> ArgumentParser:
 
 
 class Files(FieldFiles):
-    """What is written as the flow goes on: frames for ParaView and the history of the inflows."""
+    """Files that are written during the run: frames for ParaView, and the history of the inflows."""
 
     def __init__(self, flow: water.Seepage, names: list[str], folder: Path) -> None:
         self._flow, self._names = flow, names

@@ -73,7 +73,7 @@ MAY_CHANGE = {
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_flag(p, "--paper", "repeat the paper exactly: zero initial stress, time step 1e-4 s")
     add_slope_options(p)
@@ -266,7 +266,7 @@ def drawn(a: Namespace, scene: Scene | None, frames: list[dict], history: Histor
 
 
 def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
-    """What the page ``report.html`` shows beside figures and tables. Collective."""
+    """Content of the page ``report.html`` beside figures and tables. Collective."""
     a, scene = case.args, case.scene()
     movies = [particle_movie(f"MPM, {a.unit_weight / 1e3:g} kN/m\u00b3", scene, frames)]
     if case.fem is not None:

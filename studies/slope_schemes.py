@@ -49,14 +49,14 @@ import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 FRAMES = 40
-"""Of each run on the page."""
+"""Number of frames of each run on the page."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_slope_options(p)
     add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
@@ -93,7 +93,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 @dataclass
 class Run:
-    """One slide; `curve` has rows of time [s] and displacement of the crest [m]."""
+    """Result of one slide; `curve` has rows of time [s] and displacement of the crest [m]."""
 
     name: str
     curve: list[tuple[float, float]] = field(default_factory=list)
@@ -194,7 +194,7 @@ def save_crests(path: Path, runs: list[Run]) -> None:
 
 
 def drawn(runs: list[Run], scene: Scene | None, folder: Path) -> Pictures:
-    """All pictures."""
+    """Draw all pictures."""
     if scene is None:
         return {}
     shown = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN, "vertical_stress": VERTICAL_STRESS}

@@ -39,7 +39,7 @@ GRAVITY = 9.81
 COLUMNS = ["time_s", "wall_displacement_m", "coefficient", "impulse_Ns", "vertical_impulse_Ns", "wall_friction",
            "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
 RELEASED = 1.3
-"""When a free wall has its last support, over the time at which the sand is at rest"""
+"""Time at which the support of a free wall is removed, over the time at which the sand is at rest"""
 LAST = 1 / 3
 """Part of the way of the wall over which the coefficient is taken, at its end"""
 
@@ -48,7 +48,7 @@ LAST = 1 / 3
 
 
 def parser() -> ArgumentParser:
-    """All options; units stand in the help."""
+    """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_choice(
         p,
@@ -107,12 +107,12 @@ def unit_force(a: Namespace) -> float:
 
 
 def at_rest(a: Namespace) -> float:
-    """When the sand is at rest under its weight [s]; gravity rises over the first third."""
+    """Time at which the sand is at rest under its weight [s]; gravity rises over the first third."""
     return 50 * a.height / float(np.sqrt(a.young / a.density))
 
 
 def end(a: Namespace) -> float:
-    """When the wall has done its way [s]; a free wall has the time to fall by its height."""
+    """Time at which the wall has reached its displacement [s]; for a free wall the time to fall by its height."""
     if a.motion == "free":
         return at_rest(a) + 1.5 * float(np.sqrt(2 * a.height / GRAVITY))
     return at_rest(a) + 1.1 * a.movement / a.speed
@@ -125,7 +125,7 @@ def bounds(a: Namespace) -> tuple[float, float]:
 
 
 def wall_mass(a: Namespace) -> float:
-    """Of a free wall, kg per metre."""
+    """Mass of a free wall [kg/m]."""
     return float(a.wall_mass * a.density * a.height**2)
 
 
@@ -135,20 +135,20 @@ def support(a: Namespace) -> float:
 
 
 def expected_acceleration(a: Namespace) -> float:
-    """At which a free wall gives way, with a plane wedge behind it [m/s2]."""
+    """Acceleration at which a free wall gives way, with a plane wedge behind it [m/s2]."""
     return wall_acceleration(*np.radians([a.friction_angle, a.wall_friction_angle]), weight=a.density * GRAVITY,
                              cohesion=a.cohesion, height=a.height, mass=wall_mass(a), support=support(a))  # fmt: skip
 
 
 def acceleration(a: Namespace, history: History) -> float:
-    """Of a free wall, from its release until it has gone by a tenth of its height [m/s2]: twice that of a parabola."""
+    """Acceleration of a free wall until it has moved by a tenth of its height [m/s2], by a parabola through the displacements."""
     time, moved = history["time_s"], -history["wall_displacement_m"]
     chosen = (time >= RELEASED * at_rest(a)) & (moved <= 0.1 * a.height)
     return float(2 * np.polyfit(time[chosen], moved[chosen], 2)[0]) if chosen.sum() > 3 else float("nan")
 
 
 def wall_motion(a: Namespace) -> dict[str, object]:
-    """How the wall moves; arguments of ``Model.add_contact``."""
+    """Motion of the wall as arguments of ``Model.add_contact``."""
     start = at_rest(a)
     if a.motion != "free":
         speed = a.speed * a.height * (1 if is_passive(a) else -1)

@@ -19,7 +19,7 @@ OTHERS = ("h5py", "gmsh", "matplotlib", "jinja2", "tqdm")
 
 
 def about() -> str:
-    """Lines of text."""
+    """Versions, solvers and processors as lines of text."""
     sys.path.insert(0, str(find.SHIPPED))
     common = importlib.import_module("common.versions")
     lines = {

@@ -18,7 +18,7 @@ from talus.launch import run
 
 
 def parser() -> argparse.ArgumentParser:
-    """All commands."""
+    """Parser of all commands."""
     p = argparse.ArgumentParser(prog="talus", description="Slopes from rest to large deformation, by FEM and MPM.")
     commands = p.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("run", help="run a study; see `talus run --help`")  # `run_study` takes its arguments

@@ -41,4 +41,4 @@ complete -c talus -n "__fish_seen_subcommand_from run" -a "(talus list | string 
 """
 
 SCRIPTS = {"bash": _BASH, "zsh": _ZSH + _BASH, "fish": _FISH}
-"""What a shell reads, ``source <(talus completion bash)`` or ``talus completion fish | source``"""
+"""Scripts for shells, ``source <(talus completion bash)`` or ``talus completion fish | source``"""

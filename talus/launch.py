@@ -18,7 +18,7 @@ from talus.find import PACKAGE, SHIPPED
 
 
 def environment() -> dict[str, str]:
-    """What a study finds in its environment: the shared part of the studies, one thread for a rank, where results go."""
+    """Environment variables of a study: the path to common modules, one thread per rank, and the folder of results."""
     paths = [str(SHIPPED), str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
     return {
         "OMP_NUM_THREADS": "1",

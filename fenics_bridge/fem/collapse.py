@@ -27,7 +27,7 @@ class Collapse:
     """The last equilibrium below collapse, and the evidence of failure above it."""
 
     value: float
-    """Of the load or of the factor of safety at the last equilibrium"""
+    """Value of the load or of the factor of safety at the last equilibrium"""
     failed_at: float
     """Smallest value above `value` at which the body was shown to fail, or that was tried if it was shown at none"""
     failed: bool
@@ -208,7 +208,7 @@ def _unlimited(steps: list[LoadStep], curve: Any, mechanism: Any) -> Collapse:
 
 
 def _accepted(steps: list[LoadStep]) -> Any:
-    """What was accepted on the way as equilibrium."""
+    """States that were accepted as equilibrium on the way."""
     reports = [step.report for step in steps if step.converged]
     return {
         "residual": max(report.residuals[-1] for report in reports),

@@ -26,9 +26,9 @@ class LoadStep(NamedTuple):
     number: int
     """Number of the step, from 1 on"""
     value: float
-    """What was changed, such as the load factor, at the end of the step"""
+    """Value that was changed, such as the load factor, at the end of the step"""
     size: float
-    """By how much it was changed"""
+    """Amount of the change"""
     report: EquilibriumReport
     """How the equilibrium was found, or why there is none"""
 
@@ -147,7 +147,7 @@ def raise_load(
 
 
 def _not_reached(steps: list[LoadStep]) -> str:
-    """What is left of a load that the body was to be given."""
+    """Remainder of a load that was to be applied."""
     reached = max((step.value for step in steps if step.converged), default=0.0)
     failed = min((step for step in steps if not step.converged), key=lambda step: step.value, default=None)
     reason = f": at {failed.value:.3%} {failed.report.reason}" if failed is not None else ""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """What changes in a stage of construction; everything else stays as it is.
+    """Changes in a stage of construction; everything else stays as it is.
 
     Soils and boundaries are given by name, or by number, as they are in the mesh.
     """
@@ -241,7 +241,7 @@ class SiteState:
 
 
 def _wrong_value(stage: Stage, where: str) -> str | None:
-    """What is wrong with the values of a stage; None for nothing."""
+    """Error in the values of a stage; None without an error."""
     for name in ("unit_weight", "pressure"):
         for key, value in getattr(stage, name).items():
             if not (np.isscalar(value) and np.isfinite(value)):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fenics_bridge.errors import InputError
 
 NEAR = 1e-6
-"""Of the size of a side or face: what is nearer to it lies on it"""
+"""Tolerance as a fraction of the size of a side or face: points nearer than this lie on it"""
 
 
 def check_cells_fit(cells: NDArray[np.integer], name: str) -> None:
@@ -84,7 +84,7 @@ def _boundary_facets(cells: NDArray[np.integer]) -> NDArray[np.integer]:
 
 
 def _distinct(rows: NDArray[np.integer]) -> tuple[Any, ...]:
-    """Where each distinct row is first, in ascending order of the rows, and how often it is there."""
+    """Position of the first of each distinct row, in ascending order of the rows, and the number of equal rows."""
     order = np.lexsort(rows.T[::-1])
     starts = np.ones(len(rows), dtype=bool)
     starts[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)

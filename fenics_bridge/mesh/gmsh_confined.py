@@ -43,7 +43,7 @@ def limit_memory(size: int) -> None:
 
 
 def forbid_programs() -> bool:
-    """From now on this process and its children cannot start programs. Returns whether the system can do that."""
+    """Forbid this process and its children to start programs. Returns whether the system supports this."""
     try:
         library = ctypes.CDLL("libseccomp.so.2")
     except OSError:
@@ -58,7 +58,7 @@ def forbid_programs() -> bool:
 
 
 def children() -> tuple[Any, ...]:
-    """What the children of this process have used. It changes when one is started, even if it could not become a program."""
+    """Resources used by the children of this process; they change when one is started, even if it cannot become a program."""
     return tuple(resource.getrusage(resource.RUSAGE_CHILDREN))
 
 

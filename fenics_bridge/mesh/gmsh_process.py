@@ -20,7 +20,7 @@ SCRIPT = Path(__file__).with_name("gmsh_confined.py")
 
 @dataclass(frozen=True)
 class Limits:
-    """What the process may take and do, see `read_mesh`."""
+    """Limits of the process, see `read_mesh`."""
 
     time: float
     memory: float | None

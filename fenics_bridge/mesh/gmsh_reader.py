@@ -67,7 +67,7 @@ def gmsh_session() -> Iterator[Any]:
 
 
 def gmsh_message(error: Exception) -> str:
-    """What gmsh says about an error, on one line."""
+    """Message of gmsh about an error, on one line."""
     return " ".join(str(error).split()) or gmsh.logger.getLastError()
 
 

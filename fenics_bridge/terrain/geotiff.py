@@ -52,7 +52,7 @@ def read_geotiff(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
 
 
 def _name(path: Path, reference: Any) -> str:
-    """How a raster names a coordinate reference of rasterio."""
+    """Name of a coordinate reference system of rasterio in a raster."""
     if not reference:
         return ""
     if reference.to_wkt().startswith(("LOCAL_CS", "ENGCRS")):

@@ -82,7 +82,7 @@ def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[An
 
 
 def _lift(points: NDArray[np.float64], radii: NDArray[np.float64], column: Any, surface: Any) -> NDArray[np.float64]:
-    """How far each column goes up until no particle of it is nearer to the ground than its radius [m]."""
+    """Height by which each column is raised so that no particle is nearer to the ground than its radius [m]."""
     lift = np.zeros(column.max() + 1)
     below = np.arange(len(points))  # those that may still be too near
     while len(below):

@@ -30,7 +30,7 @@ class Handover:
     unbalanced_ratio: float
     """Out-of-balance over external force of the particles as they were given their stress [-]"""
     equilibrated_ratio: float | None
-    """The same after the equilibration [-]; None without equilibration, as with cells that rest"""
+    """Out-of-balance ratio after the equilibration [-]; None without equilibration, as with resting cells"""
     returned_fraction: float
     """Fraction of the particles whose stress had to be returned to the yield surface [-]"""
     yielded_fraction: float

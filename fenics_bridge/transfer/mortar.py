@@ -83,11 +83,11 @@ class Overlap(NamedTuple):
     """Integrals over a border between the nodes of two meshes."""
 
     own: NDArray[np.float64]
-    """Of products of the first mesh's shape functions, shape (n, n) [m^(D-1)]; times the radius in axial symmetry"""
+    """Integrals of products of the first mesh's shape functions, shape (n, n) [m^(D-1)]; times the radius in axial symmetry"""
     other: NDArray[np.float64]
-    """Of products with those of the second mesh, shape (n, m)"""
+    """Integrals of products with the shape functions of the second mesh, shape (n, m)"""
     area: float
-    """Of the common part [m^(D-1)]"""
+    """Area of the common part [m^(D-1)]"""
 
 
 def overlap(

@@ -30,7 +30,7 @@ class _Held(NamedTuple):
     rate: Any = None
     """Prescribed inflow over the unit [-] as a constant; None where there is none"""
     density: Any = None
-    """That inflow per area, UFL"""
+    """The inflow per area as a UFL expression"""
     total: Any = None
     """Compiled form of the integral of the inflow"""
 
@@ -81,7 +81,7 @@ class AppliedBoundary:
         return True
 
     def _where(self, condition: WaterBoundary) -> Any:
-        """Where a boundary condition holds."""
+        """Part of the boundary on which a condition holds."""
         domain, dim = self._space.mesh, self._dim
         tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
         domain.topology.create_connectivity(dim - 1, dim)

@@ -78,7 +78,7 @@ def value_at(value: Value, time: float) -> float:
 
 
 def mistake_in(condition: WaterBoundary) -> str | None:
-    """What is wrong with the values of a boundary condition; None for nothing."""
+    """Error in the values of a boundary condition; None without an error."""
     for name in ("level", "rate", "ponding"):
         value = getattr(condition, name, 0.0)
         if callable(value):

@@ -126,7 +126,7 @@ class WaterTerms:
         return further
 
     def gravity_flow(self, space: Any) -> NDArray[np.float64]:
-        """What the weight of the water makes flow in 1 s, as part of the internal forces: (m,). Collective."""
+        """Flow of the water in 1 s by its own weight, as part of the internal forces: (m,). Collective."""
         q = ufl.TestFunctions(space)[1]
         return self._unit * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
 

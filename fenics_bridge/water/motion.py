@@ -13,7 +13,7 @@ from fenics_bridge.errors import InputError, agree
 from fenics_bridge.types import OfPosition
 
 STANDARD_GRAVITY = 9.81
-"""By which unit weights are densities [m/s2]"""
+"""Gravity by which unit weights are divided to get densities [m/s2]"""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from fenics_bridge.types import Law
 from fenics_bridge.water.soils import PorousSoil
 
 MARGIN = 4
-"""Of the pressure projection over the least factor that does for uniaxial strain"""
+"""Factor of the pressure projection over the least factor that suffices in uniaxial strain"""
 
 
 class PressureProjection:

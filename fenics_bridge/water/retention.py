@@ -28,7 +28,7 @@ _SMALL = 1e-9
 
 
 class _Curve:
-    """What the curves have in common."""
+    """Base class of retention curves."""
 
     residual: float
     """Residual degree of saturation [-], which no suction takes out"""

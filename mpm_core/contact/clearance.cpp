@@ -51,7 +51,7 @@ bool is_at_border(const Triangles& triangles, const Vector<3>& x, const Distance
   return !(found.squared < apart * apart) || has_border(triangles, widened(own, apart + 2 * reach));
 }
 
-/// What is known of the surface from a cell that is near to it.
+/// Bounds of the surface for a cell that is near to it.
 /// @param x  centre of the cell, as it lies to the surface at its start
 template <int D>
 void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Distance<D>& nearest, Contact<D>& contact,

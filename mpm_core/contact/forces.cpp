@@ -11,7 +11,7 @@ namespace mpm::contact
 {
 namespace
 {
-/// What all particles need to know in a step.
+/// Data of a step that all particles need.
 template <int D>
 struct Press
 {
@@ -182,7 +182,7 @@ double lowest_point(const Mesh<D>& mesh, Index cell, const CellBound<D>& bound)
   return lowest;
 }
 
-/// What the particles of a cell know of the surface in this step.
+/// Data of the surface in this step for the particles of a cell.
 template <int D>
 struct Sight
 {

@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// What both schemes ask of a particle at a rigid surface: its size, its slip, and what the surface feels of it.
+/// Functions of both schemes for a particle at a rigid surface: its size, its slip, and its force on the surface.
 
 #include "contact/contact.h"
 

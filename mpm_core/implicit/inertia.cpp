@@ -16,7 +16,7 @@ Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, doub
 
 namespace
 {
-/// Of the iterate.
+/// Inertia of the iterate.
 template <class G>
 Inertia iterate_inertia(const VelocityField<G>& field, const ImplicitStep<G>& step, Index node, int component)
 {

@@ -8,7 +8,7 @@ namespace mpm::implicit
 {
 namespace
 {
-/// What a particle has, and what it gets over the step.
+/// Water of a particle, and what it gains over the step.
 struct DryingParticle
 {
   double volume, porosity, storage; ///< V, n, n / K_w

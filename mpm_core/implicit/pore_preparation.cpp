@@ -13,10 +13,10 @@ namespace mpm::implicit
 {
 namespace
 {
-/// Of the pressure projection over the least factor that does for uniaxial strain.
+/// Factor of the pressure projection over the least factor that suffices in uniaxial strain.
 constexpr double projection_margin = 4;
 
-/// What the particles of a run say of the water: sums of V times ...
+/// Sums over the particles of a run of the properties of their water, V times ...
 template <int D>
 struct PoreSums
 {

@@ -16,7 +16,7 @@ constexpr double slack = 1e-3;
 /// full; above it the cell is a gap between particles within the soil.
 constexpr double most_at_surface = 0.7;
 
-/// What the cells around a node say; plain doubles.
+/// Sums over the cells around a node; plain doubles.
 struct Around
 {
   double volume; ///< of all of them, the part of this node

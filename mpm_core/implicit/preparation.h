@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// What an implicit step knows of its mesh and particles before the first trial.
+/// Data of the mesh and the particles that an implicit step prepares before the first trial.
 
 #include "implicit/step.h"
 

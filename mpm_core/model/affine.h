@@ -6,7 +6,7 @@
 
 namespace mpm::model
 {
-/// What velocities particles have of the nodes.
+/// Velocities of particles from those of the nodes.
 enum class Transfer
 {
   flip,  ///< their own, which take the change of the nodes' velocities (18), with PIC a part of these velocities

@@ -10,7 +10,7 @@ namespace mpm::model
 {
 namespace
 {
-/// That of a particle, or of all particles that a resting cell stands for.
+/// Kinetic energy of a particle, or of all particles that a resting cell replaces.
 template <class G, int D = G::dim>
 double kinetic_energy(const Model<G>& model, Index p)
 {

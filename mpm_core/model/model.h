@@ -56,7 +56,7 @@ struct Totals
   double friction_work = 0;          ///< taken out where velocity fields touch
 };
 
-/// Of the last step, on this rank.
+/// Results of the last step, on this rank.
 struct LastStep
 {
   double dt = 0;            ///< [s]

@@ -6,7 +6,7 @@
 
 namespace mpm::model
 {
-/// What the pass does.
+/// Options of the pass.
 struct PassOptions
 {
   double dt;           ///< [s]

@@ -37,7 +37,7 @@ inline double pressure_at(const StandingWater<D>& standing, const std::array<dou
   return pressure;
 }
 
-/// What the particles of a cell say of the total stress beside their effective ones. Water that stands over the free
+/// Part of the total stress of the particles of a cell beside their effective stresses. Water that stands over the free
 /// surface presses on it by p_s, wherever the surface is: div(s - p_a I) + rho g with p_a = p_s there is the same as
 /// div(s - (p_a - p_s) I) + rho g - grad p_s with no load there.
 template <int D>

@@ -18,7 +18,7 @@ struct FacetNormal
   double area;
 };
 
-/// Those of the facets with a tag around each node.
+/// Areas of the facets with a tag around each node.
 /// @note Collective
 template <int D>
 std::vector<FacetNormal<D>> nodal_normals(const Mesh<D>& mesh, NodeExchange& exchange, Index facet_tag)

@@ -18,7 +18,7 @@ struct Walk
   GlobalIndex under_way;
 };
 constexpr int walk_width = sizeof(Walk) / sizeof(GlobalIndex);
-/// What a rank says of walks that are not its own.
+/// Results of a rank for walks that started on other ranks.
 constexpr GlobalIndex no_word = std::numeric_limits<GlobalIndex>::min();
 
 /// More rounds than this are a walk that goes round in circles.

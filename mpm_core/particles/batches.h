@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// How the particles are cut into what a law is given at once.
+/// Division of the particles into batches, each of which a law is given at once.
 
 #include "particles/particles.h"
 

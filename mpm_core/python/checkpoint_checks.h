@@ -16,7 +16,8 @@ inline constexpr double most_exact = 9007199254740992.0;
 /// No total comes near it, and a whole number of 64 bits holds it.
 inline constexpr double most_total = 9e18;
 
-/// Of the height of a cell, how far outside of it a particle may lie; far more than the search for cells allows.
+/// Largest distance of a particle outside of its cell, over the cell's height; far more than the search for cells
+/// allows.
 inline constexpr double most_outside = 1e-6;
 
 /// What is wrong with the content of a file on this rank; the first finding counts.

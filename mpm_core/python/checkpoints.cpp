@@ -113,7 +113,7 @@ std::pair<Particles<D>, std::vector<GlobalIndex>> particles_of(const Model<G>& m
   return {std::move(particles), std::move(cells)};
 }
 
-/// Those of some tables that a file has, with its values.
+/// The tables that a file has, with its values.
 std::vector<Table> tables_of(std::vector<Table> tables, const py::dict& arrays)
 {
   std::erase_if(tables, [&](const Table& table) { return !arrays.contains(table.name.c_str()); });

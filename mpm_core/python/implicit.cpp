@@ -23,7 +23,7 @@ struct Implicit
   Relaxation<D> relaxation;
 };
 
-/// What a trial says; where it failed, with what stopped it in words.
+/// Result of a trial; where it failed, with the reason in words.
 template <class G, int D = G::dim>
 py::dict as_dict(const Implicit<G>& implicit, const TrialReport& report)
 {

@@ -142,7 +142,7 @@ def _pictures(
 
 @dataclass(frozen=True)
 class _Overlay:
-    """What is drawn over each frame: rows of the pixels (k,), their colours (k, 3) and opacities (k, 1)."""
+    """Pixels that are drawn over each frame: rows of the pixels (k,), their colours (k, 3) and opacities (k, 1)."""
 
     rows: np.ndarray
     colours: np.ndarray
@@ -150,7 +150,7 @@ class _Overlay:
 
     @classmethod
     def of(cls, canvas: FigureCanvasAgg, axes: Axes, artists: Sequence[Artist]) -> _Overlay:
-        """Of artists, drawn on nothing; the canvas is left empty."""
+        """Overlay of artists, drawn on a transparent ground; the canvas is left empty."""
         canvas.get_renderer().clear()
         for artist in artists:
             axes.draw_artist(artist)

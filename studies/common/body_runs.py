@@ -37,7 +37,7 @@ MAY_CHANGE = {
 }  # fmt: skip
 """Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
 CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displacement": "Displacement in the end"}
-"""Of `body_pictures`"""
+"""Captions of the pictures of `body_pictures`"""
 
 
 def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
@@ -58,7 +58,7 @@ def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: 
 
 @dataclass
 class BodyRun:
-    """What came of a run; all of it on all ranks but the frames, which the first rank has."""
+    """Result of a run, on all ranks but for the frames, which the first rank has."""
 
     history: History
     frames: list[dict] = field(default_factory=list)
@@ -211,7 +211,7 @@ def write_results(
 
 
 def scheme(a: Namespace) -> dict[str, Any]:
-    """How the explicit scheme steps, from the options; arguments of ``Model.explicit``."""
+    """Options of the explicit scheme as arguments of ``Model.explicit``."""
     return {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": mpm.Integration.MIXED}
 
 

@@ -31,7 +31,7 @@ def dilation_angles(options: Namespace) -> list[float]:
 
 @dataclass(frozen=True)
 class Target:
-    """What is looked for.
+    """Target of the search.
 
     Args:
         name, failed_name, reference_name: in the summary, of the value, of the smallest one above it that failed, and of
@@ -60,7 +60,7 @@ class Target:
 
 @dataclass(frozen=True)
 class CollapseRuns:
-    """What was found.
+    """Result of the search.
 
     Args:
         target: what was looked for.
@@ -92,7 +92,7 @@ class CollapseRuns:
         }
 
     def rows(self) -> list[dict[str, object]]:
-        """One for each run."""
+        """Collapse of each run."""
         target = self.target
         return [
             {"cell_size_m": size, "dilation_angle_degrees": angle, target.name: self._value(run),

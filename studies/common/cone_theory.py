@@ -18,7 +18,7 @@ def teh_houlsby(rigidity: float, roughness: float) -> float:
 
 
 def lu(rigidity: float, roughness: float) -> float:
-    """The same by large-strain finite elements: Q. Lu, M. F. Randolph, Y. Hu, I. C. Bugarski, Proc. ICOF (2004), as fitted there.
+    """Resistance fitted to large-strain finite elements by Q. Lu, M. F. Randolph, Y. Hu and I. C. Bugarski, Proc. ICOF (2004).
 
     Args:
         rigidity, roughness: as for `teh_houlsby`.

@@ -57,7 +57,7 @@ class ParticleGround:
             self.iterations = max(self.iterations, report.iterations)
 
     def settlements(self) -> np.ndarray:
-        """Of the points of the site [m], shape (n,)."""
+        """Settlements of the points of the site [m], shape (n,)."""
         return -self._steps.at(self._places)[0][:, 1]
 
     def largest_excess(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 
 def stress_field(phi: float, delta: float, *, passive: bool) -> float:
-    """By stresses in equilibrium below the strength: the passive coefficient is too low, the active one too high.
+    """Coefficient by stresses in equilibrium below the strength: the passive coefficient is too low, the active one too high.
 
     R. Lancellotta, Géotechnique 52 (2002) 617, for the passive pressure; the active one likewise, with the other signs.
     """
@@ -21,7 +21,7 @@ def stress_field(phi: float, delta: float, *, passive: bool) -> float:
 
 
 def coulomb(phi: float, delta: float, *, passive: bool) -> float:
-    """By a plane wedge that slides: the active coefficient is too low, the passive one too high, more so the rougher the wall."""
+    """Coefficient by a sliding plane wedge: too low for active pressure, too high for passive, more so on rough walls."""
     sign = -1.0 if passive else 1.0
     root = np.sqrt(np.sin(phi + delta) * np.sin(phi) / np.cos(delta))
     return float(np.cos(phi) ** 2 / (1 + sign * root) ** 2)
@@ -30,7 +30,7 @@ def coulomb(phi: float, delta: float, *, passive: bool) -> float:
 def wall_acceleration(
     phi: float, delta: float, *, weight: float, cohesion: float, height: float, mass: float, support: float
 ) -> float:
-    """At which a wall of some mass begins to give way with a plane wedge behind it, horizontally [m/s2]; 0 where it stands.
+    """Horizontal acceleration at which a wall of some mass gives way with a plane wedge behind it [m/s2]; 0 where it stands.
 
     The wedge slides on the plane at which it does so fastest, and goes down by tan(theta) of what the wall goes sideways.
 

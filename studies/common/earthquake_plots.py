@@ -24,7 +24,7 @@ def _panel(axes: plt.Axes, label: str) -> None:
 
 
 def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of values that are linear between times, from zero."""
+    """Integral, from zero, of values that are linear between times."""
     return np.append(0.0, np.cumsum(0.5 * np.diff(time) * (values[1:] + values[:-1])))
 
 

@@ -20,7 +20,7 @@ comm = MPI.COMM_WORLD
 STIFF = 3
 """Cell tag of the lower layer"""
 STEP = 0.01
-"""Of synthetic motions [s]"""
+"""Time step of synthetic motions [s]"""
 
 
 def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:

@@ -1,4 +1,4 @@
-"""How far a result scatters: the same slide again from starts that differ by round-off."""
+"""Scatter of a result: repetitions of a slide from starts that differ by round-off."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study of finite elements writes as time goes on: fields for ParaView, and a history."""
+"""Files that a study of finite elements writes during the run: fields for ParaView, and a history."""
 
 from __future__ import annotations
 

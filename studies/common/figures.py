@@ -12,7 +12,7 @@ from .files import NOT_WRITTEN, expendable
 from .progress import counted
 
 Pictures = Mapping[str, Callable[[], object]]
-"""How pictures are drawn, by the names of their files; on the first rank, and without anything collective"""
+"""Functions that draw pictures, by the names of their files; called on the first rank only, so without collective calls"""
 
 
 def draw_pictures(pictures: Pictures) -> None:

@@ -37,7 +37,7 @@ def checkpoint_notes(path: Path, study: str, comm: MPI.Comm = MPI.COMM_WORLD) ->
 def notes_of(
     study: str, parameters: Sequence[Parameter], restarts: Sequence[Mapping], start: Mapping
 ) -> dict[str, Any]:
-    """What is noted in a checkpoint.
+    """Notes in a checkpoint.
 
     Args:
         restarts: rows of earlier restarts.
@@ -53,7 +53,7 @@ def changes(notes: Mapping[str, Any], parameters: Sequence[Parameter]) -> dict[s
 
 
 def restart_row(notes: Mapping[str, Any], changed: Mapping[str, tuple[Any, Any]], ranks: int) -> dict[str, Any]:
-    """How a run went on, as the summary has it."""
+    """Entry of the summary about a restart."""
     text = ", ".join(f"{name} {_shown(old)} to {_shown(new)}" for name, (old, new) in changed.items())
     return {"time_s": notes["time"], "steps": notes["steps"], "ranks": ranks, "changed": text}
 

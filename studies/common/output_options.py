@@ -13,7 +13,7 @@ import mpm_core as mpm
 from .options import add_switch
 
 FRAME_BYTES = 44
-"""That a particle takes in memory in each frame for pictures: nine numbers in single precision, and its number"""
+"""Memory of a particle in each frame for pictures: nine numbers in single precision, and its number"""
 
 
 def add_output_options(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""What stands on a study's page: put together from its options, its results and the files that it wrote."""
+"""Content of a study's page, from its options, its results and the files that it wrote."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ TITLES = {
     "history": "History of the run", "totals": "Totals of all particles", "crest": "Particle at the crest",
     "section_crest": "Force across the vertical section under the crest",
 }  # fmt: skip
-"""Of curves, by the names of their files"""
+"""Titles of curves by the names of their files"""
 NOT_FACTS = ("steps", "cells", "soil_cells", "failed")
 
 
 @dataclass
 class Page:
-    """What a study adds to its page, all of it optional.
+    """Additions of a study to its page, all of them optional.
 
     Args:
         movies: particles over time, panels side by side; None entries (of ranks that hold none) are left out.
@@ -73,7 +73,7 @@ def write_page(
 
 
 def seconds_since_start() -> float:
-    """Of this program, s."""
+    """Time since this program started [s]."""
     return time.time() - STARTED
 
 

@@ -30,7 +30,7 @@ from .figures import save_figure
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
 BODY = "#1d3a5f"
-"""Of rigid surfaces"""
+"""Colour of rigid surfaces"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 WIDTH = 6.9  # in; a page's text width
 STYLE = Path(__file__).with_name("paper.mplstyle")

@@ -1,4 +1,4 @@
-"""How a study starts and ends, on any number of ranks."""
+"""Start and end of a study on any number of ranks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .files import NOT_WRITTEN, PROGRAM
 
 
 def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """From now on an error that nothing catches ends all ranks, with its message; otherwise they would wait for ever."""
+    """Let an error that nothing catches end all ranks, with its message; otherwise they would wait for ever."""
     if comm.size == 1:
         return
 
@@ -44,7 +44,7 @@ class _Unheard(io.FileIO):
 
 
 def outlive_readers() -> None:
-    """From now on a run continues when the reader of its output has ended.
+    """Let a run continue when the reader of its output has ended.
 
     In ``studies/run slope 2>&1 | tee log`` Ctrl-C ends tee, too, and what the study still prints must not keep it from
     writing its results.

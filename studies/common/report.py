@@ -27,7 +27,7 @@ UNITS = {
     "_J_per_m": "J/m", "_N_per_m": "N/m", "_kPa": "kPa", "_Pa": "Pa", "_m": "m", "_mm": "mm", "_s": "s", "_seconds": "s",
     "_degrees": "degrees",
 }  # fmt: skip
-"""Of a quantity, by the end of its name."""
+"""Unit of a quantity by the end of its name."""
 SPECIAL = {
     "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"),
     "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
@@ -61,7 +61,7 @@ class Section:
 
 @dataclass
 class Report:
-    """What stands on the page.
+    """Content of the page.
 
     Args:
         title: heading.

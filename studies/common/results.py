@@ -28,7 +28,7 @@ MARK = ".talus-run"
 RESERVED = 1 << 16
 """Bytes reserved on the disk, so that there is a summary however full it becomes."""
 NAMES = ("summary.json", "verification.json", "history.csv", "checkpoint.h5", "report.html")
-"""By which results are known in a folder without that file."""
+"""Names by which results are recognised in a folder without that file."""
 BY_HAND = "empty it, or choose another folder by --output"
 _locks: dict[Path, TextIO] = {}
 
@@ -137,7 +137,7 @@ def _opened(options: Options, adds: bool) -> Path:
 
 
 def _home() -> Path:
-    """Where the results of all studies lie: as ``TALUS_RESULTS`` says, otherwise in the source tree, or else here."""
+    """Folder of the results of all studies: ``TALUS_RESULTS``, otherwise in the source tree, or else the current folder."""
     if "TALUS_RESULTS" in os.environ:
         return Path(os.environ["TALUS_RESULTS"])
     return (ROOT if IN_SOURCES else Path.cwd()) / "results"

@@ -70,7 +70,7 @@ def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> None:
-    """One panel for each flow, above one another, with one scale of the head, or of the pore pressure."""
+    """Draw a panel for each flow, above one another, with one scale of the head, or of the pore pressure."""
     points = pictures[0].head.points
     low, high = points.min(axis=0), points.max(axis=0)
     every = np.concatenate([picture.values(quantity) for picture in pictures])

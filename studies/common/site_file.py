@@ -73,7 +73,7 @@ class Site:
 
     @property
     def geometry(self) -> mpm.Geometry | None:
-        """Of elements and particles; None for what the dimension of the mesh says."""
+        """Geometry of elements and particles; None for the one of the mesh's dimension."""
         return mpm.Geometry.AXISYMMETRIC if self.axisymmetric else None
 
     def finite_elements(self, degree: int, laws: dict[int, Any] | None = None, **options: Any) -> bridge.QuasiStatic:

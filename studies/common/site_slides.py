@@ -1,4 +1,4 @@
-"""How the particles of a site slide when their soils are too weak: the run by the explicit scheme, its history and pictures."""
+"""Slide of the particles of a site whose soils are too weak: the run by the explicit scheme, its history and pictures."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def add_slide_options(parser: ArgumentParser, damping: float, pic: float) -> Non
 
 @dataclass
 class Slide:
-    """What came of the slide."""
+    """Result of the slide."""
 
     model: mpm.Model
     history: History

@@ -22,7 +22,7 @@ from .soils import add_law_options, add_parameter, law_of
 GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
-"""Of the finite elements of the slope; those of the particles are the same."""
+"""Supports of the finite elements of the slope; those of the particles are the same."""
 
 
 def add_slope_options(parser: argparse.ArgumentParser) -> None:

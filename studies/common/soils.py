@@ -109,7 +109,7 @@ def _python_law(text: str) -> Any:
 
 
 KINDS = {"strength": "strength", "friction": "friction angle", "dilation": "dilation angle"}
-"""What a property of a UMAT may stand for, and what the law calls it"""
+"""Meanings of a property of a UMAT, and their names in the law"""
 
 
 def _strength_properties(words: Sequence[str]) -> dict[int, str]:

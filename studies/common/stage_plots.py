@@ -1,4 +1,4 @@
-"""What stages of finite elements look like: the soil that is there after each, coloured by a quantity, and ParaView files."""
+"""Pictures of stages of finite elements: the soil after each stage, coloured by a quantity; and files for ParaView."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
 
 
 def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) -> None:
-    """One panel for each stage, above one another, with one colour scale: displacement, or strain where `quantity` is SHEAR."""
+    """Draw a panel for each stage, above one another, in one colour scale: displacement, or strain where `quantity` is SHEAR."""
     box = np.array([stages[0].displacement.points.min(axis=0), stages[0].displacement.points.max(axis=0)])
     values = [
         s.strain[s.there] if quantity is SHEAR else np.linalg.norm(s.field().values[s.field().cells], axis=2)

@@ -77,7 +77,7 @@ def _write(
 
 
 def _plain(value: object) -> object:
-    """What JSON has no form for, as something that it has."""
+    """Convert a value that JSON cannot represent."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):

@@ -28,7 +28,7 @@ def versions() -> dict[str, str]:
 
 
 def version_of(module: str, text: Callable[[Any], str] = lambda module: module.__version__) -> str:
-    """What a module says of itself; "not found" where there is none, or why it cannot be loaded."""
+    """Version of a module; "not found" where there is none, or the reason why it cannot be loaded."""
     try:
         return str(text(importlib.import_module(module)))
     except ModuleNotFoundError as error:
@@ -38,7 +38,7 @@ def version_of(module: str, text: Callable[[Any], str] = lambda module: module._
 
 
 def git_revision() -> str:
-    """Commit of the sources, with ``-changed`` when files differ from it; ``unknown`` outside a clone, none of an installed package."""
+    """Commit of the sources, with ``-changed`` when files differ; ``unknown`` outside a clone; none for an installed package."""
     if not IN_SOURCES:
         return "none, installed package"
     command = ["git", "-C", str(ROOT), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=-changed"]

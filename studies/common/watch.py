@@ -1,4 +1,4 @@
-"""What studies of a sliding slope look at over time."""
+"""Quantities that studies of a sliding slope record over time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Watch:
         return self._largest(self.model.particles.position[:, 0].max(initial=-np.inf)) - self.first_toe
 
     def _largest(self, mine: float) -> float:
-        """Of all ranks' numbers."""
+        """Largest of all ranks' numbers."""
         largest = np.array(mine)
         self.model.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         return float(largest)

@@ -24,7 +24,7 @@ MOST_PANELS = 4
 
 
 def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[str, float]) -> Pictures:
-    """All pictures of a slope in time; limits: factors of safety by name, drawn as lines. Collective."""
+    """Draw all pictures of a slope in time; limits: factors of safety by name, drawn as lines. Collective."""
     worst = lowest(list(instants))
     field: Field | None = mechanism_field(worst.safety.mechanism)
     if field is None:

@@ -30,7 +30,7 @@ from .water_site import DAY, in_days
 
 comm = MPI.COMM_WORLD
 FIRST_STEP, TOLERANCE = 0.1, 0.005
-"""Of the factor of safety: the first step, and the width of the last one as a fraction of it"""
+"""First step of the factor of safety, and the width of its last interval as a fraction of the factor"""
 
 
 def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suction: bool) -> None:
@@ -87,7 +87,7 @@ def steady_safety(a: Namespace, slope: SlopeSite, time: float, title: str) -> br
 
 
 class Files(FieldFiles):
-    """What is written as time goes on: the factors, and frames for ParaView."""
+    """Files that are written during the run: the factors, and frames for ParaView."""
 
     def __init__(self, flow: water.Seepage, folder: Path) -> None:
         self._flow = flow

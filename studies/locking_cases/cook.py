@@ -26,7 +26,7 @@ SHEAR = 0.375
 TRACTION = 1 / 16
 """[Pa], along the loaded edge."""
 SCALE = 1e-4
-"""Of the load, so that the displacements stay small; results are divided by it."""
+"""Factor of the load, so that the displacements stay small; results are divided by it."""
 MID_EDGE = (48.0, 52.0)
 PRESSURE_UNIT = SHEAR * SCALE, "shear modulus"
 CLAMPED, LOADED = 1, 2

@@ -25,7 +25,7 @@ EXACT = 2 + np.pi
 COHESION, STIFFNESS = 1e3, 1e5
 """[Pa]; Young's modulus over cohesion, so large that the settlement is a small part of a cell."""
 SETTLEMENT = 1e-3
-"""Of the footing over half of its width: ten times the one at which the ground without locking yields."""
+"""Settlement of the footing over half of its width: ten times the one at which the ground without locking yields."""
 DENSITY = 2000.0
 PRESSURE_UNIT = COHESION, "cohesion"
 AXIS, BASE, FAR, FOOTING = 1, 2, 3, 5

@@ -29,7 +29,7 @@ class Field(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a run gives: the quantity of its case, the mean stresses, steps and processor time [s]."""
+    """Result of a run: the quantity of its case, the mean stresses, steps and processor time [s]."""
 
     value: float
     field: Field | None

@@ -31,7 +31,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Check:
-    """One number against what it should be.
+    """A computed number and its expected value.
 
     Args:
         quantity: what it is, for instance "settlement of the top, 3D".
@@ -73,7 +73,7 @@ class Check:
 
 @dataclass
 class Result:
-    """What a case found: its checks, and pictures in its folder with their captions."""
+    """Result of a case: its checks, and pictures in its folder with their captions."""
 
     checks: list[Check]
     figures: dict[str, str] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Passive earth pressure by soil that turns on a log-spiral: an upper bound for soil that dilates by its friction angle.
+"""Passive earth pressure by soil that rotates on a log-spiral: an upper bound for soil that dilates by its friction angle.
 
 The spiral r = r_0 exp(theta tan(phi)) through the foot of the wall opens as the soil turns, so that the soil moves away from
 the ground below at the angle phi, as associated flow does. The work of the pressure, which acts on the lower third of the
@@ -14,7 +14,7 @@ STARTS = ((-0.5, 1.4), (-1.2, 1.9), (-3.2, 3.1), (-15.0, 9.0))
 
 
 def turning(pole, phi, delta):
-    """Coefficient of the horizontal pressure of soil that turns about a pole; the wall is 1 high, its foot at the origin."""
+    """Coefficient of the horizontal pressure of soil that rotates about a pole; the wall is 1 high, its foot at the origin."""
     a, b = pole
     first, angle = np.arctan2(-b, -a), np.pi
     for _ in range(2):  # the second time with all points between the foot and the ground

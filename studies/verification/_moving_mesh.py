@@ -1,4 +1,4 @@
-"""A background mesh that goes with the particles, so that none crosses into another cell; it shows what crossings cost."""
+"""A background mesh that moves with the particles, so that none crosses into another cell; it shows the error of crossings."""
 
 from collections.abc import Callable
 

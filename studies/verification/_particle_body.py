@@ -51,7 +51,7 @@ class ParticleBody:
             dt = min(dt * growth, 0.04 * self.period)
 
     def advance(self, dt):
-        """One step of dt [s], or several shorter ones."""
+        """Take one step of dt [s], or several shorter ones."""
         more = self._move_plates(dt)
         before = self.model.report().support_work
         *_, report = self._steps.advance(self.model.time + dt, dt)

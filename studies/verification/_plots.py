@@ -1,4 +1,4 @@
-"""Pictures that several cases share: what was computed as points, what is expected as lines."""
+"""Pictures that several cases share: computed values as points, expected values as lines."""
 
 from __future__ import annotations
 

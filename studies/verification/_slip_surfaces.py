@@ -60,7 +60,7 @@ def sliding_blocks(
 def slip_circle(
     centre: np.ndarray, radius: float, surface: np.ndarray, strength: Strength, unit_weight: float
 ) -> float:
-    """Factor of safety by the soil that turns on a slip circle; infinite where the circle cuts out no such soil.
+    """Factor of safety by the soil that rotates on a slip circle; infinite where the circle cuts out no such soil.
 
     Args:
         centre: (2,) [m]; radius: [m]; surface: (k, 2) [m], from left to right.

@@ -20,7 +20,7 @@ import fenics_bridge as bridge
 from fenics_bridge import compat
 
 SIDES = 24
-"""Of the polygon, whose inscribed radius is 0.9914 of the circle's"""
+"""Number of sides of the polygon, whose inscribed radius is 0.9914 of the circle's"""
 
 
 @dataclass

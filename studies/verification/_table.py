@@ -92,7 +92,7 @@ class CaseRow:
         return (*first, *methods, *others, *last), rows, wrong
 
     def notes(self) -> list[str]:
-        """What is to be said about known limits, each once."""
+        """Reasons of the known limits, each once."""
         return list(dict.fromkeys(f"Known limit: {c.limit}" for c in self.checks if c.limit and not c.passed))
 
 

@@ -53,7 +53,7 @@ class WetElements:
             raise mpm.RunError(f"no equilibrium in the step from {self.time:.4g} s: {report.reason}")
 
     def displacement(self, point):
-        """At a point [m]."""
+        """Displacement at a point [m]."""
         own = np.array([point]) if comm.rank == 0 else np.empty((0, 2))
         return comm.bcast(self.model.evaluate_at(own)["displacement"])[0]
 
@@ -88,7 +88,7 @@ class WetParticles:
             pass
 
     def displacement(self, point):
-        """At a point [m]."""
+        """Displacement at a point [m]."""
         return self._steps.at([point])[0][0]
 
     def mean_stress(self):

@@ -108,7 +108,7 @@ def ring_mean(exact, r, cells):
 
 
 def order(errors):
-    """In which the last error fell when cells were halved."""
+    """Order by which the last error decreased when the cell size was halved."""
     return float(np.log2(errors[-2] / errors[-1]))
 
 

@@ -75,7 +75,7 @@ def breathing(periods, thickness):
     return 2 * (zeros[-1] - zeros[0]) / (len(zeros) - 1), expected, (time / expected, momentum / momentum[0])
 
 
-# --- 3. A cylinder let go on rough ground -----------------------------------------------------------------------------
+# --- 3. A cylinder released on rough ground ---------------------------------------------------------------------------
 
 
 def vibrating(cells):

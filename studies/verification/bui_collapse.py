@@ -22,7 +22,7 @@ THIN = 0.01  # m
 SIDE, GROUND = 1, 3
 TIME = 1.0  # s
 PIC_FRACTION = 0.006
-"""Of a critical time step"""
+"""PIC fraction in a critical time step"""
 
 
 def run(quick: bool, folder) -> Result:

@@ -47,7 +47,7 @@ def pressure(rigidity, radius, outer=OUTER):
     return 1 + np.log(rigidity * (1 - (RADIUS / radius) ** 2)) - rigidity * squares / (outer**2 + squares)
 
 
-# --- 1. Large strains: particles on a mesh that goes with them, computed by each rank alike ---------------------------
+# --- 1. Large strains: particles on a mesh that moves with them, computed by each rank alike ---------------------------
 
 
 def empty_model(mesh, law):

@@ -27,7 +27,7 @@ comm = MPI.COMM_WORLD
 
 
 def way(acceleration, end):
-    """Of a body under a force that rises over the time RISE [m]."""
+    """Displacement of a body under a force that rises over the time RISE [m]."""
     u = end - RISE
     return acceleration * (RISE**2 / 6 + RISE * u / 2 + u**2 / 2)
 
@@ -79,7 +79,7 @@ def slid(mesh, slope, friction):
 
 
 def crept(slope, friction):
-    """How far a block moves on that sticks, once it is at rest, over the way that it would slide without friction [-]."""
+    """Displacement of a sticking block once it is at rest, over that of a block without friction [-]."""
     model, plane, _ = block("along cells")
     model.set_gravity(gravity(slope), ramp=0.4)
     model.add_contact(plane, friction=friction)
@@ -90,7 +90,7 @@ def crept(slope, friction):
 
 
 def fallen(drop=0.2):
-    """How far the block falls until it feels the plane [m]."""
+    """Distance that the block falls before the plane acts on it [m]."""
     model, plane, _ = block("along cells", drop)
     model.set_gravity((0, -G))
     ground, last = model.add_contact(plane), 0.0

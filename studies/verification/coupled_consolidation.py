@@ -36,7 +36,7 @@ from fenics_bridge import water
 comm = MPI.COMM_WORLD
 YOUNG, MOBILITY, LOAD = 10e6, 1e-12, 10e3  # Pa, k / gamma_w [m2/(Pa s)], Pa
 WEIGHT = 1e-3
-"""Of the pore water [N/m3]: next to nothing, as in the closed forms"""
+"""Unit weight of the pore water [N/m3]: nearly zero, as in the closed forms"""
 LEFT, RIGHT, BASE, TOP, STRIP = 1, 2, 3, 4, 5
 PARTICLES = "particles"
 NAMES = {water.Element.TAYLOR_HOOD: "P2-P1", water.Element.STABILISED: "P1-P1", PARTICLES: "particles"}
@@ -66,7 +66,7 @@ class Body:
             raise mpm.RunError(f"no equilibrium in the step from a time factor of {start:.3g}: {reports[-1].reason}")
 
     def advance(self, dt):
-        """One step of dt [s]."""
+        """Take one step of dt [s]."""
         self.model.advance(dt)
 
     @property

@@ -62,7 +62,7 @@ def elastica(load: float):
 
 
 class Beam:
-    """Particles of a beam whose tip load rises step by step, on a mesh that stays or goes with them.
+    """Particles of a beam whose tip load rises step by step, on a mesh that stays or moves with them.
 
     On each rank alike, which computes all of it.
     """
@@ -98,7 +98,7 @@ class Beam:
         return model
 
     def step(self, load: float) -> None:
-        """One step to equilibrium under a load P L^2 / EI'."""
+        """Take one step to equilibrium under a load P L^2 / EI'."""
         if self.moving_mesh and self.model.steps:
             self._go_with_the_beam()
         traction = np.zeros((len(self.start), 2))
@@ -114,7 +114,7 @@ class Beam:
         self.model = on_moved_mesh(self.model, self.nodes, self._model)
 
     def tip_displacement(self) -> np.ndarray:
-        """Of the middle of the loaded particles over the arm: downwards and backwards [-]."""
+        """Displacement of the centre of the loaded particles over the arm: downwards and backwards [-]."""
         moved = (in_order(self.model, "position") - self.start)[self.tip].mean(axis=0)
         return -moved[::-1] / self.arm
 

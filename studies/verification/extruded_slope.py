@@ -35,7 +35,7 @@ class Slide(NamedTuple):
     moved: np.ndarray
 
     def mean(self) -> np.ndarray:
-        """Of the mass, shape (D,)."""
+        """Mean displacement by mass, shape (D,)."""
         return self.moved.mean(axis=0)
 
     def crest(self) -> float:
@@ -45,7 +45,7 @@ class Slide(NamedTuple):
         return float(np.linalg.norm(self.moved[near, :2], axis=1).mean())
 
     def run_out(self) -> float:
-        """Of the farthest particle past where the farthest one started."""
+        """Distance of the farthest particle from the start of the farthest one."""
         return float((self.start + self.moved)[:, 0].max() - self.start[:, 0].max())
 
 

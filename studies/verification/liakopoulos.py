@@ -33,7 +33,7 @@ POROSITY, CONDUCTIVITY = (
 )  # -, m/s from an intrinsic permeability [m2] and a viscosity [Pa s]
 STEPS = ((1, 0.06), (9, 1), (5, 10), (1, 0.94), (3, 10), (1, 30), (1, 100), (1, 80), (9, 100), (2, 200), (3, 400), (3, 600),
          (1, 200), (3, 600), (1, 0.06), (9, 1), (5, 10), (1, 0.94), (3, 10), (1, 30), (1, 100), (1, 80), (3, 100))  # fmt: skip
-"""How many steps of which length [s]"""
+"""Numbers of steps and their lengths [s]"""
 PUBLISHED = {600: (-5170.6, -0.76202), 7200: (-9171.7, -1.54702)}
 """Pressure [Pa] and displacement [mm] of the top, by time [s]"""
 
@@ -153,7 +153,7 @@ def march(model, dt):
 
 
 def drainage_of_particles(cells):
-    """The same checks by particles."""
+    """The checks of the column by particles."""
     weight = ((1 - POROSITY) * 2000.0 + POROSITY * 1000.0) * GRAVITY
     law = mpm.LinearElastic(young=1.3e6, poisson=0.4)
     model, checks, name = particles(cells, law, POROSITY, CONDUCTIVITY, del_monte_sand(), weight), [], "particles"

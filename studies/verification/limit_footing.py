@@ -28,7 +28,7 @@ def surcharge_factor(friction: float) -> float:
 
 
 def nc(friction: float, size: str) -> float:
-    """By the study footing, on one mesh."""
+    """Bearing capacity factor by the study footing, on one mesh."""
     a = parse(["--friction-angle", str(friction), "--cell-size", size, "--meshes", "1"])
     collapse, _ = footing(a, a.cell_size, friction)
     return collapse.value / a.cohesion

@@ -18,7 +18,7 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 LAME, SHEAR = YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON)), YOUNG / (2 * (1 + POISSON))
 AMPLITUDE = 1e-9  # m: strains so small that the motion of particles does not count
 RATIO = -0.5
-"""Of the second to the first component of the displacement."""
+"""Ratio of the second to the first component of the displacement."""
 
 
 # --- 1. The solution in space, its stress and its body force -------------------------------------------------------

@@ -22,7 +22,7 @@ ELASTIC = mpm.LinearElastic(young=1e6, poisson=0.3)
 SAND = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=200.0, friction_angle=30.0)
 REACH, HEADROOM = 2.5, 1.0  # of the mesh in which the sand collapses, over the radius and the height
 DURATION = 0.8
-"""Of the collapse [s]: 2.5 √(H/g)"""
+"""Duration of the collapse [s]: 2.5 √(H/g)"""
 HALF, QUARTER = "half section", "quarter in three dimensions"
 
 
@@ -80,7 +80,7 @@ def collapsing(dim, cells):
 
 
 def radius(model):
-    """Of each particle of this rank [m]."""
+    """Distance of each particle of this rank from the axis [m]."""
     return np.linalg.norm(model.particles.position[:, : model.mesh.dim - 1], axis=1)
 
 

@@ -71,7 +71,7 @@ def speed_of_swing(cells, modulus, which):
 
 
 def implicit_waves(speed, quick):
-    """By implicit particles: speed of the first mode, without the error of backward Euler; pressure behind a front over q."""
+    """Waves by implicit particles: speed of the first mode, less the error of backward Euler; pressure behind a front over q."""
     model = column(20, 1e-12, 2.2e8)
     height = model.particles.position[:, 1]
     model.particles.set("velocity", np.column_stack([0 * height, 1e-4 * np.sin(0.5 * np.pi * height / HEIGHT)]))

@@ -25,7 +25,7 @@ comm = MPI.COMM_WORLD
 COHESION, SHEAR, POROSITY, MODULUS = 1e3, 4e6, 0.4, 2.2e9  # Pa, Pa, -, Pa
 HALF, SETTLED, STEPS = 0.5, 0.02, 20  # half width and settlement of the footing [m]
 SIZES = (0.24, 0.12, 0.06)
-"""Of cells beside the footing [m]; a quarter of them at its edge"""
+"""Cell sizes beside the footing [m]; a quarter of these at its edge"""
 AXIS, BASE, FAR, FREE, PRESSED = 1, 2, 3, 4, 5
 LIMIT = 2 + np.pi
 SUPPORTS = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
@@ -34,7 +34,7 @@ COARSE = "the load converges from above; cells of 0.24 m are coarse"
 
 
 def clay(poisson=0.3):
-    """Of one shear modulus, whatever the Poisson ratio of the skeleton is."""
+    """Clay with the same shear modulus for any Poisson's ratio of the skeleton."""
     return mpm.MohrCoulomb(young=2 * SHEAR * (1 + poisson), poisson=poisson, cohesion=COHESION, friction_angle=0.0)
 
 
@@ -61,7 +61,7 @@ def total_stress(size):
 
 
 def coupled(size, element, law):
-    """The same by finite elements of soil and water."""
+    """Load of the footing by finite elements of soil and water."""
     domain, _, facet_tags = ground(size)
     supports = [*SUPPORTS, bridge.prescribed(PRESSED, (0.0, -SETTLED))]
     soil = water.PorousSoil(1e-17, porosity=POROSITY)
@@ -79,7 +79,7 @@ def coupled(size, element, law):
 
 
 def particles(size, *, nmd, wet=True):
-    """The same by implicit particles with water, or with the undrained law, one per cell: work of the footing over its way."""
+    """Load by implicit particles with water, or with the undrained law, one per cell: work of the footing over its path."""
     model = mpm.Model(bridge.background_mesh(*ground(size)), clay() if wet else undrained())
     model.seed(density=2000.0, per_cell=1)
     bridge.apply_supports(model, SUPPORTS)

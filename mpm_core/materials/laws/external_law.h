@@ -39,7 +39,7 @@ inline int n_state(const ExternalLaw& law) { return static_cast<int>(law.names.s
 inline Needs needs(const ExternalLaw& law) { return law.wants; }
 inline std::vector<std::string> state_names(const ExternalLaw& law) { return law.names; }
 inline double p_wave_modulus(const ExternalLaw& law) { return law.wave_modulus; }
-/// That of a Poisson's ratio of 1/4
+/// Shear modulus for a Poisson's ratio of 1/4
 inline double shear_modulus(const ExternalLaw& law) { return law.wave_modulus / 3; }
 
 /// Throws InputError when there are too many or no state variables, or no positive modulus.

@@ -26,7 +26,7 @@ inline std::string law_name(const Heterogeneous& law) { return "Heterogeneous " 
 
 inline int n_state(const Heterogeneous& law) { return n_state(law.law) + static_cast<int>(law.varying.size()); }
 
-/// Those of the law, then NAME_difference for each parameter that varies
+/// Names of the law's state variables, then NAME_difference for each parameter that varies
 std::vector<std::string> state_names(const Heterogeneous& law);
 
 /// Throws InputError when the law's numbers are out of their range, or a parameter is not one that may vary.

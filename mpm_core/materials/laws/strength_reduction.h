@@ -18,14 +18,14 @@ DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
 /// The friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is
 CamClay reduced_strength(const CamClay& law, double factor);
 
-/// Of the parameters that it names
+/// Reduces the parameters that the law names.
 /// @throws InputError it names none
 ExternalLaw reduced_strength(const ExternalLaw& law, double factor);
 Umat reduced_strength(const Umat& law, double factor);
 
-/// Of all points
+/// Reduces the strength of all points.
 Heterogeneous reduced_strength(const Heterogeneous& law, double factor);
-/// Of the law that they are made of
+/// Reduces the strength of the law that it is made of.
 Hencky reduced_strength(const Hencky& law, double factor);
 Undrained reduced_strength(const Undrained& law, double factor);
 

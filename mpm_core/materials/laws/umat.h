@@ -81,7 +81,7 @@ inline int n_state(const Umat& law) { return 16 + law.n_variables; }
 inline Needs needs(const Umat&) { return Umat::special_needs; }
 std::vector<std::string> state_names(const Umat& law);
 inline double p_wave_modulus(const Umat& law) { return law.wave_modulus; }
-/// That of a Poisson's ratio of 1/4
+/// Shear modulus for a Poisson's ratio of 1/4
 inline double shear_modulus(const Umat& law) { return law.wave_modulus / 3; }
 
 /// Kinds and values of the PROPS that are its strength.

@@ -18,7 +18,7 @@ from .motion import Motion
 from .rayleigh import Rayleigh
 
 WAVE = -1
-"""In the place of the number of a free field: the incoming wave comes through the side"""
+"""Stands for the number of a free field where the incoming wave passes through the side"""
 Side = tuple[int, float, float, float, int]
 """Facet tag, impedances for compression and shear waves [kg/(m2 s)], thickness of the springs [m], number of the free field"""
 
@@ -87,7 +87,7 @@ class AbsorbingSides:
         self._take_sides([(*side, 0 if free_field else WAVE) for side in new])
 
     def _take_sides(self, new: list[Side]) -> None:
-        """Begin all sides anew, with these in the place of those of the same tags. Collective."""
+        """Set up all sides again; these replace the ones with the same tags. Collective."""
         tags = {side[0] for side in new}
         kept = [*(side for side in self._absorbing if side[0] not in tags), *new]
         free = [side[0] for side in kept if side[4] != WAVE]
@@ -173,7 +173,7 @@ class AbsorbingSides:
             self._core.set_free_field(number, heights, *table)
 
     def _base(self) -> Base | None:
-        """What free fields stand on."""
+        """Base of the free fields."""
         below = [side for side in self._absorbing if side[4] == WAVE]
         if not below:
             return None
@@ -186,7 +186,7 @@ class AbsorbingSides:
         self._core.set_incoming_wave(*(incoming or ([], [], [0.0] * self.mesh.dim)))
 
     def _absorbing_state(self) -> dict[str, Any] | None:
-        """What a checkpoint needs: sides, their nodes with forces and displacements, the wave. Collective."""
+        """State for a checkpoint: the sides, their nodes with forces and displacements, and the wave. Collective."""
         if not self._absorbing:
             return None
         nodes = {node: entry for part in self.comm.allgather(self._core.dashpots()) for node, entry in part.items()}
@@ -199,7 +199,7 @@ class AbsorbingSides:
         }
 
     def _take_absorbing(self, state: dict[str, Any] | None) -> None:
-        """The state of a checkpoint. Collective."""
+        """Restore the state from a checkpoint. Collective."""
         state = state or {"sides": [], "nodes": [], "incoming": None, "free_fields": []}
         self._absorbing = [
             (tag, _given(normal), _given(shear), _given(far), free) for tag, normal, shear, far, free in state["sides"]
@@ -210,7 +210,7 @@ class AbsorbingSides:
         self._columns, self._tables = [], []  # a run begins them anew, and brings them to the present
 
     def _retake_absorbing(self, state: dict[str, Any] | None) -> None:
-        """The same after a repartition, in the midst of a run."""
+        """Restore the state after a repartition during a run."""
         columns, tables = self._columns, self._tables
         self._take_absorbing(state)
         self._columns = columns

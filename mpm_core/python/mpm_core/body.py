@@ -74,7 +74,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         if not self.laws:
             raise InputError("laws is empty, expected at least one constitutive law")
         self.geometry = collectively(self.comm, lambda: _geometry(mesh, geometry))
-        """What the mesh stands for."""
+        """Geometry of the body on the mesh."""
         fields = collectively(self.comm, lambda: _whole_numbers("velocity_fields", velocity_fields or ()))
         suffix = {Geometry.PLANE_STRAIN: "2", Geometry.AXISYMMETRIC: "Axisymmetric", Geometry.SOLID: "3"}[self.geometry]
         self._core = getattr(_core, f"Model{suffix}")(mesh._core, self.laws, fields, MPI._addressof(self.comm))

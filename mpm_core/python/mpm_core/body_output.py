@@ -85,6 +85,6 @@ class BodyOutput(Output):
         self._series.shared["stored"] = (points.tobytes(), place, topology)
 
     def _rows(self, values: NDArray) -> tuple[NDArray, list[int]]:
-        """Those that this rank writes, and how many each does: the first one all of them."""
+        """Rows that this rank writes, and the number of rows of each rank: the first rank writes all of them."""
         comm = self._series.comm
         return values if comm.rank == 0 else values[:0], [len(values)] + [0] * (comm.size - 1)

@@ -79,7 +79,7 @@ def _rename(aside: str, path: str) -> None:
 
 
 class Column(NamedTuple):
-    """What an array of particles must be."""
+    """Required shape and type of an array of particles."""
 
     width: int
     whole: bool
@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 
 class CheckpointFile:
-    """A checkpoint opened by all ranks, each of which reads what it needs. What the file says of itself is not believed.
+    """A checkpoint opened by all ranks, each of which reads what it needs. Shapes and types are checked.
 
     Raises:
         RunError: on all ranks, here and in each method: the file or an array of it is not there, damaged, or of another kind.
@@ -108,7 +108,7 @@ class CheckpointFile:
             self._file.close()
 
     def _tried(self, name: str | None, work: Callable[[], T]) -> T:
-        """Run what concerns an array of the file, or all of it."""
+        """Run a function that reads an array of the file, or the whole file."""
 
         def run() -> T:
             try:

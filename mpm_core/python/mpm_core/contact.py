@@ -183,7 +183,7 @@ class RigidContact:
 
     @property
     def kinetic_energy(self) -> float:
-        """Of motion along free axes and of free rotation [J]; 0 for other bodies."""
+        """Kinetic energy of the motion along free axes and of free rotation [J]; 0 for other bodies."""
         return float(self._state()["kinetic_energy"])
 
     @property

@@ -16,7 +16,7 @@ class CriticalCell(NamedTuple):
     number: int
     """Number of the cell over all ranks, as in `Mesh.global_cells`"""
     centre: tuple[float, ...]
-    """Of the cell [m]"""
+    """Centre of the cell [m]"""
     altitude: float
     """Smallest altitude h_min of the cell [m]"""
     wave_speed: float

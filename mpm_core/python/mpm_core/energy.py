@@ -20,7 +20,7 @@ LEAST_STEPS = 32
 
 
 ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
-"""What to look at where energy is unexplained"""
+"""Advice for runs with unexplained energy"""
 
 
 class EnergyWarning(RuntimeWarning):

@@ -16,7 +16,7 @@ from .mesh import Mesh, floats
 
 @dataclass(frozen=True)
 class _Border:
-    """What a far field does."""
+    """Border of a far field: its nodes, stiffness and mass."""
 
     nodes: NDArray[np.int64]
     stiffness: NDArray[np.float64]
@@ -111,7 +111,7 @@ class FarFields:
         )
 
     def _border_state(self) -> dict[str, Any] | None:
-        """What a checkpoint needs beside the far field itself."""
+        """State for a checkpoint, without the far field itself."""
         if self._border is None:
             return None
         return {
@@ -121,7 +121,7 @@ class FarFields:
         }
 
     def _take_border_state(self, state: dict[str, Any] | None) -> None:
-        """The state of a checkpoint, whose far field the model has; see `require_border`."""
+        """Restore the state from a checkpoint, whose far field the model has; see `require_border`."""
         border = self._border
         if state is None or border is None:
             return
@@ -140,7 +140,7 @@ def require_border(model: Any, path: str, state: dict[str, Any] | None) -> None:
 
 
 def refuse_far_field(model: Any, what: str) -> None:
-    """Raises InputError where something does not know a far field."""
+    """Raises InputError where something does not support a far field."""
     if model._border is not None:
         raise InputError(f"{what} does not support far fields, expected implicit steps; see Model.detach_far_field")
 

@@ -10,8 +10,8 @@ from petsc4py import PETSc
 from .petsc import multigrid_options
 
 SCHUR_WEIGHT = 5.0
-"""Of diag(Q^T diag(K)^-1 Q): the diagonal of K holds each node alone, while its neighbours give way, too. From 3 to 8 the
-iterations are the same, with 1 they are half as many again."""
+"""Factor of diag(Q^T diag(K)^-1 Q): the diagonal of K is the stiffness of one node with its neighbours
+fixed, while these move too. From 3 to 8 the number of iterations is the same; with 1 it is larger by a half."""
 
 
 def split_options(dim: int, rtol: float) -> dict[str, Any]:

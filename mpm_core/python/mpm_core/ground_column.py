@@ -51,7 +51,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class Base:
-    """What a column stands on.
+    """Base of a column.
 
     Args:
         impedances: ``rho c_p`` and ``rho c_s`` of the ground below [kg/(m2 s)]; zeros for those of the lowest layer, infinite
@@ -141,7 +141,7 @@ class GroundColumn:
         return np.array(times), np.array(velocities), np.array(tractions)
 
     def _to_levels(self, lower: Floats, upper: Floats) -> Floats:
-        """What layers add to the levels below and above them."""
+        """Contributions of the layers to the levels below and above them."""
         total = np.zeros((len(lower) + 1, *lower.shape[1:]))
         total[:-1] += lower
         total[1:] += upper
@@ -167,7 +167,7 @@ class GroundColumn:
         return stress
 
     def _step(self) -> Floats:
-        """One step; returns the viscous stress at its start."""
+        """Take one step; returns the viscous stress at its start."""
         damped = self._is_damped()
         viscous = self._viscous_stress(damped)
         on_plane = (self.stress - self._stress_start + viscous)[:, self._on_plane]
@@ -188,7 +188,7 @@ class GroundColumn:
         return viscous
 
     def _base_acceleration(self, force: Floats) -> Floats:
-        """Of the lowest level, whose dashpots take the mean velocity of the step, (D)."""
+        """Acceleration of the lowest level, whose dashpots act on the mean velocity of the step, (D)."""
         if self._base is None:
             return 0.0 * force
         incoming = 2 * self._base.wave(self.time + 0.5 * self.dt)

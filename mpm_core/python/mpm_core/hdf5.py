@@ -96,7 +96,7 @@ class RowsFile:
 
 
 class HeldRows:
-    """What `RowsFile` takes, gathered to the first rank, which can write it later and by another thread."""
+    """The arrays of a `RowsFile`, gathered to the first rank, which can write them later and by another thread."""
 
     def __init__(self, path: str, comm: MPI.Comm, compression: int) -> None:
         self._path, self._comm, self._compression = path, comm, compression

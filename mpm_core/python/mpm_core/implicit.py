@@ -68,7 +68,7 @@ def implicit_options(
 
 
 def _energy_check(options: Any) -> tuple[str, int]:
-    """What to do about energy that an implicit run does not explain, and the steps from which on it is looked at."""
+    """Advice on energy that an implicit run does not explain, and the number of steps from which it is checked."""
     if options.second_order or options.damping:
         return ADVICE, LEAST_STEPS
     return (

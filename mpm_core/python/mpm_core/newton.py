@@ -199,7 +199,7 @@ class NewtonSolver:
 
     @property
     def tolerance(self) -> float:
-        """Of the residual."""
+        """Tolerance of the residual."""
         return self._options.tolerance
 
     def tangent_of(self, step: Any) -> Tangent:

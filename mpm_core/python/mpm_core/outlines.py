@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Outline = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D)."""
 SEGMENTS = 96
-"""Of a disc."""
+"""Number of segments of the outline of a disc."""
 SPHERE_CELLS = 10
 """Squares, each of two triangles, along a quarter of a great circle."""
 

@@ -31,7 +31,7 @@ Value: TypeAlias = float | Sequence[tuple[float, float]]
 
 
 STANDARD_GRAVITY = 9.81
-"""By which the unit weight of water is its density [m/s2]"""
+"""Gravity by which the unit weight of water is divided to get its density [m/s2]"""
 
 
 class WaveSpeeds(NamedTuple):

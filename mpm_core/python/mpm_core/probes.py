@@ -33,7 +33,7 @@ STRESSES = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 class Probe(Protocol):
-    """What a `ProbeFile` can record."""
+    """Quantities that a `ProbeFile` can record."""
 
     @property
     def model(self) -> Model:

@@ -1,4 +1,4 @@
-"""How rigid surfaces move, as a caller describes it."""
+"""Motion of rigid surfaces as given by the caller."""
 
 from __future__ import annotations
 

@@ -67,9 +67,9 @@ class Series:
         self._length, self._next_rewriting, self._unnamed = 0, 0.0, 0
         self._thread: ThreadPoolExecutor | None = None
         self._unfinished: tuple[Callable[[], object], str] | None = None
-        """What writes a frame or waits for it, and its text in the XDMF file"""
+        """Function that writes the last frame or waits for it, and the text of the frame in the XDMF file"""
         self.shared: dict[str, Any] = {}
-        """What frames that are on the disk have for later ones to refer to; a frame that failed had perhaps stored it"""
+        """Data of frames on the disk that later frames refer to; cleared when a frame fails, which may have stored some"""
         check_same_path(comm, text)
         write_on_first_rank(comm, text, self._begin)
 
@@ -125,7 +125,7 @@ class Series:
 
     @contextmanager
     def single(self) -> Iterator[Frame]:
-        """What is the same in all frames, in the file ``mesh.h5``; as long as there is no frame, the XDMF file has it."""
+        """Data that all frames have in common, in the file ``mesh.h5``; until there is a frame the XDMF file describes them."""
         head = f'<Grid Name="{self._grid}" GridType="Uniform">\n'
         with self._written("mesh", head, None) as frame:
             yield frame
@@ -217,7 +217,7 @@ T = TypeVar("T", bound="Output")
 
 
 class Output:
-    """What outputs of one series have in common: a context manager that closes it."""
+    """Base class of outputs of one series: a context manager that closes the series."""
 
     def __init__(self, series: Series) -> None:
         self._series = series
@@ -247,7 +247,7 @@ class Frame:
     def __init__(self, file: RowsFile | HeldRows, address: str, real: np.dtype[Any]) -> None:
         self._file, self._address, self._real = file, address, real
         self.text: list[str] = []
-        """What the XDMF file says of it"""
+        """Its description in the XDMF file"""
 
     def add_data(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> str:
         """Add a dataset; returns how the XDMF file names it. Collective."""

@@ -111,7 +111,7 @@ def _check(vertices: NDArray[np.float64], triangles: NDArray[Any]) -> None:
 
 
 def _check_sides(vertices: NDArray[np.float64], triangles: NDArray[Any]) -> None:
-    """Each side has one triangle, or two that pass it in opposite directions; there is at most one border."""
+    """Require that each side has one triangle, or two of opposite direction, and that there is at most one border."""
     starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     keys = np.minimum(starts, ends).astype(np.int64) * len(vertices) + np.maximum(starts, ends)
     _, group, counts = np.unique(keys, return_inverse=True, return_counts=True)
