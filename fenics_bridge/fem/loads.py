@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,6 +12,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.setup_warnings import UNIT_WEIGHTS
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -82,6 +84,19 @@ def require_finite(comm: MPI.Comm, load: Load) -> None:
 
 def _arrays(tractions: Any) -> Any:
     return {tag: np.asarray(vector, dtype=float) for tag, vector in tractions.items()}
+
+
+def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
+    """Warn of a unit weight that no soil has, such as one in kN/m3; none is fine."""
+    weights = [float(weight) for weight in _weight_by_tag(load.unit_weight).values()]
+    odd = [weight for weight in weights if weight and not UNIT_WEIGHTS[0] <= abs(weight) <= UNIT_WEIGHTS[1]]
+    if odd and comm.rank == 0:
+        warnings.warn(
+            f"the unit weight is {odd[0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
+            "weights are in N/m3, 20e3 for most soils",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def _weight_by_tag(unit_weight: Any) -> Any:

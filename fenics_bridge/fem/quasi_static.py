@@ -25,7 +25,7 @@ from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
-from fenics_bridge.fem.loads import Load, LoadVectors
+from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
 from fenics_bridge.fem.locking import warn_of_locking
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
@@ -317,7 +317,9 @@ class QuasiStatic(SupportedBody, PointFunctions):
         Note:
             Collective.
         """
-        return raise_load(self, self._loads.resolved(load), first_step, tolerance, progress)
+        load = self._loads.resolved(load)
+        warn_of_weight(self.domain.comm, load)
+        return raise_load(self, load, first_step, tolerance, progress)
 
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array

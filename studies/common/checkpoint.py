@@ -39,6 +39,9 @@ def check_restart(parser: argparse.ArgumentParser, options: Options, may_change:
     """
     if not options.notes:
         return
+    reached = options.notes["time"]
+    check(parser, options.time >= reached, lambda: f"--time is {options.time:g} s, expected at least the {reached:g} s that the run "
+          f"of checkpoint {options.restart} has reached")  # fmt: skip
     changed = changes(options.notes, options.parameters())
     for name, (before, now) in changed.items():
         check(parser, name in may_change,

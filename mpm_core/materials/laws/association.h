@@ -16,7 +16,8 @@ double associated_fraction(const Law& law);
 /// dilation angle.
 bool is_non_associated(const Law& law);
 
-/// Fraction of nodal mixed discretisation in a soil: less in frictional soil that hardly dilates. Forces of strains that
-/// are averaged in full do not feel pressures that alternate from cell to cell: there these would cost the soil strength.
+/// Fraction of nodal mixed discretisation in a soil: less in frictional soil that hardly dilates. Forces of strains
+/// that are averaged in full do not feel pressures that alternate from cell to cell: there these would cost the soil
+/// strength.
 double fraction_of_averages(const Law& law);
 } // namespace mpm::materials

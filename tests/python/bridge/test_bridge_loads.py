@@ -1,5 +1,7 @@
 """Tractions of a load, beside its pressures."""
 
+import warnings
+
 import numpy as np
 import pytest
 from bridge_cases import POISSON, UNIT_WEIGHT, YOUNG, column, slope_model
@@ -7,6 +9,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem.loads import warn_of_weight
 
 SHEAR_MODULUS = YOUNG / (2 * (1 + POISSON))
 
@@ -75,3 +78,12 @@ def test_shear_on_the_crest_lowers_the_collapse_load():
         return bridge.collapse_load(model, load, first_step=1e3, tolerance=0.02).value
 
     assert carried(500.0) < 0.98 * carried(-500.0)
+
+
+@pytest.mark.parametrize("weight, is_odd", [(80.0, True), ({"soil": 18e3, 7: 20.0}, True), (18e3, False), (0.0, False)])
+def test_a_unit_weight_that_no_soil_has_is_said(weight, is_odd):
+    """80 N/m3 is a unit weight in another unit; an unloaded body has none."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warn_of_weight(MPI.COMM_WORLD, bridge.Load(unit_weight=weight))
+    assert [("expected from 1000 to 200000 N/m3" in str(one.message)) for one in caught] == [True] * is_odd
