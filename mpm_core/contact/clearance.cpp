@@ -1,6 +1,7 @@
 #include "contact/clearance.h"
 
 #include "contact/triangle_parts.h"
+#include "contact/triangle_rises.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,8 @@ namespace
 constexpr double relative_keep = 0.25; ///< travel after which bounds are found again, over the reach of a cell
 constexpr double relative_sight = 1.0; ///< of a cell, over its reach: all of the cell is in sight after such a travel
 constexpr double relative_ceiling = 0.75; ///< likewise: the width of a particle, and some travel
+constexpr double relative_touch = 0.25;   ///< likewise: the radius of a particle
+constexpr double relative_rises = 1.5;    ///< likewise: twice the width of a particle, and half of it
 constexpr double fine_boxes = 0.05;       ///< size of a surface's boxes that are as good as their triangles; likewise
 
 template <int D>
@@ -37,18 +40,18 @@ Region<D> box_of(const Mesh<D>& mesh, Index cell, const RigidBody<D>& body)
   return box;
 }
 
-/// Whether points of a cell may be nearest to the border of a surface: beyond it that goes on where it has no
-/// triangles, and nothing is known from the cell.
+/// The triangle nearest to the centre of a cell; -1 where points of the cell may be nearest to the border of the
+/// surface: beyond it that goes on where it has no triangles, and nothing is known from the cell.
 /// @param x  its centre, as it lies to the surface at its start
-bool is_at_border(const Triangles& triangles, const Vector<3>& x, const Distance<3>& nearest, const Region<3>& own,
-                  double reach)
+Index triangle_near(const Triangles& triangles, const Vector<3>& x, const Distance<3>& nearest, const Region<3>& own,
+                    double reach)
 {
   const double apart = std::abs(nearest.value) * (1 + 1e-9) + 1e-9 * reach;
   static constexpr Index root = 0;
-  if (!triangles.box_at_border[root])
-    return false;
   const NearestOnTriangles found = nearest_on(triangles, x, std::span(&root, 1), apart * apart);
-  return !(found.squared < apart * apart) || has_border(triangles, widened(own, apart + 2 * reach));
+  if (!(found.squared < apart * apart) || has_border(triangles, widened(own, apart + 2 * reach)))
+    return -1;
+  return found.triangle;
 }
 
 /// Bounds of the surface for a cell that is near to it.
@@ -68,14 +71,14 @@ void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Dist
     if (const auto* line = std::get_if<Polyline>(&contact.surface))
       add_segments(*line, seen, contact.parts);
   }
-  else if (const auto* triangles = std::get_if<Triangles>(&contact.surface))
+  else if (auto* triangles = std::get_if<Triangles>(&contact.surface))
   {
-    if (is_at_border(*triangles, x, nearest, own, bound.reach))
-    {
-      bound.blind = true;
+    bound.start = triangle_near(*triangles, x, nearest, own, bound.reach);
+    bound.blind = bound.start < 0;
+    if (bound.blind)
       return;
-    }
     add_boxes(*triangles, seen, contact.parts);
+    find_rises(widened(own, relative_touch * bound.reach), relative_rises * bound.reach, *triangles);
   }
   bound.last = contact.parts.size();
   // The cell may not be beyond the surface: its centre is outside and above all of the surface that is close, so that

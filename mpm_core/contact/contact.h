@@ -35,6 +35,7 @@ struct CellBound
   Vector<D> normal{};
   double height = std::numeric_limits<double>::infinity(); ///< unknown [m]
   std::size_t first = 0, last = 0;                         ///< parts of the surface; see `distance_within`
+  Index start = -1;                                        ///< the triangle nearest to the centre, if it is known
   bool blind = false;                                      ///< whether `distance` alone is known
 };
 

@@ -193,25 +193,22 @@ struct Sight
   double width;     ///< of the largest particle, and its motion [m]
 };
 
-template <class G, int D = G::dim>
-Sight<D> sight_of(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double travelled,
-                  const Contact<D>& contact, const Particles<D>& particles)
+template <int D>
+Sight<D> sight_of(const Contact<D>& contact, Index cell, double travelled, const Extremes& extremes)
 {
-  const CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(run.cell)];
-  double largest = 0;
-  for (Index p = run.first; p < run.last; ++p)
-    largest = std::max(largest, particle_cube<G>(particles, p));
-  const double motion = travelled + dt * fastest_node<D>(mesh, run.cell, velocity);
+  const CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(cell)];
+  const double motion = travelled + extremes.motion;
   return {bound, std::span<const Index>(contact.parts).subspan(bound.first, bound.last - bound.first), travelled,
-          motion, motion + (D == 3 ? std::cbrt(largest) : std::sqrt(largest))};
+          motion, motion + (D == 3 ? std::cbrt(extremes.cube) : std::sqrt(extremes.cube))};
 }
 
 /// Distance of a particle from the surface where it may matter, at the step's start; nothing where it is farther than
 /// its own size, also at the end.
-/// @param xi  from the centre of its cell [m]
+/// @param xi     from the centre of its cell [m]
+/// @param start  see `distance_within`
 template <class G, int D = G::dim>
 std::optional<Distance<D>> near_distance(const Contact<D>& contact, const Press<D>& press, const Sight<D>& sight,
-                                         const Vector<D>& x, const Vector<D>& xi, double cube)
+                                         const Vector<D>& x, const Vector<D>& xi, double cube, Index& start)
 {
   const CellBound<D>& bound = sight.bound;
   const double height = height_over<D>(bound, x), from_centre = norm<D>(xi);
@@ -227,8 +224,8 @@ std::optional<Distance<D>> near_distance(const Contact<D>& contact, const Press<
   const bool above = height > sight.motion;
   const double limit = above ? sight.width : std::max(from_centre + sight.travelled, sight.width);
   if ((above || bound.distance > sight.travelled) && limit <= visible)
-    return distance_within<D>(contact.surface, as_it_was, sight.parts, limit);
-  if (const auto found = distance_within<D>(contact.surface, as_it_was, sight.parts, std::max(visible, 0.0)))
+    return distance_within<D>(contact.surface, as_it_was, sight.parts, limit, start);
+  if (const auto found = distance_within<D>(contact.surface, as_it_was, sight.parts, std::max(visible, 0.0), start))
     return found;
   return distance<D>(contact.surface, as_it_was);
 }
@@ -237,12 +234,12 @@ std::optional<Distance<D>> near_distance(const Contact<D>& contact, const Press<
 /// @returns whether any was in contact
 template <class G, int D = G::dim>
 bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, const Press<D>& press,
-               double travelled, Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
+               const Sight<D>& sight, Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
 {
-  const Sight<D> sight = sight_of<G, D>(mesh, run, velocity, press.dt, travelled, contact, particles);
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
-  const AffineField<D> field = affine_field<D>(mesh, run.cell, nodal);
+  std::optional<AffineField<D>> field; // found where any particle is near
   bool touched = false;
+  Index start = sight.bound.start;
   for (Index p = run.first; p < run.last; ++p)
   {
     const Vector<D> x = at<D>(particles.position, p), xi = difference<D>(x, mesh.shapes[run.cell].centre);
@@ -250,15 +247,17 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
       continue;
     const auto nearest = press.bonds
                              ? distance<D>(contact.surface, as_at_start<D>(contact.body, x))
-                             : near_distance<G, D>(contact, press, sight, x, xi, particle_cube<G>(particles, p));
+                             : near_distance<G, D>(contact, press, sight, x, xi, particle_cube<G>(particles, p), start);
     if (!nearest)
     {
       leave_slip<D>(press, p);
       continue;
     }
+    if (!field)
+      field = affine_field<D>(mesh, run.cell, nodal);
     Vector<D> v;
     for (int i = 0; i < D; ++i)
-      v[i] = field.value[i] + dot<D>(field.gradient[i], xi);
+      v[i] = field->value[i] + dot<D>(field->gradient[i], xi);
     const auto force = press.bonds ? bond_force<G, D>(press, *nearest, v, particles, p, contact)
                                    : particle_force<G, D>(press, *nearest, v, particles, p, contact);
     if (!force)
@@ -289,14 +288,16 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
     if (!may_be_near(bound, travelled) || movers.field_of_law[static_cast<std::size_t>(run.material)] != movers.field)
       continue;
     const double gap = std::max(bound.distance - bound.reach, lowest_point<D>(mesh, run.cell, bound)) - travelled;
-    if (!may_be_near<G, D>(mesh, run, velocity, dt, gap, particles))
+    const Extremes extremes = extremes_of<G, D>(mesh, run, velocity, dt, particles);
+    if (!may_be_near<D>(extremes, gap))
     {
       for (Index p = run.first; p < run.last; ++p)
         leave_slip<D>(press, p);
       continue;
     }
     TractionMoments<D> moments{};
-    if (!press_run<G, D>(mesh, run, velocity, press, travelled, particles, contact, moments))
+    const Sight<D> sight = sight_of<D>(contact, static_cast<Index>(run.cell), travelled, extremes);
+    if (!press_run<G, D>(mesh, run, velocity, press, sight, particles, contact, moments))
       continue;
     touched = true;
     for (int k = 0; k <= D; ++k)

@@ -1,6 +1,7 @@
 #include "contact/surfaces.h"
 
 #include "base/tensor.h"
+#include "contact/triangle_rises.h"
 
 #include <algorithm>
 #include <cmath>
@@ -171,21 +172,27 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x)
 
 template <int D>
 std::optional<Distance<D>> distance_within(const Surface<D>& surface, const Vector<D>& x, std::span<const Index> parts,
-                                           double limit)
+                                           double limit, [[maybe_unused]] Index& start)
 {
   const auto* divided = std::get_if<std::conditional_t<D == 2, Polyline, Triangles>>(&surface);
   if (!divided)
     return distance<D>(surface, x);
-  const auto nearest = nearest_on(*divided, x, parts, limit * limit);
+  const auto nearest = [&]
+  {
+    if constexpr (D == 3)
+      return nearest_from(*divided, x, parts, limit, start);
+    else
+      return nearest_on(*divided, x, parts, limit * limit);
+  }();
   return nearest.squared < limit * limit ? std::optional(distance_at(*divided, nearest)) : std::nullopt;
 }
 
 template Distance<2> distance<2>(const Surface<2>&, const Vector<2>&);
 template Distance<3> distance<3>(const Surface<3>&, const Vector<3>&);
 template std::optional<Distance<2>> distance_within<2>(const Surface<2>&, const Vector<2>&, std::span<const Index>,
-                                                       double);
+                                                       double, Index&);
 template std::optional<Distance<3>> distance_within<3>(const Surface<3>&, const Vector<3>&, std::span<const Index>,
-                                                       double);
+                                                       double, Index&);
 template double rotation_reach<2>(const Surface<2>&, const Vector<2>&);
 template double rotation_reach<3>(const Surface<3>&, const Vector<3>&);
 } // namespace mpm::contact

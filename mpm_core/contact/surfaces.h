@@ -58,9 +58,10 @@ Distance<D> distance(const Surface<D>& surface, const Vector<D>& x);
 /// Distance of a point if it is at most `limit`, else nothing: by a search of some parts, which are segments of a
 /// polyline or boxes of triangles. Surfaces without parts always give it.
 /// @param parts  contain all of the surface that is so near
+/// @param start  a triangle that may be near, negative if none is known; out: the nearest one that was seen
 template <int D>
 std::optional<Distance<D>> distance_within(const Surface<D>& surface, const Vector<D>& x, std::span<const Index> parts,
-                                           double limit);
+                                           double limit, Index& start);
 
 /// How far the surface moves at most when it rotates by one radian about a point [m]; infinite where it is endless.
 template <int D>

@@ -46,17 +46,30 @@ double fastest_node(const Mesh<D>& mesh, Index cell, std::span<const Vector<D>> 
   return std::sqrt(fastest);
 }
 
+/// The largest particle of a run, and how far any moves in a step.
+struct Extremes
+{
+  double cube;   ///< [m^D]
+  double motion; ///< [m]
+};
+
+template <class G, int D = G::dim>
+Extremes extremes_of(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt,
+                     const Particles<D>& particles)
+{
+  Extremes extremes{0, dt * fastest_node<D>(mesh, run.cell, velocity)};
+  for (Index p = run.first; p < run.last; ++p)
+    extremes.cube = std::max(extremes.cube, particle_cube<G>(particles, p));
+  return extremes;
+}
+
 /// Whether any particle of a run can be near: not if the largest would not be where the cell, and the step, bring it
 /// nearest. Most cells that a surface may reach before their bounds are found again are not at it now.
 /// @param gap  smallest possible distance of the cell from the surface at the end of the step, if its nodes rest [m]
-template <class G, int D = G::dim>
-bool may_be_near(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, double dt, double gap,
-                 const Particles<D>& particles)
+template <int D>
+bool may_be_near(const Extremes& extremes, double gap)
 {
-  double largest = 0;
-  for (Index p = run.first; p < run.last; ++p)
-    largest = std::max(largest, particle_cube<G>(particles, p));
-  return fits<D>(gap - dt * fastest_node<D>(mesh, run.cell, velocity), largest);
+  return fits<D>(gap - extremes.motion, extremes.cube);
 }
 
 /// The part of a vector along a surface.

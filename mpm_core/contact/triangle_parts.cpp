@@ -8,34 +8,15 @@ namespace
 {
 double size_of(const TriangleBox& box) { return norm<3>(difference<3>(box.upper, box.lower)); }
 
+} // namespace
+
 Region<3> box_of(const Triangles& surface, Index t)
 {
-  const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
-  const auto vertex = [&](Index corner) -> const Vector<3>&
-  { return surface.vertices[static_cast<std::size_t>(corner)]; };
-  Region<3> box{vertex(corners[0]), vertex(corners[0])};
-  for (Index corner : corners)
-    include<3>(vertex(corner), box);
+  Region<3> box{corner_of(surface, t, 0), corner_of(surface, t, 0)};
+  for (std::size_t k = 1; k < 3; ++k)
+    include<3>(corner_of(surface, t, k), box);
   return box;
 }
-
-/// Calls f(number) for the boxes in a region, from the root on; it returns whether to look into the box.
-template <class F>
-void visit_boxes(const Triangles& surface, const Region<3>& region, F&& f)
-{
-  std::vector<Index> stack{0};
-  while (!stack.empty())
-  {
-    const Index number = stack.back();
-    stack.pop_back();
-    const TriangleBox& box = surface.boxes[static_cast<std::size_t>(number)];
-    if (!overlap(region, box) || !f(number) || box.count > 0)
-      continue;
-    stack.push_back(box.first);
-    stack.push_back(number + 1);
-  }
-}
-} // namespace
 
 void add_boxes(const Triangles& surface, const Region<3>& region, std::vector<Index>& boxes)
 {
@@ -77,10 +58,9 @@ double highest(const Triangles& surface, const Region<3>& region, const Vector<3
       for (Index t = box.first; t < box.first + box.count; ++t)
         if (const Region<3> around = box_of(surface, t); overlap(region, around))
         {
-          const Vector<3>& corner =
-              surface.vertices[static_cast<std::size_t>(surface.triangles[static_cast<std::size_t>(t)][0])];
-          height =
-              std::max(height, highest_on_plane<3>(common(region, around), normal, unit_normal(surface, t), corner));
+          const double top =
+              highest_on_plane<3>(common(region, around), normal, unit_normal(surface, t), corner_of(surface, t, 0));
+          height = std::max(height, top);
         }
     return size_of(box) > fine;
   };

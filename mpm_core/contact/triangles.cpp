@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -13,6 +12,7 @@ namespace mpm::contact
 namespace
 {
 constexpr Index most_in_leaf = 2;
+constexpr Index most_in_order = 256; ///< triangles that are sorted to divide them
 
 Vector<3> plus(const Vector<3>& a, const Vector<3>& b, double factor)
 {
@@ -90,7 +90,33 @@ void find_boxes_at_border(Triangles& surface)
   }
 }
 
-/// A box around triangles, with those of its halves behind it.
+/// Divides triangles into two parts along an axis: halves of many, few where the gap in between is widest, so that the
+/// two triangles of a square stay together.
+/// @param place  of the centre of a triangle, by its number
+/// @returns how many belong to the first part
+template <class F>
+Index divide(std::span<Index> triangles, F&& place)
+{
+  const auto count = static_cast<Index>(triangles.size());
+  const auto before = [&](Index a, Index b) { return place(a) < place(b); };
+  Index middle = count / 2;
+  if (count > most_in_order)
+  {
+    std::nth_element(triangles.begin(), triangles.begin() + middle, triangles.end(), before);
+    return middle;
+  }
+  std::sort(triangles.begin(), triangles.end(), before);
+  double widest = 0;
+  for (Index k = std::max(count / 3, 1); k <= count - std::max(count / 3, 1); ++k)
+    if (const double gap = place(triangles[k]) - place(triangles[k - 1]); gap > widest * (1 + 1e-9))
+    {
+      widest = gap;
+      middle = k;
+    }
+  return middle;
+}
+
+/// A box around triangles, with those of its parts behind it.
 /// @param order  numbers of the triangles, put in the order of the leaves
 void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, Index first, Index last,
              std::vector<Index>& order, std::vector<TriangleBox>& boxes)
@@ -111,10 +137,8 @@ void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, In
     return;
   const Vector<3> extent = difference<3>(of_centres.upper, of_centres.lower);
   const auto axis = static_cast<std::size_t>(std::ranges::max_element(extent) - extent.begin());
-  const Index middle = first + box.count / 2;
-  std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last,
-                   [&](Index a, Index b)
-                   { return centres[static_cast<std::size_t>(a)][axis] < centres[static_cast<std::size_t>(b)][axis]; });
+  const auto place = [&](Index t) { return centres[static_cast<std::size_t>(t)][axis]; };
+  const Index middle = divide(std::span(order).subspan(first, box.count), place) + first;
   boxes[number].count = 0;
   add_box(surface, centres, first, middle, order, boxes);
   boxes[number].first = static_cast<Index>(boxes.size());
@@ -124,12 +148,17 @@ void add_box(const Triangles& surface, const std::vector<Vector<3>>& centres, In
 /// Boxes that a search has still to look at, and their distances squared; the last one comes first.
 struct NearBoxes
 {
-  // Halves have as many triangles as each other, so that 64 levels suffice; the search begins with a few boxes.
+  // Each part has a third of the triangles at least, so that 64 levels suffice; the search begins with a few boxes.
   std::array<std::pair<double, Index>, 64 + 2 * most_start_boxes> boxes;
   std::size_t size = 0;
 
   void push(const std::pair<double, Index>& box) { boxes[size++] = box; }
-  void nearest_last() { std::sort(boxes.begin(), boxes.begin() + size, std::greater<>{}); }
+  void nearest_last()
+  {
+    for (std::size_t k = 1; k < size; ++k) // a few
+      for (std::size_t i = k; i > 0 && boxes[i - 1].first < boxes[i].first; --i)
+        std::swap(boxes[i - 1], boxes[i]);
+  }
   void order_last_two()
   {
     if (boxes[size - 2].first < boxes[size - 1].first)
@@ -151,15 +180,13 @@ double squared_distance(const TriangleBox& box, const Vector<3>& x)
 /// The nearest point of a triangle, by the regions of Voronoi of its corners and sides (Ericson 2005, section 5.1.5).
 NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vector<3>& x)
 {
-  const auto& corners = surface.triangles[static_cast<std::size_t>(t)];
-  const Vector<3>& a = surface.vertices[static_cast<std::size_t>(corners[0])];
-  const Vector<3> ab = difference<3>(surface.vertices[static_cast<std::size_t>(corners[1])], a);
-  const Vector<3> ac = difference<3>(surface.vertices[static_cast<std::size_t>(corners[2])], a);
+  const Vector<3>& a = corner_of(surface, t, 0);
+  const Vector<3> ab = difference<3>(corner_of(surface, t, 1), a), ac = difference<3>(corner_of(surface, t, 2), a);
   const Vector<3> ap = difference<3>(x, a), bp = difference<3>(ap, ab), cp = difference<3>(ap, ac);
   const auto at = [&](int feature, double v, double w)
   {
     const Vector<3> offset = plus(plus(ap, ab, -v), ac, -w);
-    return NearestOnTriangles{t, feature, offset, dot<3>(offset, offset)};
+    return NearestOnTriangles{t, feature, offset, dot<3>(offset, offset), {w, 1 - v - w, v}};
   };
   const double d1 = dot<3>(ab, ap), d2 = dot<3>(ac, ap), d3 = dot<3>(ab, bp), d4 = dot<3>(ac, bp);
   const double d5 = dot<3>(ab, cp), d6 = dot<3>(ac, cp);
@@ -186,10 +213,9 @@ NearestOnTriangles nearest_on_one(const Triangles& surface, Index t, const Vecto
 
 Vector<3> unit_normal(const Triangles& surface, Index t)
 {
-  const auto& [a, b, c] = surface.triangles[static_cast<std::size_t>(t)];
-  const Vector<3>& origin = surface.vertices[static_cast<std::size_t>(a)];
-  const Vector<3> e = difference<3>(surface.vertices[static_cast<std::size_t>(b)], origin);
-  const Vector<3> f = difference<3>(surface.vertices[static_cast<std::size_t>(c)], origin);
+  const Vector<3>& origin = corner_of(surface, t, 0);
+  const Vector<3> e = difference<3>(corner_of(surface, t, 1), origin),
+                  f = difference<3>(corner_of(surface, t, 2), origin);
   const Vector<3> n = cross(e, f);
   const double length = norm<3>(n);
   return {n[0] / length, n[1] / length, n[2] / length};
@@ -197,7 +223,7 @@ Vector<3> unit_normal(const Triangles& surface, Index t)
 
 Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles)
 {
-  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}, {}};
+  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}, {}, {}};
   std::vector<Vector<3>> centres;
   for (const auto& [a, b, c] : surface.triangles)
   {
@@ -257,6 +283,29 @@ NearestOnTriangles nearest_on(const Triangles& surface, const Vector<3>& x, std:
     look_at(box.first);
     if (near.size == before + 2)
       near.order_last_two();
+  }
+  return best;
+}
+
+NearestOnTriangles walk_on(const Triangles& surface, const Vector<3>& x, Index from)
+{
+  constexpr int most_steps = 8;
+  NearestOnTriangles best = nearest_on_one(surface, from, x);
+  Index before = -1;
+  for (int step = 0; step < most_steps && best.feature != 0; ++step)
+  {
+    const auto& neighbours = surface.neighbours[static_cast<std::size_t>(best.triangle)];
+    const auto side = static_cast<std::size_t>(best.feature - 1) % 3; // of a corner, the one that begins there
+    Index next = neighbours[side];
+    if (best.feature > 3 && (next < 0 || next == before))
+      next = neighbours[(side + 2) % 3];
+    if (next < 0 || next == before)
+      break;
+    before = best.triangle;
+    if (const NearestOnTriangles found = nearest_on_one(surface, next, x); found.squared <= best.squared)
+      best = found;
+    else
+      break;
   }
   return best;
 }

@@ -121,7 +121,7 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
     {
       const auto cell = static_cast<std::size_t>(run.cell);
       const double gap = contact.bounds[cell].distance - contact.bounds[cell].reach - travelled;
-      if (!may_be_near<G, D>(model.mesh, run, velocity, time.dt, gap, model.particles))
+      if (!may_be_near<D>(extremes_of<G, D>(model.mesh, run, velocity, time.dt, model.particles), gap))
         continue;
       const std::size_t before = trial.touching.size();
       find_touching<G, D>(model, contact, slips, run, tied, velocity, time.dt, strains[cell].volumetric, tangents,
