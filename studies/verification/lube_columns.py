@@ -8,16 +8,17 @@ r0 where a > 1.7.
 The sand has an angle of repose of 31°. The experiments hardly depend on this angle, but the computed run-outs do. With
 the friction angle of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders
 run less far and end higher than the experiments; with 31° itself they are near. A foot that spreads over a growing ring
-is not in plane strain, and it is an open question which angle is right; both are therefore shown, and the tolerance of
-these results is a quarter. There are two further limits: the foot is thinner than a cell, and its end is known to the
-size of a cell only, 8 to 13 % of the radius; and with a PIC fraction of 0.1 % instead of 0.6 % the columns with 31° run
-up to a fifth farther.
+is not in plane strain, and it is an open question which angle is right; both are therefore shown. With 31° the tolerance is a
+tenth, and for the run-out besides the size of a cell, by which the foot is known (8 to 13 % of the radius), together a fifth at
+most; for the height at a = 1, where the laws of low and of high columns differ by 12 %, and for the other angle, it is a
+fifth. With a PIC fraction of 0.1 % instead of 0.6 %, the one number that is calibrated, the columns with 31° run up to a fifth
+farther.
 """
 
 import numpy as np
 from _case import Check, Result, run_alone
 from _plots import save_comparison
-from lube_runout import FRICTION, GRAVITY, PIC_FRACTION, REPOSE, column
+from lube_runout import FRICTION, GRAVITY, PIC_FRACTION, REPOSE, column, tolerance
 from lube_runout import WIDTH as RADIUS
 from mpi4py import MPI
 
@@ -70,13 +71,16 @@ def run(quick: bool, folder) -> Result:
         ]
     checks, feet, tops, deposits = [], {}, {}, {}
     for name, friction, ratios, finer in series:
-        runs = [collapsed(ratio, finer * (12 if ratio < 3 else 8), friction) for ratio in ratios]
+        cells = [finer * (12 if ratio < 3 else 8) for ratio in ratios]
+        runs = [collapsed(ratio, n, friction) for ratio, n in zip(ratios, cells)]
         feet[name], tops[name] = ((np.array(ratios), np.array([found[k] for found in runs])) for k in (0, 1))
-        for ratio, (foot, top, surface) in zip(ratios, runs):
+        for ratio, n, (foot, top, surface) in zip(ratios, cells, runs):
             source = "experiments, Lube et al. 2004"
-            # The foot is known to a cell, which is much of the run-out of the lowest column.
-            checks.append(Check(f"run-out over the radius, a = {ratio:g}, {name}", run_out(ratio), source, foot, 0.25))
-            checks.append(Check(f"height over the radius, a = {ratio:g}, {name}", height(ratio), source, top, 0.2))
+            calibrated = friction == REPOSE
+            checks.append(Check(f"run-out over the radius, a = {ratio:g}, {name}", run_out(ratio), source, foot,
+                                tolerance(run_out(ratio), n) if calibrated else 0.2))  # fmt: skip
+            checks.append(Check(f"height over the radius, a = {ratio:g}, {name}", height(ratio), source, top,
+                                0.1 if calibrated and ratio != 1 else 0.2))  # fmt: skip
             if friction == REPOSE and finer == 1:
                 deposits[f"a = {ratio:g}"] = surface
 
