@@ -44,7 +44,7 @@ from common.plots import (
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import add_pic, add_scheme_options, check_scheme_options, run_scheme
+from common.schemes import add_pic, add_scheme_options, check_scheme_options, run_scheme, stable_integration
 from common.site_runs import add_site_option
 from common.site_slides import add_strength_factor, site_slide
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
@@ -87,7 +87,7 @@ def parser() -> ArgumentParser:
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil keeps its "
                "volume: friction angle 0, undrained, Poisson's ratio above 0.45; not with --paper)")  # fmt: skip
     add_number(slide, "--time", 34.8, "s", "duration of the slide", above=0)
-    add_scheme_options(slide)
+    add_scheme_options(slide, integration=None)
     add_number(slide, "--rebalance", 1.2, "-",
                "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
     add_count(slide, "--ensemble", 1,
@@ -110,6 +110,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_slope_options(p, options)
+    if options.integration is None:
+        cohesive = not options.paper and options.cohesion > 0
+        options.integration = stable_integration(options.particles_per_cell, cohesive)
     if options.paper:
         check(
             p, options.initial in (None, "zero"), lambda: f"--initial is {options.initial}, expected zero with --paper"

@@ -17,16 +17,23 @@ INTEGRATIONS = {
     "dual-domain": mpm.Integration.DUAL_DOMAIN,
 }
 TRANSFERS = {"flip": mpm.Transfer.FLIP, "affine": mpm.Transfer.AFFINE}
+LEAST_FOR_MIXED = 6
+"""Particles in a cell from which on mixed integration keeps the energy of a slide"""
+
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
 
 
-def add_scheme_options(parser: argparse.ArgumentParser) -> None:
-    """Options ``--scheme``, ``--solver``, ``--second-order``, ``--integration``, ``--transfer`` and ``--dt``."""
+def add_scheme_options(parser: argparse.ArgumentParser, integration: str | None = "particles") -> None:
+    """Options ``--scheme``, ``--solver``, ``--second-order``, ``--integration``, ``--transfer`` and ``--dt``.
+
+    Args:
+        integration: default of ``--integration``; None for that of `stable_integration`.
+    """
     add_choice(parser, "--scheme", "explicit", SCHEMES,
                "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
-    add_discretisation(parser)
+    add_discretisation(parser, integration)
     add_number(parser, "--dt", None, "s", "largest time step (default: half of the critical one; 20 times the critical "
                "one where implicit or quasi-static)", above=0)  # fmt: skip
 
@@ -45,15 +52,27 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
                at_least=0, at_most=1)  # fmt: skip
 
 
-def add_discretisation(parser: argparse.ArgumentParser) -> None:
+def stable_integration(per_cell: int, cohesive: bool) -> str:
+    """Name of the integration whose runs keep their energy: mixed, but for few particles in a cell and for dry grains, which
+    loosen (docs/integration.md)."""
+    return "mixed" if cohesive and per_cell >= LEAST_FOR_MIXED else "particles"
+
+
+def add_discretisation(parser: argparse.ArgumentParser, integration: str | None = "particles") -> None:
     """Options ``--second-order``, ``--integration`` and ``--transfer``."""
     add_switch(parser, "--second-order", False, "implicit steps of second order in time instead of backward Euler's")
     add_choice(
         parser,
         "--integration",
-        "particles",
+        integration,
         tuple(INTEGRATIONS),
-        "how stresses are integrated over a cell to nodal forces",
+        "how stresses are integrated over a cell to nodal forces"
+        + (
+            ""
+            if integration
+            else f" (default: mixed; particles with --paper, without cohesion, and below {LEAST_FOR_MIXED} "
+            "particles in a cell)"
+        ),
     )
     add_choice(
         parser, "--transfer", "flip", tuple(TRANSFERS), "which velocities particles carry from step to step (explicit)"
