@@ -5,8 +5,13 @@ Behind smooth walls Rankine's coefficients are exact. Behind rough walls they li
 and the upper bound of a mechanism. For the active pressure these are 2 % apart. For the passive pressure a plane wedge is far
 too high, and a body that rotates on a log-spiral is a much closer upper bound. Both theorems hold for sand that dilates by
 its friction angle. The friction that it mobilises on the wall is 17 to 20 of the 20 degrees available, and less at the foot,
-where the rock holds it. Sand that does not dilate hardly rises along the lower half of the wall and does not mobilise its
-friction, so its passive pressure is compared with the stress field for the friction that acts.
+where the rock holds it.
+
+For sand that does not dilate there is no exact coefficient. It cannot resist more than the same sand with associated flow
+(Radenkovic 1961), so that the log-spiral remains an upper bound; the stress field at the full strength is no longer a lower
+one. Sand that shears at constant volume has the strength tan(phi*) = sin(phi) on its slip lines (Davis 1968): the stress
+field for phi* is the other end of the interval. Such sand hardly rises along the lower half of the wall and does not mobilise
+its friction there, so that its passive pressure is also compared with the stress field for the friction that acts.
 """
 
 import numpy as np
@@ -21,6 +26,8 @@ from mpi4py import MPI
 ROUGH = 20.0  # degrees
 RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "field of stresses, Lancellotta 2002", "plane wedge, Coulomb 1776"
 SPIRAL = "soil that turns on a log-spiral"
+DAVIS = "field of stresses, strength at constant volume, Davis 1968"
+RADENKOVIC = "log-spiral, sand that dilates, Radenkovic 1961"
 
 
 def moved(motion, friction_angle, quick, dilation_angle=0.0):
@@ -51,7 +58,10 @@ def run(quick: bool, folder) -> Result:
                 acting = stress_field(np.radians(a.friction_angle), delta, passive=True)
                 source = f"{LANCELLOTTA}, for the {np.degrees(delta):.1f} degrees that act"
                 checks.append(Check(name, acting, source, found, tolerance))
-                checks.append(Check(f"{name}: at most", wedge, COULOMB, found, 0.0, kind=Kind.AT_MOST))
+                angles = np.radians([a.friction_angle, ROUGH])
+                least = stress_field(np.arctan(np.sin(angles[0])), angles[1], passive=True)
+                checks.append(Check(f"{name}: at least", least, DAVIS, found, 0.0, kind=Kind.AT_LEAST))
+                checks.append(Check(f"{name}: at most", log_spiral(*angles), RADENKOVIC, found, 0.0, kind=Kind.AT_MOST))
 
     if not quick:
         a, rows = runs["passive, rough, dilating"] = moved("passive", ROUGH, quick, dilation_angle=30.0)
