@@ -4,6 +4,7 @@
 #include "contact/touch.h"
 
 #include <cmath>
+#include <optional>
 
 namespace mpm::contact
 {
@@ -46,15 +47,20 @@ Matrix<D> identity()
 
 /// Distance of a place from the body, and its normal, where the body is.
 template <int D>
-Distance<D> distance_at(const Contact<D>& contact, const RigidBody<D>& body, const Vector<D>& x)
+Distance<D> distance_at(SeenSurface<D>& seen, const RigidBody<D>& body, const Vector<D>& x)
 {
-  auto [apart, normal] = distance<D>(contact.surface, as_at_start<D>(body, x));
+  const Surface<D>& surface = seen.contact.surface;
+  const Vector<D> as_it_was = as_at_start<D>(body, x);
+  std::optional<Distance<D>> found;
+  if (seen.within > 0)
+    found = distance_within<D>(surface, as_it_was, seen.parts, seen.within, seen.start);
+  const auto [apart, normal] = found ? *found : distance<D>(surface, as_it_was);
   return {apart, rotated<D>(body.rotation, normal)};
 }
 
 /// Derivative of the normal by the place: symmetric.
 template <int D>
-Matrix<D> curvature(const Contact<D>& contact, const RigidBody<D>& body, const Vector<D>& x, double length)
+Matrix<D> curvature(SeenSurface<D>& seen, const RigidBody<D>& body, const Vector<D>& x, double length)
 {
   Matrix<D> by{};
   for (int j = 0; j < D; ++j)
@@ -62,7 +68,7 @@ Matrix<D> curvature(const Contact<D>& contact, const RigidBody<D>& body, const V
     Vector<D> ahead = x, behind = x;
     ahead[j] += length;
     behind[j] -= length;
-    const Vector<D> a = distance_at<D>(contact, body, ahead).normal, b = distance_at<D>(contact, body, behind).normal;
+    const Vector<D> a = distance_at<D>(seen, body, ahead).normal, b = distance_at<D>(seen, body, behind).normal;
     for (int i = 0; i < D; ++i)
       by[i][j] = (a[i] - b[i]) / (ahead[j] - behind[j]);
   }
@@ -154,6 +160,15 @@ RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool a
   return body;
 }
 
+template <int D>
+SeenSurface<D> seen_from(const Contact<D>& contact, Index cell, double motion)
+{
+  constexpr double safe = 0.99; // places for differences are slightly beyond
+  const CellBound<D>& bound = contact.bounds[static_cast<std::size_t>(cell)];
+  return {contact, std::span<const Index>(contact.parts).subspan(bound.first, bound.last - bound.first),
+          bound.blind ? 0 : safe * (bound.sight - motion), bound.start};
+}
+
 template <class G>
 Spring spring_of(const Particles<G::dim>& particles, Index p, const ContactModuli& moduli, double penalty)
 {
@@ -173,13 +188,14 @@ EndRadius radius_at_end(const Particles<G::dim>& particles, Index p, double volu
 }
 
 template <int D>
-bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, double radius,
+bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, double radius,
                     const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch)
 {
+  const Contact<D>& contact = seen.contact;
   Vector<D> place;
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
-  const auto [apart, normal] = distance_at<D>(contact, end, place);
+  const auto [apart, normal] = distance_at<D>(seen, end, place);
   touch.normal = normal;
   const double overlap = (radius - apart) / spring.onset;
   if (overlap < -farthest)
@@ -199,7 +215,7 @@ bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Sp
   if (!tangent)
     return true;
 
-  const Matrix<D> h = curvature<D>(contact, end, place, difference_length * radius);
+  const Matrix<D> h = curvature<D>(seen, end, place, difference_length * radius);
   const double rises = 1 / (1 + std::exp(-overlap)); // d depth / d overlap
   touch.stiffness = combined<D>(spring.stiffness * rises, outer<D>(normal, normal), -spring.stiffness * touch.depth, h);
   for (int i = 0; i < D; ++i)
@@ -217,7 +233,7 @@ bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Sp
 }
 
 template <int D>
-EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
+EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
                         const Vector<D>& u, const Vector<D>& anchor)
 {
   const Vector<D> there = as_it_is<D>(end, anchor);
@@ -225,7 +241,7 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
   Vector<D> place;
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
-  touch.normal = distance_at<D>(contact, end, place).normal;
+  touch.normal = distance_at<D>(seen, end, place).normal;
   for (int i = 0; i < D; ++i)
   {
     touch.arm[i] = place[i] - end.displacement[i] - end.centre[i];
@@ -237,10 +253,11 @@ EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, cons
 }
 
 #define INSTANTIATE(D)                                                                                                 \
-  template EndTouch<D> tied_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,         \
+  template SeenSurface<D> seen_from<D>(const Contact<D>&, Index, double);                                              \
+  template EndTouch<D> tied_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,           \
                                       const Vector<D>&, const Vector<D>&);                                             \
   template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Motion<D>&);                    \
-  template bool touches_at_end<D>(const Contact<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,     \
+  template bool touches_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,       \
                                   const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

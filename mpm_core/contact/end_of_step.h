@@ -19,12 +19,28 @@
 
 #include "contact/contact.h"
 
+#include <span>
+
 namespace mpm::contact
 {
 /// The place and velocities of a body at the end of a step, by its prescribed motion; at rest where there is no time.
 /// @param driven  velocity along axes that are not prescribed, and spin of a body that rotates freely
 template <int D>
 RigidBody<D> body_at_end(const Contact<D>& contact, const TimeStep& step, bool at_rest, const Motion<D>& driven);
+
+/// A surface as it is seen from a cell: a search finds all that is so near among some of its parts.
+template <int D>
+struct SeenSurface
+{
+  const Contact<D>& contact;
+  std::span<const Index> parts;
+  double within; ///< [m]; where nothing is that near, all of the surface is searched
+  Index start;   ///< see `distance_within`
+};
+
+/// @param motion  of a place in the cell relative to the surface since the bounds of the cell were found, at most [m]
+template <int D>
+SeenSurface<D> seen_from(const Contact<D>& contact, Index cell, double motion);
 
 /// Moduli of soil [Pa].
 struct ContactModuli
@@ -71,18 +87,19 @@ struct EndTouch
   bool sticks = true;
 };
 
+/// @param seen    the surface, from the cell of the particle
 /// @param radius  of the particle at the step's end [m]
 /// @param x       place of the particle at the step's start [m]
 /// @param u       its displacement [m]
 /// @param old     elastic slip at the step's start [m]
 /// @returns whether it touches
 template <int D>
-bool touches_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, double radius,
+bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, double radius,
                     const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch);
 
 /// A particle that is tied to the body, as `touches_at_end`.
 /// @param anchor  the point of the body that it is tied to, where it was at the start [m]
 template <int D>
-EndTouch<D> tied_at_end(const Contact<D>& contact, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
+EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, const Vector<D>& x,
                         const Vector<D>& u, const Vector<D>& anchor);
 } // namespace mpm::contact

@@ -21,7 +21,7 @@ Vector<D> slip_of(const std::vector<Column>* slips, Index p)
 
 /// The particles of a run that touch a surface when the nodes move with a velocity over a time.
 template <class G, int D = G::dim>
-void find_touching(const Model<G>& model, const Contact<D>& contact, const std::vector<Column>* slips, const Run& run,
+void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector<Column>* slips, const Run& run,
                    const std::vector<Column>* bonds, std::span<const Vector<D>> velocity, double dt, double volumetric,
                    bool tangents, TrialContact<D>& trial)
 {
@@ -41,14 +41,14 @@ void find_touching(const Model<G>& model, const Contact<D>& contact, const std::
     TouchingParticle<D> found{p,
                               static_cast<Index>(run.cell),
                               {},
-                              spring_of<G>(model.particles, p, moduli, contact.penalty),
+                              spring_of<G>(model.particles, p, moduli, seen.contact.penalty),
                               radius_at_end<G>(model.particles, p, volumetric, u),
                               u};
     bool touches = bonds;
     if (bonds)
-      found.touch = tied_at_end<D>(contact, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
+      found.touch = tied_at_end<D>(seen, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
     else
-      touches = touches_at_end<D>(contact, trial.end, found.spring, found.radius.value, x, u, slip_of<D>(slips, p),
+      touches = touches_at_end<D>(seen, trial.end, found.spring, found.radius.value, x, u, slip_of<D>(slips, p),
                                   tangents, found.touch);
     if (touches)
       trial.touching.push_back(found);
@@ -121,11 +121,12 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
     {
       const auto cell = static_cast<std::size_t>(run.cell);
       const double gap = contact.bounds[cell].distance - contact.bounds[cell].reach - travelled;
-      if (!may_be_near<D>(extremes_of<G, D>(model.mesh, run, velocity, time.dt, model.particles), gap))
+      const Extremes extremes = extremes_of<G, D>(model.mesh, run, velocity, time.dt, model.particles);
+      if (!may_be_near<D>(extremes, gap))
         continue;
       const std::size_t before = trial.touching.size();
-      find_touching<G, D>(model, contact, slips, run, tied, velocity, time.dt, strains[cell].volumetric, tangents,
-                          trial);
+      const SeenSurface<D> seen = seen_from(contact, static_cast<Index>(run.cell), travelled + extremes.motion);
+      find_touching<G, D>(model, seen, slips, run, tied, velocity, time.dt, strains[cell].volumetric, tangents, trial);
       scatter<G, D>(model, run.cell, std::span<const TouchingParticle<D>>(trial.touching).subspan(before), tangents,
                     step);
     }

@@ -187,12 +187,14 @@ void add_rotating(Model<G>& model, std::size_t first, std::size_t last, Implicit
     Vector<D> old{};
     for (std::size_t i = 0; slips && i < D; ++i)
       old[i] = (*slips)[i][p];
+    const double motion = contact.travel + step_travel(contact, trial.end, step.dt) + norm<D>(particle.displacement);
+    SeenSurface<D> seen = seen_from(contact, particle.cell, motion);
     const auto touch_at = [&](const RigidBody<D>& end, const Vector<D>& u, double radius)
     {
       EndTouch<D> touch;
       if (bonds)
-        return tied_at_end<D>(contact, end, particle.spring, x, u, anchor_of<D>(*bonds, p));
-      touches_at_end<D>(contact, end, particle.spring, radius, x, u, old, false, touch);
+        return tied_at_end<D>(seen, end, particle.spring, x, u, anchor_of<D>(*bonds, p));
+      touches_at_end<D>(seen, end, particle.spring, radius, x, u, old, false, touch);
       return touch;
     };
     const auto by = derivatives_about<D>(trial.end, ends, particle, axes, length, touch_at);

@@ -4,6 +4,7 @@
 #include "boxes.h"
 
 #include "contact/contact.h"
+#include "contact/end_of_step.h"
 #include "particles/seed.h"
 
 #include <gtest/gtest.h>
@@ -157,3 +158,33 @@ TEST(ContactBounds, ForcesOfBoxes)
   compare<3>(Box<3>{{0.3, 0.35, 0.4}, {0.7, 0.6, 0.6}}, 5, 4);
 }
 TEST(ContactBounds, ForcesOfBalls) { compare<3>(Ball<3>{{0.5, 0.5, 0.5}, 0.2}, 5, 4); }
+
+TEST(ContactBounds, TouchesAtTheEndOfAStep)
+{
+  const Mesh<3> mesh = mpm::test::box<3>(6, 0.2).mesh();
+  Particles<3> particles;
+  seed_cells<Solid>(mesh, {}, 4, {0, 2000.0}, 0, particles);
+  Contact<3> contact = moving<3>(bumpy_ball(16));
+  begin_step<3>(mesh, {0, 1e-3}, contact);
+  const RigidBody<3> end = body_at_end(contact, {0, 1e-3}, false, {contact.body.velocity, contact.body.spin});
+  const Vector<3> u{1e-3, -5e-4, 7e-4};
+  const double motion = step_travel(contact, end, 1e-3) + norm<3>(u);
+  int touching = 0, seen_parts = 0;
+  for (Index p = 0; p < particles.size(); ++p)
+  {
+    const Vector<3> x = at<3>(particles.position, p);
+    const Spring spring = spring_of<Solid>(particles, p, {1e6, 3e5}, 0.2);
+    const double radius = particle_radius<Solid>(particles, p);
+    SeenSurface<3> near = seen_from(contact, particles.cell[p], motion), all{contact, {}, 0, -1};
+    EndTouch<3> quick, thorough;
+    const bool touches = touches_at_end<3>(near, end, spring, radius, x, u, {}, true, quick);
+    ASSERT_EQ(touches, touches_at_end<3>(all, end, spring, radius, x, u, {}, true, thorough));
+    ASSERT_EQ(quick.force, thorough.force);
+    ASSERT_EQ(quick.stiffness, thorough.stiffness);
+    ASSERT_EQ(quick.arm, thorough.arm);
+    touching += touches;
+    seen_parts += touches && near.within > radius;
+  }
+  EXPECT_GT(touching, 100);
+  EXPECT_GT(seen_parts, 0.9 * touching);
+}
