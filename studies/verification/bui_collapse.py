@@ -59,8 +59,8 @@ def run(quick: bool, folder) -> Result:
         checks.append(Check(f"height of the surface at {1e3 * at:.0f} mm", 1e3 * height, source, 1e3 * found,
                             0.06 if quick else 0.04, "mm", scale=1e3 * HEIGHT))  # fmt: skip
     expected, found = (np.interp(-THIN, -heights, places) for places, heights in (SURFACE.T, (middle, top)))
-    checks.append(Check(f"place where the bed is {1e3 * THIN:.0f} mm thick", 1e3 * expected, "experiment, between two points",
-                        1e3 * found, 0.1, "mm"))  # fmt: skip
+    checks.append(Check(f"position where the deposit is {1e3 * THIN:.0f} mm thick", 1e3 * expected,
+                        "experiment, between two points", 1e3 * found, 0.1, "mm"))  # fmt: skip
     checks.append(Check("kinetic energy at the end", 0.0, "at rest; over the energy set free", report.kinetic_energy, 0.001,
                         "J/m", scale=report.external_work))  # fmt: skip
     if comm.rank == 0:

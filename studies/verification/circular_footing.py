@@ -71,10 +71,10 @@ def run(quick: bool, folder) -> Result:
                 Check(f"N_c, {name}, cells of {sizes[-1]:g} m", exact, source, values[-1], 0.08 if quick else tolerance)
             )
             checks.append(
-                Check(f"N_c, {name}: it comes from above", exact, source, min(values), 0.0, kind=Kind.AT_LEAST)
+                Check(f"N_c, {name}: convergence from above", exact, source, min(values), 0.0, kind=Kind.AT_LEAST)
             )
             ratio = (values[-1] - exact) / (values[-2] - exact)
-            checks.append(Check(f"error of N_c over that on cells twice as large, {name}", 0.6, "falls with the cells", ratio,
+            checks.append(Check(f"error of N_c over that on cells twice as large, {name}", 0.6, "convergence", ratio,
                                 0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Pictures -------------------------------------------------------------------------------------------------

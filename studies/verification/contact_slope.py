@@ -151,15 +151,15 @@ def run(quick: bool, folder) -> Result:
         pairs = SLIDES[2:3] if quick else SLIDES
         ways = [slid(mesh, slope, friction) for slope, friction in pairs]
         for (slope, friction), (found, expected) in zip(pairs, ways, strict=True):
-            checks.append(Check(f"way of a block, θ = {slope}°, μ = {friction:g}, plane {mesh}", expected, "g (sin θ - μ cos θ)",
-                                found, TOLERANCE, "m"))  # fmt: skip
+            checks.append(Check(f"displacement of a block, θ = {slope}°, μ = {friction:g}, plane {mesh}", expected,
+                                "g (sin θ - μ cos θ)", found, TOLERANCE, "m"))  # fmt: skip
         steep = [(friction, found) for (slope, friction), (found, _) in zip(pairs, ways, strict=True) if slope == 30]
         computed[f"plane {mesh}"] = tuple(np.array(steep).T)
     for slope, friction in () if quick else STICKS:
-        checks.append(Check(f"creep of a block, θ = {slope}°, μ = {friction:g}, over the way without friction", 0.0, "it sticks",
-                            crept(slope, friction), TOLERANCE, scale=1.0))  # fmt: skip
-    checks.append(Check("fall of a block until it feels the plane", 0.2, "the gap; the error is a fraction of a cell", fallen(),
-                        0.05, "m", scale=CELL))  # fmt: skip
+        checks.append(Check(f"creep of a block, θ = {slope}°, μ = {friction:g}, over the displacement without friction", 0.0,
+                            "it sticks", crept(slope, friction), TOLERANCE, scale=1.0))  # fmt: skip
+    checks.append(Check("fall of a block before the plane acts on it", 0.2, "the gap; the error is a fraction of a cell",
+                        fallen(), 0.05, "m", scale=CELL))  # fmt: skip
     bodies = [
         ("cylinder", 30, 0.3),
         ("cylinder", 30, 0.1),
@@ -171,8 +171,8 @@ def run(quick: bool, folder) -> Result:
         found, turned, expected, expected_turn = rolled(shape, slope, friction)
         name, part = f"{shape}, θ = {slope}°, μ = {friction:g}", "2/3" if shape == "cylinder" else "5/7"
         source = f"{part} g sin θ: it rolls" if expected == expected_turn else "g (sin θ - μ cos θ): it slides"
-        checks.append(Check(f"way of a {name}", expected, source, found, TOLERANCE, "m"))
-        checks.append(Check(f"turn of a {name}, times its radius", expected_turn, source, turned, TOLERANCE, "m"))
+        checks.append(Check(f"displacement of a {name}", expected, source, found, TOLERANCE, "m"))
+        checks.append(Check(f"rotation of a {name}, times its radius", expected_turn, source, turned, TOLERANCE, "m"))
 
     if comm.rank == 0:
         friction = np.linspace(0.0, 0.55, 60)

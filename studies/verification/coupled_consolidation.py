@@ -189,13 +189,13 @@ def strip_checks(element, size, tolerance):
     body.advance(1e-7 * body.period)
     for depth in (0.5, 1.0, 2.0):
         _, p = body.at((0.0, -depth))
-        checks.append(Check(f"strip, pressure at once {depth:g} m below its middle over the load",
+        checks.append(Check(f"strip, initial pressure {depth:g} m below its middle over the load",
                             strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance,
                             scale=1.0, method=name))  # fmt: skip
     at_once = dip(body)
     body.drain(("surface", "footing"))
     body.advance(1e8 * body.period)
-    checks.append(Check("strip, settlement at once over the final one, ν = 0.2", 1 / (2 * (1 - poisson)),
+    checks.append(Check("strip, immediate settlement over the final one, ν = 0.2", 1 / (2 * (1 - poisson)),
                         "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0, method=name))  # fmt: skip
     return checks
 
@@ -224,7 +224,7 @@ def alternation(element, cells_high):
 def alternation_checks(cells_high):
     found = {name: alternation(element, cells_high) for element, name in NAMES.items()}
     return [
-        Check("strip, alternation of the pressure at once from node to node", found["P2-P1"], "the field of P2-P1", value, 0.1,
+        Check("strip, alternation of the initial pressure from node to node", found["P2-P1"], "the field of P2-P1", value, 0.1,
               kind=Kind.AT_MOST, method=name)
         for name, value in found.items() if name != "P2-P1"
     ]  # fmt: skip

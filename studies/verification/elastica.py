@@ -144,7 +144,7 @@ def run(quick: bool, folder) -> Result:
     meshes = (2, 4) if quick else (4, 8, 16)
     expected = {load: elastica(load)(1.0)[[3, 2]] * [1, -1] + [0, 1] for load in LOADS}
     checks, beams, errors, noise = [], {}, {}, {}
-    for name, moving in ((CROSSES, False), ("mesh goes with the beam", True)):
+    for name, moving in ((CROSSES, False), ("mesh moves with the beam", True)):
         errors[name], noise[name] = [], []
         for squares in meshes:
             beam = Beam(squares, moving)
@@ -157,7 +157,8 @@ def run(quick: bool, folder) -> Result:
                 if finest and load in LOADS:
                     tolerance = 0.25 if quick else 0.05
                     for part, want, got in zip(("across", "along"), expected[load], beam.tip_displacement()):
-                        checks.append(Check(f"tip {part} over L, P L²/EI' = {load:g}, {squares} squares over the height, {name}",
+                        quantity = f"deflection of the tip {part} over L, P L²/EI' = {load:g}"
+                        checks.append(Check(f"{quantity}, {squares} squares over the height, {name}",
                                             want, "elastica, boundary value problem by collocation", got, tolerance))  # fmt: skip
             errors[name].append(abs(beam.tip_displacement()[0] / expected[LOADS[-1]][0] - 1))
             noise[name].append(scatter(beam, LOADS[-1]))

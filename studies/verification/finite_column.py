@@ -83,7 +83,7 @@ def run(quick: bool, folder) -> Result:
     meshes = (5, 10) if quick else (10, 20, 40)
     checks, errors = [], {}
     for name, per_cell, steps, integration, moving in (
-        ("mesh goes with them", 3, STEPS, PLAIN, True),
+        ("mesh moves with them", 3, STEPS, PLAIN, True),
         ("mixed, 24 particles a cell", 24, STEPS, MIXED, False),
         ("mixed, 24 particles a cell, 40 steps", 24, 40, MIXED, False),
         ("66 particles a cell", 66, STEPS, PLAIN, False),

@@ -155,7 +155,7 @@ def acceleration_checks(quick):
 
 
 def level_ground_checks(method, conductivity):
-    """The water falls by 5 m within an hour, and nothing happens."""
+    """The water level falls by 5 m within an hour, and nothing happens."""
     soil = mpm.LinearElastic(young=5e6, poisson=0.3)
     ground = bridge.box_mesh(comm, (2.0, 3.0), (4, 6))
     weight = 2000.0 * GRAVITY
@@ -172,7 +172,7 @@ def level_ground_checks(method, conductivity):
             body.model.boundary = [water.Reservoir(TOP, level)]
         body.advance(720.0)
     elastic = 5.0 * WATER * 3.0 / soil.p_wave_modulus
-    name, where = METHODS[method], f"water falls by 5 m over level ground, k = {conductivity:g} m/s"
+    name, where = METHODS[method], f"water level falls by 5 m over level ground, k = {conductivity:g} m/s"
     return [
         Check(f"{where}: change of the effective stress over that of the water", 0.0, "load and pore pressure fall alike",
               (body.mean_stress()[1] - stress) / (5.0 * WATER), 1e-5, scale=1.0, method=name),

@@ -88,7 +88,7 @@ def drainage(element, cells):
                                     pressure[-1] / 1e3, 0.01, "kPa", method=name))  # fmt: skip
                 checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved[-1, 1],
                                     0.01, "mm", method=name))  # fmt: skip
-                checks.append(Check(f"water that is missing after the step to {time} s, over the pores", 0.0, "balance",
+                checks.append(Check(f"error of the water balance after the step to {time} s, over the pores", 0.0, "balance",
                                     report.water_error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
     return checks, profiles
 
@@ -171,7 +171,7 @@ def drainage_of_particles(cells):
                 checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved, 0.01, "mm",
                                     method=name))  # fmt: skip
                 error = model.water_volume() - held - (model.water_inflow() - entered)
-                checks.append(Check(f"water that is missing after the step to {time} s, over the pores", 0.0, "balance",
+                checks.append(Check(f"error of the water balance after the step to {time} s, over the pores", 0.0, "balance",
                                     error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
     return checks
 

@@ -77,7 +77,7 @@ def run(quick: bool, folder) -> Result:
     if not quick:
         coarse, fine = pulled("rough", 2 * cell_size)[0], checks[-1].computed
         ratio = abs(fine - exact("rough")) / abs(coarse - exact("rough"))
-        checks.append(Check("error of the factor of a rough pipe, over that on cells twice as large", 0.6, "falls with the cells",
+        checks.append(Check("error of the factor of a rough pipe, over that on cells twice as large", 0.6, "convergence",
                             ratio, 0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Picture --------------------------------------------------------------------------------------------------

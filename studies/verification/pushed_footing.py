@@ -59,13 +59,13 @@ def run(quick: bool, folder) -> Result:
         tolerance = 0.15 if quick else TOLERANCES[shape]
         checks.append(Check(f"N_c, {base} {shape} footing", exact, source, found, tolerance))
         checks.append(
-            Check(f"N_c, {base} {shape} footing: it comes from above", exact, source, found, 0.0, kind=Kind.AT_LEAST)
+            Check(f"N_c, {base} {shape} footing: convergence from above", exact, source, found, 0.0, kind=Kind.AT_LEAST)
         )
 
     if not quick:
         exact, coarse = footing_push.EXACT["strip", "smooth"], pushed("strip", "smooth", COARSE)[0]
         ratio = (checks[0].computed - exact) / (coarse - exact)
-        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6, "falls with the cells", ratio,
+        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6, "convergence", ratio,
                             0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Picture --------------------------------------------------------------------------------------------------

@@ -92,7 +92,7 @@ def moments(model):
 
 
 def run(quick: bool, folder) -> Result:
-    # --- 3. Elastic: the difference falls with the cells -------------------------------------------------------------
+    # --- 3. Elastic: the difference decreases with the cell size -------------------------------------------------------------
     sizes, checks, errors = (4, 8) if quick else (4, 8, 12), [], {}
     found = {name: [elastic(dim, n) for n in sizes] for name, dim in ((HALF, 2), (QUARTER, 3))}
     for k, what in enumerate(
@@ -104,7 +104,7 @@ def run(quick: bool, folder) -> Result:
                             0.04 if quick else 0.02, "mm"))  # fmt: skip
     total = [np.linalg.norm(np.array(a) / np.array(b) - 1) for a, b in zip(found[QUARTER], found[HALF])]
     checks.append(Check(f"difference with {sizes[-1]} cells over that with {sizes[0]}, elastic", sizes[0] / sizes[-1],
-                        "at least in proportion to the cells", total[-1] / total[0], 0.0, kind=Kind.AT_MOST))  # fmt: skip
+                        "at least in proportion to the cell size", total[-1] / total[0], 0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 4. Collapse -------------------------------------------------------------------------------------------------
     sizes_of_sand = (4, 6) if quick else (4, 8, 12)
@@ -127,8 +127,8 @@ def run(quick: bool, folder) -> Result:
         )
     total = np.linalg.norm(list(errors_of_sand.values()), axis=0)
     checks.append(Check(f"difference with {sizes_of_sand[-1]} cells over that with {sizes_of_sand[0]}, collapse",
-                        sizes_of_sand[0] / sizes_of_sand[-1], "at least in proportion to the cells", total[-1] / total[0], 0.1,
-                        kind=Kind.AT_MOST))  # fmt: skip
+                        sizes_of_sand[0] / sizes_of_sand[-1], "at least in proportion to the cell size", total[-1] / total[0],
+                        0.1, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 5. Pictures -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

@@ -24,9 +24,9 @@ from common.earth_pressure import stress_field
 from mpi4py import MPI
 
 ROUGH = 20.0  # degrees
-RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "field of stresses, Lancellotta 2002", "plane wedge, Coulomb 1776"
-SPIRAL = "soil that turns on a log-spiral"
-DAVIS = "field of stresses, strength at constant volume, Davis 1968"
+RANKINE, LANCELLOTTA, COULOMB = "Rankine 1857", "stress field, Lancellotta 2002", "plane wedge, Coulomb 1776"
+SPIRAL = "soil that rotates on a log-spiral"
+DAVIS = "stress field, strength at constant volume, Davis 1968"
 RADENKOVIC = "log-spiral, sand that dilates, Radenkovic 1961"
 
 

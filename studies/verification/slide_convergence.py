@@ -87,7 +87,7 @@ def slide(
 
 def alike(name: str, reference: Slide, other: Slide, tolerance: float, of_run_out: float | None = None) -> list[Check]:
     """Checks that a variant slides as far as the reference; the run-out may have a tolerance of its own."""
-    source = "no theory; the same slide otherwise"
+    source = "no closed form; the same slide otherwise"
     of_run_out = tolerance if of_run_out is None else of_run_out
     return [
         Check(f"crest, {name}", reference.crest, source, other.crest, tolerance, "m"),

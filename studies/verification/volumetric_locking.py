@@ -34,7 +34,7 @@ def run(quick: bool, folder) -> Result:
             Check(f"error of plain triangles, {name}", LOCKED, f"{source}; they lock", errors["plain"][-1], 0.0,
                   kind=Kind.AT_LEAST),
             Check(f"error with NMD, {name}", 0.0, source, errors["NMD"][-1], FREE, scale=1.0),
-            Check(f"the same over that on the mesh before, {name}", 0.6, "convergence", errors["NMD"][-1] / errors["NMD"][-2],
+            Check(f"error over that on the next coarser mesh, {name}", 0.6, "convergence", errors["NMD"][-1] / errors["NMD"][-2],
                   0.0, kind=Kind.AT_MOST),
         ]  # fmt: skip
         if MPI.COMM_WORLD.rank == 0:
