@@ -83,7 +83,7 @@ def run(quick: bool, folder) -> Result:
             }
             ends = np.array([0.0, max(x.max() for x, _ in curves.values())])
             lines = {
-                f"{name}, field of stresses": (ends, np.full(2, wall.bounds(a)[0]))
+                f"{name}, stress field": (ends, np.full(2, wall.bounds(a)[0]))
                 for name, (a, _) in chosen.items()
                 if a.dilation_angle == 0
             }
