@@ -24,7 +24,7 @@ from common.field_plots import gathered
 from common.figures import Pictures
 from common.files import OutputError
 from common.movie import PORE, particle_movie
-from common.options import add_count, add_flag, add_number, study_parser
+from common.options import add_count, add_flag, add_number, add_switch, study_parser
 from common.page import Page
 from common.plots import DISPLACEMENT, save_particles
 from common.progress import Progress
@@ -57,6 +57,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--first-step", 0.5, "days", "first step", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
     add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
+    add_switch(p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking")
     add_flag(p, "--particles", "compute implicit particles as well; the reservoirs must keep the ground under water")
     add_particles_per_cell(p, 3)
     return p
@@ -191,11 +192,11 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     folder = open_results(a, comm)
     site = read_consolidation_site(a.site, comm, a.cell_size)
-    model = site.at_rest(ELEMENTS[a.elements])
+    model = site.at_rest(ELEMENTS[a.elements], a.nmd and a.elements == "P1-P1")
     with ExitStack() as stack:
         particles = None
         if a.particles:
-            particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, folder))
+            particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, a.nmd, folder))
         files = stack.enter_context(Files(model, site, folder, particles))
         files.row()
         stopped = follow(a, model, files)

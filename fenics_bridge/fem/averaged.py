@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import ufl
 from dolfinx import fem, la
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -13,8 +14,10 @@ from petsc4py import PETSc
 from fenics_bridge import compat
 from fenics_bridge.fem.averaged_stiffness import AssembledStiffness, FactoredStiffness
 from fenics_bridge.fem.averaged_strain import AveragedStrain
+from fenics_bridge.fem.fields import assembled as assembled_form
 from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.fem.kinematics import Kinematics
+from fenics_bridge.fem.stiffness import Stiffness
 from fenics_bridge.mesh.background import global_numbers
 from fenics_bridge.types import Law
 from mpm_core import _core
@@ -46,6 +49,7 @@ class AveragedKinematics:
         geometry: plane strain, axial symmetry or a solid.
         as_particles: average by the fractions of explicit steps.
         assembled: whether `stiffness` is a matrix of PETSc, for a direct solver; else it stays in factors, for an iterative one.
+        further: on a mixed space as for `Kinematics`; `stiffness` is then a matrix.
     """
 
     def __init__(
@@ -57,17 +61,29 @@ class AveragedKinematics:
         geometry: Geometry | None = None,
         as_particles: bool = False,
         assembled: bool = True,
+        further: Callable[[Any, Any], tuple[Any, Any]] | None = None,
     ) -> None:
-        self._increment, self._points, self._as_particles = increment, points, as_particles
+        self._increment, self._points, self._constraints = increment, points, constraints
+        self._as_particles = as_particles
         self._space = increment.function_space
-        nodes, gradients, volumes, radii = self._cells(geometry == Geometry.AXISYMMETRIC)
-        comm, n_nodes = self._space.mesh.comm, self._space.dofmap.index_map.size_local
-        self._n_dofs = n_nodes * self._space.mesh.geometry.dim
-        self._strain = AveragedStrain(comm, n_nodes, nodes, gradients, volumes, radii, points.material >= 0)
-        self._forces = la.vector(self._space.dofmap.index_map, self._space.dofmap.index_map_bs)
-        self._held = constraints.dofs[constraints.dofs < self._n_dofs]
-        self._assembled = AssembledStiffness(self._strain, self._held) if assembled else None
+        index_map, block = self._space.dofmap.index_map, self._space.dofmap.index_map_bs
+        self._n_dofs = index_map.size_local * block
+        self._forces = la.vector(index_map, block)
+        displacements, dofs = self._displacements(further is not None)
+        dofs, nodes, gradients, volumes, radii = self._cells(displacements, dofs, geometry == Geometry.AXISYMMETRIC)
+        n_own = self._n_dofs, displacements.dofmap.index_map.size_local
+        self._strain = AveragedStrain(
+            self._space.mesh.comm, n_own, dofs, nodes, gradients, volumes, radii, points.material >= 0
+        )
+        self._assembled = AssembledStiffness(self._strain) if assembled else None
         self._without = None if assembled else Kinematics(increment, points, constraints, geometry)
+        self._more: tuple[Any, Stiffness] | None = None
+        if further is not None:
+            test, trial = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
+            forces, stiffness = further(test, trial)
+            # A matrix without a place on the diagonal takes no boundary condition; the terms need not be in all cells.
+            nothing = fem.Constant(self._space.mesh, 0.0) * ufl.inner(trial, test) * ufl.dx(degree=1)
+            self._more = fem.form(forces), Stiffness(stiffness + nothing, constraints)
         self.follow(laws)
 
     def follow(self, laws: Sequence[Law]) -> None:
@@ -90,33 +106,60 @@ class AveragedKinematics:
 
     def internal_forces(self, stress: NDArray[np.float64]) -> Any:
         """Nodal forces of a stress (n, S) as a vector (`dolfinx.la`), ghosts up to date. Collective."""
-        self._forces.array[: self._n_dofs] = self._strain.forces(stress)
+        if self._more is not None:
+            assembled_form(self._more[0], self._space, self._forces)
+        else:
+            self._forces.array[:] = 0.0
+        self._forces.array[: self._n_dofs] += self._strain.forces(stress)
         compat.forward(self._forces)
         return self._forces
 
     def stiffness(self) -> PETSc.Mat | FactoredStiffness:
         """Stiffness of the cells' present tangent, without the rows and columns of the supports. Collective."""
-        if self._assembled is not None:
-            return self._assembled.with_tangent(self._points.tangent)
-        return FactoredStiffness(self._strain, self._held, self._without, self._points.tangent)
+        dofs = self._constraints.dofs
+        held = dofs[dofs < self._n_dofs]
+        if self._assembled is None:
+            return FactoredStiffness(self._strain, held, self._without, self._points.tangent)
+        more = self._more[1].assembled() if self._more is not None else None
+        return self._assembled.with_tangent(self._points.tangent, held, more)
 
-    def _cells(self, axisymmetric: bool) -> tuple[Any, ...]:
-        """Nodes, gradients of shape functions, volumes and radii of the owned cells.
+    def _displacements(self, mixed: bool) -> tuple[Any, NDArray[np.integer]]:
+        """Space of the displacement, and its dofs in the space of the increment, (nodes, D), ghosts included."""
+        dim = self._space.mesh.geometry.dim
+        if mixed:
+            space, dofs = self._space.sub(0).collapse()
+            return space, np.asarray(dofs).reshape(-1, dim)
+        index_map = self._space.dofmap.index_map
+        return self._space, np.arange((index_map.size_local + index_map.num_ghosts) * dim).reshape(-1, dim)
+
+    def _cells(self, space: Any, dofs: NDArray[np.integer], axisymmetric: bool) -> tuple[Any, ...]:
+        """Degrees of freedom, nodes, gradients of shape functions, volumes and radii of the owned cells.
+
+        Args:
+            space: space of the displacement.
+            dofs: its dofs in the space of the increment, (nodes, D).
+            axisymmetric: whether the body is.
 
         Returns:
-            Global nodes (m, D + 1), gradients (m, D + 1, D) [1/m], volumes (m,), those of one radian in an axisymmetric body, and
-            the radii (m,) of the centroids in such a body, else None.
+            Global dofs (m, D + 1, D), global nodes (m, D + 1), gradients (m, D + 1, D) [1/m], volumes (m,), those of one radian in
+            an axisymmetric body, and the radii (m,) of the centroids in such a body, else None.
         """
-        dim = self._space.mesh.geometry.dim
-        local = compat.cell_dofs(self._space)[self._points.cells]
-        corners = self._space.tabulate_dof_coordinates()[local][:, :, :dim]
+        dim, block = space.mesh.geometry.dim, self._space.dofmap.index_map_bs
+        local = compat.cell_dofs(space)[self._points.cells]
+        corners = space.tabulate_dof_coordinates()[local][:, :, :dim]
         edges = corners[:, 1:] - corners[:, :1]
         inner = np.swapaxes(np.linalg.inv(edges), 1, 2)
         gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
-        index_map = self._space.dofmap.index_map
-        numbers = global_numbers(index_map, index_map.size_local + index_map.num_ghosts)
+        numbers, nodes = (_numbers(each) for each in (self._space, space))
+        columns = block * numbers[dofs[local] // block] + dofs[local] % block
         volumes = np.abs(np.linalg.det(edges)) / (2 if dim == 2 else 6)
         if not axisymmetric:
-            return numbers[local], gradients, volumes, None
+            return columns, nodes[local], gradients, volumes, None
         radii = corners[:, :, 0].mean(axis=1)
-        return numbers[local], gradients, radii * volumes, radii
+        return columns, nodes[local], gradients, radii * volumes, radii
+
+
+def _numbers(space: Any) -> NDArray[np.integer]:
+    """Global numbers of the nodes of a space on this rank, ghosts included."""
+    index_map = space.dofmap.index_map
+    return global_numbers(index_map, index_map.size_local + index_map.num_ghosts)

@@ -17,15 +17,13 @@ class AssembledStiffness:
 
     Args:
         strain: the averaged strain.
-        held: places of the supported dofs among this rank's own ones.
 
     Note:
         Collective.
     """
 
-    def __init__(self, strain: AveragedStrain, held: NDArray[np.integer]) -> None:
+    def __init__(self, strain: AveragedStrain) -> None:
         self._strain = strain
-        self._held = (strain.plain.getOwnershipRangeColumn()[0] + held).astype(np.int32)
         self._comm = strain.plain.comm.tompi4py()
         size, n = strain.size, len(strain.volumes)
         first = self._comm.scan(n) - n
@@ -43,8 +41,19 @@ class AssembledStiffness:
         self._product: PETSc.Mat | None = None
         self._averages: NDArray[np.float64] | None = None
 
-    def with_tangent(self, tangent: NDArray[np.float64]) -> PETSc.Mat:
-        """The matrix of a tangent (n, S, S) [Pa]. Collective."""
+    def with_tangent(
+        self, tangent: NDArray[np.float64], held: NDArray[np.integer], more: PETSc.Mat | None = None
+    ) -> PETSc.Mat:
+        """The matrix of a tangent.
+
+        Args:
+            tangent: tangent of the cells (n, S, S) [Pa].
+            held: places of the prescribed dofs among this rank's own ones, whose rows and columns are those of the identity.
+            more: matrix that is added; None for none.
+
+        Note:
+            Collective.
+        """
         self._follow()
         weighted = self._strain.volumes[:, None, None] * tangent
         self._tangent.setValuesCSR(*compressed(self._columns, weighted.reshape(-1, self._strain.size)))
@@ -52,7 +61,9 @@ class AssembledStiffness:
         self._stresses = self._tangent.matMult(self._whole, self._stresses)
         product = self._transposed.matMult(self._stresses, self._product)
         self._product, found = product, product.copy()  # the places of the first are kept for the next product
-        found.zeroRowsColumns(self._held, 1.0)
+        if more is not None:
+            found.axpy(1.0, more, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        found.zeroRowsColumns((self._strain.plain.getOwnershipRangeColumn()[0] + held).astype(np.int32), 1.0)
         return found
 
     def _follow(self) -> None:

@@ -19,8 +19,9 @@ class AveragedStrain:
 
     Args:
         comm: ranks of the body.
-        n_nodes: number of this rank's own nodes.
-        nodes: global numbers of the nodes of this rank's cells, (n, D + 1).
+        n_own: numbers of this rank's own degrees of freedom and nodes.
+        dofs: global numbers of the degrees of freedom for the displacements of the nodes of this rank's cells, (n, D + 1, D).
+        nodes: global numbers of these nodes, (n, D + 1).
         gradients: gradients of the shape functions [1/m], (n, D + 1, D).
         volumes: volumes of the cells, those of one radian in an axisymmetric body, (n,).
         radii: radii of the centroids [m] in an axisymmetric body, (n,), else None.
@@ -33,14 +34,15 @@ class AveragedStrain:
     def __init__(
         self,
         comm: MPI.Comm,
-        n_nodes: int,
+        n_own: tuple[int, int],
+        dofs: NDArray[np.integer],
         nodes: NDArray[np.integer],
         gradients: NDArray[np.float64],
         volumes: NDArray[np.float64],
         radii: NDArray[np.float64] | None,
         present: NDArray[np.bool_],
     ) -> None:
-        n, corners, dim = gradients.shape
+        (n, corners, dim), (n_dofs, n_nodes) = gradients.shape, n_own
         self.size = 4 if dim == 2 else 6
         """Components of strain"""
         self.normal = dim if radii is None else 3
@@ -49,9 +51,8 @@ class AveragedStrain:
         """Volumes of the cells (n,)"""
         self.of_strains, self.of_forces = np.ones(n), np.ones(n)
         """Fraction by which a cell's strains, and its forces, are averaged, (n,)"""
-        dofs = (dim * nodes[:, :, None] + np.arange(dim)).reshape(n, -1)
-        rows = _strain_rows(gradients, radii)
-        self.plain = matrix(comm, (n * self.size, n_nodes * dim), np.repeat(dofs, self.size, axis=0), rows)
+        rows, columns = _strain_rows(gradients, radii), np.repeat(dofs.reshape(n, -1), self.size, axis=0)
+        self.plain = matrix(comm, (n * self.size, n_dofs), columns, rows)
         """The plain strain"""
         to_nodes = matrix(comm, (n, n_nodes), nodes, (volumes * present)[:, None]).transpose()
         around = to_nodes.getRowSum()

@@ -9,13 +9,14 @@ from mpm_core.setup_warnings import locking, locks_at_failure
 
 if TYPE_CHECKING:
     from fenics_bridge.fem.quasi_static import QuasiStatic
+    from fenics_bridge.water.consolidation import Consolidation
 
 
-def warn_of_locking(model: QuasiStatic) -> None:
+def warn_of_locking(model: QuasiStatic | Consolidation, instead: str = "elements of degree=2 or 4 hardly lock") -> None:
     """Warn where the laws of a new model keep the volume of the soil whatever happens. Collective."""
     text = locking(model.laws) if _is_plain(model) else ""  # on all ranks, since `laws` is collective
     if text and model.domain.comm.rank == 0:
-        warnings.warn(f"{text}; elements of degree=2 or 4 hardly lock", RuntimeWarning, stacklevel=3)
+        warnings.warn(f"{text}; {instead}", RuntimeWarning, stacklevel=3)
 
 
 def warn_of_locking_at_failure(model: Any) -> None:

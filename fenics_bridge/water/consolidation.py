@@ -14,11 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.fem.active_cells import cells_there
+from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.loads import Load, LoadVectors
+from fenics_bridge.fem.locking import warn_of_locking
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -64,6 +66,8 @@ class Consolidation(ConsolidationResults):
         load: load, or function of the time [s] that returns one; unit weights are those of the saturated soil, pressures are
             total stresses.
         element: elements of displacement and pressure.
+        nmd: average volumetric strains of the soil over nodes (nodal mixed discretisation), for `Element.STABILISED`; as the
+            pore water, the soil then keeps the volume around each node instead of that of each cell.
         cell_tags: tags of the cells; needed where laws, soils or unit weights are given by cell tag.
         geometry: as for `QuasiStatic`.
         unit_weight: unit weight of water [N/m3].
@@ -90,6 +94,7 @@ class Consolidation(ConsolidationResults):
         boundary: Iterable[WaterBoundary],
         load: Load | Callable[[float], Load] | None = None,
         element: Element = Element.TAYLOR_HOOD,
+        nmd: bool = False,
         cell_tags: MeshTags | None = None,
         geometry: Geometry | None = None,
         unit_weight: float = WATER_WEIGHT,
@@ -98,7 +103,7 @@ class Consolidation(ConsolidationResults):
         options_prefix: str = "consolidation_",
         inertia: Newmark | None = None,
     ) -> None:
-        agree(domain.comm, _first_mistake(element, soil, unit_weight, water_modulus, geometry, inertia))
+        agree(domain.comm, _first_mistake(element, nmd, soil, unit_weight, water_modulus, geometry, inertia))
         self.domain = domain
         """Mesh of the body"""
         self.geometry = geometry_of(domain, geometry)
@@ -134,7 +139,9 @@ class Consolidation(ConsolidationResults):
         self._wet = cells_there(domain, cell_tags, ())
         self._wet.x.array[np.setdiff1d(np.arange(len(self._wet.x.array)), np.concatenate(self._soils[2]))] = 0.0
         self._held, self._holding = 0.0, (0.0, 0.0)
-        self._element = element
+        self.degree = element.value
+        """Degree of the displacement"""
+        self._element, self._nmd = element, nmd
         self.pressure = fem.Function(self._pressures[0], name="pore_pressure")
         """Pore pressure [Pa], a function that is linear in each cell, compression positive"""
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
@@ -142,6 +149,7 @@ class Consolidation(ConsolidationResults):
         """Velocity and acceleration; None in quasi-static steps"""
         self._assemble(options_prefix, inertia)
         self._external = self._loads.forces(Load())
+        warn_of_locking(self, "Element.TAYLOR_HOOD hardly locks")
 
     def __repr__(self) -> str:
         laws = map(repr, self._laws)
@@ -208,9 +216,11 @@ class Consolidation(ConsolidationResults):
         agree(self.domain.comm, "boundary: no head, reservoir, seepage face or rain, incompressible water and supports all "
               "around; the pressure is undetermined" if free else None)  # fmt: skip
         body = self._body
-        body.kinematics = Kinematics(
-            body.increment, self.points, body.constraints, self.geometry, self._terms.forms(self._applied)
-        )
+        parts, further = (body.increment, self.points, body.constraints), self._terms.forms(self._applied)
+        if self._nmd:
+            body.kinematics = AveragedKinematics(*parts, self._laws, self.geometry, further=further)
+        else:
+            body.kinematics = Kinematics(*parts, self.geometry, further)
         there = self._there if len(self.off) else None
         self._reservoirs = ReservoirLoads(
             self._space, self._facet_tags, self._applied, self._weights[0], self.radius, there
@@ -398,10 +408,12 @@ def _largest_conductivity(soils: Any) -> float:
 
 
 def _first_mistake(
-    element: Any, soil: Any, unit_weight: Any, water_modulus: float, geometry: Any, inertia: Any
+    element: Any, nmd: bool, soil: Any, unit_weight: Any, water_modulus: float, geometry: Any, inertia: Any
 ) -> str | None:
     if not isinstance(element, Element):
         return f"element: got {element!r}, expected one of {', '.join(map(str, Element))}"
+    if nmd and element != Element.STABILISED:
+        return f"nmd: averages strains of linear elements, Element.STABILISED, got element={element}"
     for one in soil.values() if isinstance(soil, dict) else [soil]:
         retention = getattr(one, "retention", None)
         if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):

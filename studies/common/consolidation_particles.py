@@ -24,15 +24,18 @@ class ParticleGround:
     Args:
         site: the ground; fem: its finite elements at the beginning.
         per_cell: particles per cell.
+        nmd: average volumetric strains over nodes.
         folder: where the particles are written to.
 
     Note:
         Collective, as its methods are.
     """
 
-    def __init__(self, site: ConsolidationSite, fem: water.Consolidation, per_cell: int, folder: Path) -> None:
-        self.model = site.particles(fem, per_cell)
-        self._site, self._steps = site, SmallMotion(self.model)
+    def __init__(
+        self, site: ConsolidationSite, fem: water.Consolidation, per_cell: int, nmd: bool, folder: Path
+    ) -> None:
+        self.model = site.particles(fem, per_cell, nmd)
+        self._site, self._steps = site, SmallMotion(self.model, nmd)
         self._places = np.array(list(site.points.values()))
         self.model.add_field("initial_pore_pressure", unit="Pa", meaning="Pore pressure at the beginning")
         self.model.add_field("excess_pore_pressure", unit="Pa", meaning="Pore pressure above that at the beginning")

@@ -53,8 +53,12 @@ class ConsolidationSite:
         """Weights and pressures at a time [s]."""
         return bridge.Load(self.unit_weight, {tag: value_at(given, time) for tag, given in self.pressures.items()})
 
-    def at_rest(self, element: water.Element) -> water.Consolidation:
+    def at_rest(self, element: water.Element, nmd: bool = False) -> water.Consolidation:
         """The ground at the beginning: in equilibrium under its weight, the pressures at time 0 and the steady flow. Collective.
+
+        Args:
+            element: elements of displacement and pressure.
+            nmd: average volumetric strains of linear elements over nodes.
 
         Raises:
             RunError: it cannot carry them.
@@ -63,19 +67,28 @@ class ConsolidationSite:
         flow = water.Seepage(domain, self.soils, facet_tags, self.boundary, cell_tags=cell_tags)
         flow.solve()
         fem = bridge.QuasiStatic(
-            domain, self.laws, facet_tags, self.supports, element.value, cell_tags=cell_tags, options_prefix="rest_"
+            domain,
+            self.laws,
+            facet_tags,
+            self.supports,
+            element.value,
+            nmd,
+            cell_tags=cell_tags,
+            options_prefix="rest_",
         )
         fem.reconfigure(pore_pressure=flow.pore_pressure())
         fem.solve(self.load(0.0))
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
         model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
-                                    element=element, cell_tags=cell_tags)  # fmt: skip
+                                    element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
         model.initialise(fem, flow)
         return model
 
-    def particles(self, fem: water.Consolidation, per_cell: int) -> mpm.Model:
+    def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
+
+        With averaged strains, `nmd`, they are so as they are; an equilibration would take forces without averages.
 
         Raises:
             InputError: the water has a boundary condition other than reservoirs.
@@ -96,7 +109,7 @@ class ConsolidationSite:
             anisotropy=anisotropy if any(factors is not None for factors in anisotropy) else None,
         )
         self.load_particles(model, fem.time)
-        bridge.initialise(model, fem)
+        bridge.initialise(model, fem, equilibrate=not nmd)
         return model
 
     def load_particles(self, model: mpm.Model, time: float) -> None:

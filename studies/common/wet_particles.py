@@ -15,10 +15,11 @@ class SmallMotion:
 
     Args:
         model: particles with pore water.
+        nmd: average volumetric strains over nodes.
     """
 
-    def __init__(self, model: mpm.Model) -> None:
-        self.model = model
+    def __init__(self, model: mpm.Model, nmd: bool = False) -> None:
+        self.model, self._nmd = model, nmd
         self.moved = np.zeros(model.mesh.points.shape)
         """Displacement of the nodes [m], shape (n, D)"""
 
@@ -28,7 +29,8 @@ class SmallMotion:
         Raises:
             RunError: a step does not converge.
         """
-        for report in self.model.implicit(until, dt=dt, quasi_static=True, small_displacements=True, every_steps=1):
+        options = {"quasi_static": True, "small_displacements": True, "nmd": self._nmd}
+        for report in self.model.implicit(until, dt=dt, every_steps=1, **options):
             self.moved += report.dt * self.model.nodal("velocity")
             yield report
 

@@ -28,7 +28,7 @@ class Column:
     porosity = 0.4
 
     def __init__(self, element, cells, dim=2, boundary=None, load=10e3, buoyant=0.0, conductivity=1e-8, poisson=0.3,
-                 water_modulus=np.inf, comm=MPI.COMM_WORLD):  # fmt: skip
+                 water_modulus=np.inf, comm=MPI.COMM_WORLD, nmd=False):  # fmt: skip
         self.width, self.size, self.load, self.buoyant = 0.2, load + buoyant, load, buoyant
         side = [self.width] * (dim - 1)
         domain, _, facet_tags = bridge.box_mesh(comm, (*side, 1.0), (*[2] * (dim - 1), cells))
@@ -49,6 +49,7 @@ class Column:
             [water.Head(top, 1.0)] if boundary is None else boundary,
             load=bridge.Load(unit_weight=GRAVITY_OF_WATER + buoyant, pressure={top: load}),
             element=element,
+            nmd=nmd,
             water_modulus=water_modulus,
         )
         self.top, self.base = np.append(side, 1.0), np.append(side, 0.0)

@@ -181,6 +181,7 @@ def make(**options):
     "options, words",
     [
         ({"element": 2}, "element: got 2, expected one of Element.TAYLOR_HOOD"),
+        ({"nmd": True}, "nmd: averages strains of .* Element.STABILISED, got element=Element.TAYLOR_HOOD"),
         ({"boundary": [water.Reservoir(9, 1.0)]}, "no facet has the tag 9"),
         ({"boundary": [water.Head(TOP, np.nan)]}, "level is nan"),
         ({"soil": 1e-7}, "expected a PorousSoil"),
