@@ -150,6 +150,10 @@ class EquilibriumStep:
         n = self._n_owned
         return self._comm.allreduce(float(np.dot(self._residual_vector.array[:n], self._correction.x.array[:n])))
 
+    def wants_more(self, tolerance: float) -> bool:
+        """Whether a residual below the tolerance is not enough: it is."""
+        return False
+
     def keep(self) -> None:
         """Make this the last point of the iteration."""
         self._base[:] = self._body.increment.x.array

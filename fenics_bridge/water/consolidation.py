@@ -306,7 +306,7 @@ class Consolidation(ConsolidationResults):
             self._projection.write(self._terms.projection, dt, None if self.motion is None else self.motion.method.beta)
         if self.motion is not None:
             self.motion.begin(dt)
-        report, active, iterations, reason = self._solved(external, load.displacement, end, dt)
+        report, active, iterations, reason = self._solved(external, load.displacement, end, dt, stored)
         if self.motion is None and not reason:
             reason = collapsed(self._moved(), self.domain)
         if reason:
@@ -369,7 +369,7 @@ class Consolidation(ConsolidationResults):
     def _read_pressure(self) -> None:
         self.pressure.x.array[:] = self._unit * self._body.solution.x.array[self._pressures[1]]
 
-    def _solved(self, external: Any, displacement: Any, end: Any, dt: float) -> Any:
+    def _solved(self, external: Any, displacement: Any, end: Any, dt: float, stored: float) -> Any:
         """What `solve_step` returns for the step under way."""
         fixed, heads, upper = self._applied.bounds(end)
         fixed[self._waterless], heads[self._waterless] = True, 0.0
@@ -377,8 +377,9 @@ class Consolidation(ConsolidationResults):
 
         def step() -> Any:
             return CoupledStep(
-                self._body, self._laws, external, self._external, displacement, self._owned, dt * self._gravity
-            )
+                self._body, self._laws, external, self._external, displacement, self._owned, dt * self._gravity,
+                self._unit * stored,
+            )  # fmt: skip
 
         bounds = fixed, unit * heads, unit * upper
         state = lambda: self._step_state(dt)

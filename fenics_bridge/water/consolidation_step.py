@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
-from mpm_core.newton import EASY_ITERATIONS, newton
+from mpm_core.newton import EASY_ITERATIONS, Conservation, newton
 from numpy.typing import NDArray
 
 from fenics_bridge.fem.equilibrium import Body, EquilibriumStep
@@ -69,6 +69,7 @@ class CoupledStep(EquilibriumStep):
         displacement: fraction of the displacements that the supports prescribe.
         parts: owned dofs of displacement and of pressure.
         gravity_flow: what the weight of water makes flow in the step, shape (m,).
+        stored: volume of the water in the body, times the unit of pressure.
     """
 
     def __init__(
@@ -80,9 +81,10 @@ class CoupledStep(EquilibriumStep):
         displacement: float,
         parts: Sequence[NDArray[np.integer]],
         gravity_flow: NDArray[np.float64],
+        stored: float,
     ) -> None:
         super().__init__(body, laws, external, before, displacement)
-        self._parts, self._gravity_flow = parts, gravity_flow
+        self._parts, self._gravity_flow, self._stored, self._water = parts, gravity_flow, stored, Conservation()
         stress = body.points.stress
         self._of_stress = body.kinematics.internal_forces(stress).array.copy()
         self._of_stress -= body.kinematics.internal_forces(np.zeros_like(stress)).array
@@ -98,8 +100,14 @@ class CoupledStep(EquilibriumStep):
         return force, max(force, self._norm(out_of_balance[self._parts[1]]), self._norm(self._gravity_flow))
 
     def _relative(self, out_of_balance: Any) -> Any:
+        lost = self._comm.allreduce(float(np.abs(out_of_balance[self._parts[1]]).sum()))
+        self._water.lost = lost / self._stored if self._stored > 0 else 0.0
         norms = (self._norm(out_of_balance[dofs]) for dofs in self._parts)
         return max(norm / scale if scale > 0 else 0.0 for norm, scale in zip(norms, self.scale))
+
+    def wants_more(self, tolerance: float) -> bool:
+        """Whether water is out of balance where forces are not."""
+        return self._water.wants_more(tolerance)
 
 
 def solve_step(

@@ -33,7 +33,8 @@ TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& f
                          const TrialCount<G::dim>& count)
 {
   constexpr int D = G::dim;
-  std::array<double, 9> sums{}; // squares of r, f_ext, f_int, inertia; plastic, failed; water; motion
+  // squares of r, f_ext, f_int, inertia; plastic, failed; water; motion; volumes of water out of balance, and of pores
+  std::array<double, 11> sums{};
   for (std::size_t i = 0; i < step.residual.size(); ++i)
   {
     const NodalForces<D>& f = step.forces[i];
@@ -47,7 +48,11 @@ TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& f
     sums[8] += per_velocity * per_velocity * dot<D>(field.velocity[i], field.velocity[i]);
     if (step.pore.flows)
       sums[step.pore.held[i] ? 7 : 6] += step.pore.unit * step.pore.unit * step.pore.content[i] * step.pore.content[i];
+    if (step.pore.flows && !step.pore.held[i])
+      sums[9] += std::abs(step.pore.content[i]);
   }
+  for (const PoreCell<D>& cell : step.pore.cells)
+    sums[10] += (1 - cell.grains) * volume_of(cell);
   sums[4] = static_cast<double>(count.plastic);
   sums[5] = static_cast<double>(count.failed);
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, exchange.comm);
@@ -55,8 +60,8 @@ TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& f
   // Volumes of water times the unit of pressure count as forces: a volumetric strain weighs as much as its stress.
   const double water_scale = std::max(scale, sums[7]);
   const double residual = water_scale > 0 ? std::max(sums[0], sums[6] * (scale > 0 ? scale / water_scale : 1)) : 0;
-  return {std::sqrt(residual), std::sqrt(scale > 0 ? scale : water_scale), static_cast<std::int64_t>(sums[4]),
-          static_cast<std::int64_t>(sums[5])};
+  return {std::sqrt(residual), std::sqrt(scale > 0 ? scale : water_scale), sums[10] > 0 ? sums[9] / sums[10] : 0,
+          static_cast<std::int64_t>(sums[4]), static_cast<std::int64_t>(sums[5])};
 }
 
 #define INSTANTIATE(G)                                                                                                 \

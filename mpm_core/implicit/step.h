@@ -73,6 +73,7 @@ struct TrialReport
 {
   double residual = 0;
   double scale = 0;         ///< largest of |f_ext|, |f_int|, |M (v1 - v0) / dt|, reactions included
+  double lost_water = 0;    ///< water out of balance, over that of the pores
   std::int64_t plastic = 0; ///< particles that yield
   std::int64_t failed = 0;  ///< particles whose law failed, and cells that would lose their volume
 };

@@ -29,6 +29,28 @@ RUN_AWAY = 10.0
 """Relative residual at which an iteration is abandoned"""
 
 
+CONSERVED = 1e-2
+"""Water that may be out of balance at the end of a step, over that of the pores, as a fraction of the tolerance of forces"""
+
+
+class Conservation:
+    """Whether water that is still out of balance, where forces are in balance, is worth another correction.
+
+    It is as long as corrections reduce it tenfold; what round-off leaves is accepted.
+    """
+
+    def __init__(self) -> None:
+        self.lost = 0.0
+        """Water out of balance at the last point, over that of the pores [-]"""
+        self._before = np.inf
+
+    def wants_more(self, tolerance: float) -> bool:
+        """Whether to go on; called where the residual is below the tolerance."""
+        more = self.lost > CONSERVED * tolerance and self.lost < 0.1 * self._before
+        self._before = self.lost
+        return more
+
+
 class System(Protocol):
     """A system of equations that `newton` solves.
 
@@ -51,6 +73,9 @@ class System(Protocol):
 
     def keep(self) -> None:
         """Make this the last point."""
+
+    def wants_more(self, tolerance: float) -> bool:
+        """Whether, below the tolerance, another correction is worth while for the sake of the water."""
 
 
 MOST_SURFACES = 30
@@ -96,7 +121,9 @@ def newton(
     residuals = [system.start()]
     if residuals[0] == float("inf"):
         return NewtonReport(False, residuals, system.reason)
-    while residuals[-1] > tolerance or len(residuals) <= min_iterations:
+    while residuals[-1] > tolerance or len(residuals) <= min_iterations or system.wants_more(tolerance):
+        if len(residuals) > max_iterations and residuals[-1] <= tolerance:
+            break
         if len(residuals) > max_iterations:
             return NewtonReport(False, residuals, f"residual {residuals[-1]:.1e} after {max_iterations} iterations")
         if patience and len(residuals) > patience and min(residuals[-patience:]) > 0.5 * min(residuals[:-patience]):
@@ -253,6 +280,7 @@ class _StepSystem:
         self._solver, self._step, self._dt = solver, step, dt
         self._has_tangents = False
         self._last, self._reduction = np.inf, 1.0
+        self._water = Conservation()
         self.reason = ""
         self.linear_iterations: list[int] = []
 
@@ -305,5 +333,8 @@ class _StepSystem:
         if report["failed"]:
             self.reason = report["reason"]
             return float("inf")
-        self._residual = relative(report)
+        self._residual, self._water.lost = relative(report), report["lost_water"]
         return self._residual
+
+    def wants_more(self, tolerance: float) -> bool:
+        return self._water.wants_more(tolerance)

@@ -325,7 +325,10 @@ class PoreWater(Conditions):
         self._set_water_conditions(collectively(self.comm, remaining))
 
     def water_volume(self) -> float:
-        """Volume of the water in the pores at atmospheric pressure [m3], per metre or radian in two dimensions. Collective."""
+        """Volume of the pores that water fills [m3], per metre or radian in two dimensions. Collective.
+
+        What their pressure presses into the pores besides, p / K_w of it, counts as inflow and in the masses of particles.
+        """
         self._require_water()
         p = self.particles
         pores = p.porosity * p.volume

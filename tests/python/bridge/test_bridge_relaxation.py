@@ -108,6 +108,9 @@ class Chatters:
     def keep(self):
         pass
 
+    def wants_more(self, tolerance):
+        return False
+
 
 def test_newton_gives_up_where_the_residual_does_not_halve_in_time():
     assert newton(Chatters(falls=[]), patience=6).iterations == 6

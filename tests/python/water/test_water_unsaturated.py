@@ -77,7 +77,6 @@ def test_a_drained_column_carries_its_weight_by_suction_and_soil(element, dim):
 @ELEMENTS
 def test_water_that_leaves_is_water_that_was_stored(element):
     model = column(element, 1e6)
-    model.solver = bridge.Solver(tolerance=1e-11)
     before = model.stored_water()
     reports = model.run(2e4, 10.0, growth=1.4)
     assert reports[-1].converged
