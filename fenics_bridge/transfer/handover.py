@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from mpm_core.checks import renamed
 from numpy.typing import NDArray
 
@@ -18,6 +20,9 @@ from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
 from fenics_bridge.water.consolidation import Consolidation
+
+SAME_WEIGHT = 0.01
+"""Relative difference of unit weights up to which they count as the same"""
 
 _BALANCED, _MOST_STEPS = 5e-4, 60
 """Out-of-balance ratio to reach, and largest number of steps: near collapse each one leaves a fraction of it."""
@@ -104,6 +109,7 @@ def initialise(
     """
     particles = model.particles
     _require_usable(model, fem, move)
+    _warn_of_other_weight(model, fem)
     if resting:
         agree(model.comm, "move: cells that rest are not moved, expected False with resting" if move else None)
         model.rest()
@@ -196,6 +202,26 @@ def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
     agree(model.comm, None if fits else problem)
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
+
+
+def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
+    """Warn, on the first rank, of particles whose unit weight is none of those that the finite elements carry. Collective."""
+    if not isinstance(fem, QuasiStatic):
+        return
+    given = fem.load.unit_weight
+    carried = [float(weight) for weight in (given.values() if isinstance(given, dict) else [given])]
+    p, gravity = model.particles, float(np.linalg.norm(model.gravity))
+    own = gravity * p.mass / p.volume
+    low = model.comm.allreduce(float(own.min(initial=np.inf)), MPI.MIN)
+    high = model.comm.allreduce(float(own.max(initial=0.0)), MPI.MAX)
+    too_low, too_high = low < (1 - SAME_WEIGHT) * min(carried), high > (1 + SAME_WEIGHT) * max(carried)
+    if (too_low or too_high) and model.comm.rank == 0:
+        warnings.warn(
+            f"the unit weight of particles is {low if too_low else high:.5g} N/m3, density times gravity, that of the finite "
+            f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: their equilibrium is another one",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def _require_same_laws(model: mpm.Model, fem: Any, number: Any) -> None:

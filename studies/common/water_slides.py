@@ -116,9 +116,8 @@ def handed_over(
     def pressure(points: np.ndarray) -> np.ndarray:
         return np.maximum(instant.pore_pressure(points), 0.0)
 
-    nmd = (
-        averages(a, site.laws.values()) and a.slide_water == "still"
-    )  # implicit steps, where it flows, average strains only
+    # Implicit steps, where water flows, average strains only.
+    nmd = averages(a, site.laws.values()) and a.slide_water == "still"
     for part in HOLDING:
         stronger = bridge.reduced_strength(site.laws, part * instant.safety.value)
         fem = slope.elements(1, pressure, stronger, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)

@@ -1,6 +1,7 @@
 """From finite elements to particles."""
 
 import gc
+import warnings
 
 import numpy as np
 import pytest
@@ -238,6 +239,17 @@ def test_background_mesh_outlives_the_mesh_that_it_came_from():
 def test_laws_that_do_not_match_are_named(law, words):
     with pytest.raises(bridge.InputError, match=words):
         bridge.initialise(slope_particles(UNIT_WEIGHT, law=law), solved())
+
+
+@pytest.mark.parametrize(
+    ("weight", "said"), [(UNIT_WEIGHT, False), (0.5 * UNIT_WEIGHT, True), (1.1 * UNIT_WEIGHT, True)]
+)
+def test_particles_of_another_weight_are_said(weight, said):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        bridge.initialise(slope_particles(weight), solved(degree=1), equilibrate=False)
+    words = f"unit weight of particles is {weight:.5g} N/m3"
+    assert any(words in str(one.message) for one in caught) == said
 
 
 def test_materials_are_matched_place_by_place():
