@@ -22,7 +22,7 @@ SOIL = mpm.LinearElastic(young=10e6, poisson=0.3)
 OEDOMETER = SOIL.p_wave_modulus
 BASE, TOP = 3, 4
 COMM = MPI.COMM_WORLD
-ONE_PRESSURE = "each cell has one pressure, too few for the steep profile of early times"
+BLURRED = "averages over nodes blur the profile in the cells at the drained surface, in proportion to their size"
 
 
 def column(cells, conductivity, modulus, law=SOIL, headroom=0.0):
@@ -45,6 +45,19 @@ def gathered(model, *names):
     """Fields of all particles, on all ranks."""
     parts = COMM.allgather([getattr(model.particles, name) for name in names])
     return [np.concatenate([part[k] for part in parts]) for k in range(len(names))]
+
+
+def cell_pressures(model):
+    """Heights of the centres of all cells [m], and the means of their particles' pore pressures [Pa], by height: (n,) each.
+
+    The pressure follows from the volume of a cell, which has one strain, so that it is that of its centre.
+    """
+    p = model.particles
+    _, cell, count = np.unique(p.cell, return_inverse=True, return_counts=True)
+    means = np.array([np.bincount(cell, values) / count for values in (p.position[:, 1], p.pore_pressure)])
+    heights, pressures = np.concatenate(COMM.allgather(means), axis=1)
+    order = np.argsort(heights)
+    return heights[order], pressures[order]
 
 
 def modes(modulus):
@@ -138,23 +151,24 @@ def run(quick: bool, folder) -> Result:
     stiff = modulus / POROSITY
     first = LOAD * stiff / (OEDOMETER + stiff)
     c_v = conductivity / UNIT_WEIGHT / (1 / OEDOMETER + 1 / stiff)
-    model = column(20, conductivity, modulus)
-    model.traction(TOP, (0.0, -LOAD))
-    model.set_pore_pressure(first)
-    stress = (first - LOAD) * np.array([3 / 7, 1.0, 3 / 7, 0.0])
-    model.particles.set("stress", np.tile(stress, (len(model.particles), 1)))
-    for factor in (0.1, 0.2, 0.5):
-        model.explicit(factor * HEIGHT**2 / c_v).last()
-        x, p = gathered(model, "position", "pore_pressure")
-        expected = first * terzaghi(x[:, 1], factor)
-        worst = np.argmax(np.abs(p - expected))
-        checks.append(Check(f"pore pressure, worst particle, T = {factor:g}", expected[worst] / LOAD, "Terzaghi 1925",
-                            p[worst] / LOAD, 0.02, scale=1.0,
-                            limit=ONE_PRESSURE if factor < 0.2 else ""))  # fmt: skip
-        order = np.argsort(x[:, 1])
-        curves[f"$T = {factor:g}$"] = (p[order] / LOAD, x[order, 1])
-        line = np.linspace(0, HEIGHT, 101)
-        exact[f"Terzaghi, $T = {factor:g}$"] = (first * terzaghi(line, factor) / LOAD, line)
+    for nmd in (False, True):
+        model = column(20, conductivity, modulus)
+        model.traction(TOP, (0.0, -LOAD))
+        model.set_pore_pressure(first)
+        stress = (first - LOAD) * np.array([3 / 7, 1.0, 3 / 7, 0.0])
+        model.particles.set("stress", np.tile(stress, (len(model.particles), 1)))
+        for factor in (0.05, 0.1, 0.2, 0.5):
+            model.explicit(factor * HEIGHT**2 / c_v, nmd=nmd).last()
+            height, p = cell_pressures(model)
+            expected = first * terzaghi(height, factor)
+            worst = np.argmax(np.abs(p - expected))
+            checks.append(Check(f"pore pressure over the load, worst cell, T = {factor:g}", expected[worst] / LOAD, "Terzaghi 1925",
+                                p[worst] / LOAD, 0.02, scale=1.0, limit=BLURRED if nmd and factor < 0.4 else "",
+                                method="explicit, NMD" if nmd else "explicit"))  # fmt: skip
+            if not nmd:
+                curves[f"$T = {factor:g}$"] = (p / LOAD, height)
+                line = np.linspace(0, HEIGHT, 101)
+                exact[f"Terzaghi, $T = {factor:g}$"] = (first * terzaghi(line, factor) / LOAD, line)
 
     # --- 4. Flow upwards through sand without cohesion: rest below the critical gradient, lift-off above ---------------
     critical = (GRAINS / WATER - 1) * (1 - POROSITY)
@@ -179,7 +193,7 @@ def run(quick: bool, folder) -> Result:
     if COMM.rank == 0:
         save_comparison(folder / "pressure.png", curves, exact, ("Pore pressure over load [-]", "Height over $H$ [-]"))
     return Result(
-        checks, {"pressure.png": "Pore pressure of the particles in a column that consolidates, by explicit steps"}
+        checks, {"pressure.png": "Pore pressure of the cells of a column that consolidates, by explicit steps"}
     )
 
 
