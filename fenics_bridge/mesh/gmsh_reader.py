@@ -68,7 +68,7 @@ def gmsh_session() -> Iterator[Any]:
 
 def gmsh_message(error: Exception) -> str:
     """Message of gmsh about an error, on one line."""
-    return " ".join(str(error).split()) or gmsh.logger.getLastError()
+    return " ".join(str(error).split()) or gmsh.logger.getLastError() or "it gives no reason"
 
 
 def read_file(path: Path, dim: int) -> dict[str, Any]:

@@ -281,7 +281,8 @@ class Model(ContactMethods, Body):
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs. With
                 ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
-                symmetric for associated flow; pressures of nearly incompressible soil may then alternate from cell to cell.
+                symmetric for associated flow; strains and forces of soil that dilates less are averaged by half, as in explicit
+                steps. Pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; checked before each step.
             energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
             second_order: use a method of second order in time with two stages per step (Alexander 1977) instead of backward
