@@ -98,7 +98,8 @@ py::array_t<double> owned_points(const Implicit<G>& implicit)
   return copied(values).reshape({-1, D});
 }
 
-/// One vector of this rank's unknowns for each axis along which forces move a body, without supported directions.
+/// One vector of this rank's unknowns for each axis along which forces move a body, without supported directions. The
+/// motion of a body does not move water: what it has of pressures is zero.
 template <class G, int D = G::dim>
 py::array_t<double> of_bodies(const Implicit<G>& implicit, std::vector<Vector<D>> DrivenAxis<D>::*nodal)
 {
@@ -108,6 +109,7 @@ py::array_t<double> of_bodies(const Implicit<G>& implicit, std::vector<Vector<D>
     {
       const Vector<D> v = product<D>(projector(implicit.system, node), (driven.*nodal)[static_cast<std::size_t>(node)]);
       all.insert(all.end(), v.begin(), v.end());
+      all.resize(all.size() + static_cast<std::size_t>(implicit.system.unknowns - D));
     }
   return copied(all);
 }

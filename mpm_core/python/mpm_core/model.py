@@ -300,8 +300,6 @@ class Model(ContactMethods, Body):
         refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
-        if self._core.water is not None:
-            refuse_contacts(self, "the implicit scheme with pore water")
         if isinstance(solver, Relaxation):
             refuse_contacts(self, "relaxation")
         refuse_absorbing(self, "the implicit scheme")
