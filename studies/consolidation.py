@@ -57,7 +57,9 @@ def parser() -> ArgumentParser:
     add_number(p, "--first-step", 0.5, "days", "first step", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
     add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
-    add_switch(p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking")
+    add_switch(
+        p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking"
+    )
     add_flag(p, "--particles", "compute implicit particles as well; the reservoirs must keep the ground under water")
     add_particles_per_cell(p, 3)
     return p

@@ -29,8 +29,8 @@ py::dict as_dict(const Implicit<G>& implicit, const TrialReport& report)
 {
   using namespace py::literals;
   const auto& failure = implicit.step.failure;
-  return py::dict("residual"_a = report.residual, "scale"_a = report.scale,
-                  "lost_water"_a = report.lost_water, "plastic"_a = report.plastic, "failed"_a = report.failed,
+  return py::dict("residual"_a = report.residual, "scale"_a = report.scale, "lost_water"_a = report.lost_water,
+                  "plastic"_a = report.plastic, "failed"_a = report.failed,
                   "reason"_a = failure ? failure_text(implicit.model, *failure) : "");
 }
 
