@@ -22,9 +22,8 @@ def run(*command):
 @pytest.mark.skipif(not (BUILD / "CMakeCache.txt").exists(), reason="the package was not built here by CMake")
 def test_a_program_builds_with_the_installed_core_and_falls_as_it_must(tmp_path):
     run("cmake", "--install", BUILD, "--component", "development", "--prefix", tmp_path / "talus")
-    run(
-        "cmake", "-S", ROOT / "tests/install", "-B", tmp_path / "build", f"-Dtalus_DIR={tmp_path}/talus/lib/cmake/talus"
-    )
+    folders = "-S", ROOT / "tests/install", "-B", tmp_path / "build"
+    run("cmake", "-G", "Ninja", *folders, f"-Dtalus_DIR={tmp_path}/talus/lib/cmake/talus")
     run("cmake", "--build", tmp_path / "build")
     mass, momentum = map(float, run(tmp_path / "build/fall").split())
     assert mass == pytest.approx(2000.0, rel=1e-12)
