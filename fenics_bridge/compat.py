@@ -126,6 +126,13 @@ def forward(vector: Any) -> None:
     vector.scatter_forward()
 
 
+def measure_beside(domain: mesh.Mesh, others: Any) -> Any:
+    """Measure dx of a form that is added to others, or to 0: since DOLFINx 0.8 all of a form must have the same cell tags."""
+    integrals = others.integrals_by_type("cell") if isinstance(others, ufl.Form) else ()
+    tags = next((one.subdomain_data() for one in integrals if one.subdomain_data() is not None), None)
+    return ufl.Measure("dx", domain=domain, subdomain_data=tags)
+
+
 def function_space(domain: mesh.Mesh, family: str, degree: int, size: int | None = None) -> Any:
     """Lagrange space, continuous ("Lagrange") or not ("DG"), with `size` components per node (None: scalar)."""
     if hasattr(fem, "functionspace"):

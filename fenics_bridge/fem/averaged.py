@@ -82,7 +82,8 @@ class AveragedKinematics:
             test, trial = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
             forces, stiffness = further(test, trial)
             # A matrix without a place on the diagonal takes no boundary condition; the terms need not be in all cells.
-            nothing = fem.Constant(self._space.mesh, 0.0) * ufl.inner(trial, test) * ufl.dx(degree=1)
+            dx = compat.measure_beside(self._space.mesh, stiffness)
+            nothing = fem.Constant(self._space.mesh, 0.0) * ufl.inner(trial, test) * dx(degree=1)
             self._more = fem.form(forces), Stiffness(stiffness + nothing, constraints)
         self.follow(laws)
 

@@ -49,7 +49,7 @@ class Kinematics:
         self._strain = fem.Expression(strain(du, radius), points.reference)
         self._stress, self._stress_rows = self._quadrature_function(size)
         self._tangent, self._tangent_rows = self._quadrature_function(size**2)
-        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": points.degree})
+        dx = compat.measure_beside(domain, more_forces)(metadata={"quadrature_degree": points.degree})
         matrix = ufl.as_matrix([[self._tangent[i * size + j] for j in range(size)] for i in range(size)])
         forces = weighted(ufl.inner(self._stress, strain(test, radius)), radius) * dx
         stiffness = weighted(ufl.inner(ufl.dot(matrix, strain(trial, radius)), strain(test, radius)), radius) * dx

@@ -166,8 +166,9 @@ def write_raster(path: str | Path, raster: Raster) -> None:
     if path.suffix.lower() in TIFF:
         write_geotiff(path, raster.x, raster.y, raster.values, raster.crs)
         return
-    header = (f"ncols {len(raster.x)}\nnrows {len(raster.y)}\nxllcenter {raster.x[0]!r}\nyllcenter {raster.y[0]!r}\n"
-              f"cellsize {raster.spacing!r}\nNODATA_value -9999\n")  # fmt: skip
+    x, y, cell = (repr(float(number)) for number in (raster.x[0], raster.y[0], raster.spacing))
+    header = (f"ncols {len(raster.x)}\nnrows {len(raster.y)}\nxllcenter {x}\nyllcenter {y}\ncellsize {cell}\n"
+              "NODATA_value -9999\n")  # fmt: skip
     values = np.where(np.isfinite(raster.values), raster.values, -9999)[::-1]
     path.write_text(header + "\n".join(" ".join(f"{v:.9g}" for v in row) for row in values) + "\n")
     path.with_suffix(".prj").write_text(raster.crs + "\n")
