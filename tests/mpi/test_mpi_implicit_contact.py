@@ -36,8 +36,9 @@ def test_implicit_contact_is_the_same_on_any_partition(comm, owners_of):
     assert runs[0][1].impulse[1] < 0  # the ground carries the block
 
 
+@pytest.mark.parametrize("wet", [False, True])
 @pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
-def test_a_load_settles_alike_on_any_partition(comm, owners_of):
+def test_a_load_settles_alike_on_any_partition(comm, owners_of, wet):
     runs = []
     for ranks in (comm, MPI.COMM_SELF):
         mesh = spread_box((12, 8), (1.2, 0.8), ranks, owners_of)
@@ -48,9 +49,12 @@ def test_a_load_settles_alike_on_any_partition(comm, owners_of):
         model.fix(3)
         servo = mpm.Servo(force=(150.0, -900.0), speed=1.0)
         plate = model.add_contact(mpm.Box((0.31, 0.4), (0.87, 0.6)), friction=0.5, body=servo)
-        list(model.implicit(0.2, dt=0.1, quasi_static=True, nmd=True))
+        if wet:
+            model.add_water(porosity=0.4, conductivity=1e-5, modulus=np.inf, drained_surface=True)
+        list(model.implicit(0.2, dt=0.1, quasi_static=True, nmd=True, solver=mpm.Newton(tolerance=1e-11)))
         runs.append((model, plate))
-    assert_same(*(all_by_id(model, (*FIELDS, "contact_slip_0")) for model, _ in runs))
+    names = (*FIELDS, "contact_slip_0", *(["pore_pressure"] if wet else []))
+    assert_same(*(all_by_id(model, names) for model, _ in runs))
     assert runs[0][1].displacement == pytest.approx(runs[1][1].displacement, rel=1e-7)
     assert runs[0][1].force == pytest.approx([-150.0, 900.0], rel=1e-6)
 
