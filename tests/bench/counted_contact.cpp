@@ -4,6 +4,7 @@
 /// terrain's squares over the width of the layer.
 
 #include "../cpp/boxes.h"
+#include "../cpp/sheets.h"
 
 #include "explicit/explicit_step.h"
 #include "particles/seed.h"
@@ -31,20 +32,8 @@ double height(double x, double y)
 /// @param over_layer  sides of squares over its width
 Triangles terrain(int over_layer)
 {
-  std::vector<Vector<3>> vertices;
-  std::vector<std::array<Index, 3>> triangles;
-  const double side = 1.0 / over_layer, first = 0.5 - side * squares / 2;
-  for (int j = 0; j <= squares; ++j)
-    for (int i = 0; i <= squares; ++i)
-      vertices.push_back({first + side * i, first + side * j, height(first + side * i, first + side * j)});
-  for (Index j = 0; j < squares; ++j)
-    for (Index i = 0; i < squares; ++i)
-    {
-      const Index a = j * (squares + 1) + i, c = a + squares + 2;
-      triangles.push_back({a, a + 1, c});
-      triangles.push_back({a, c, c - 1});
-    }
-  return make_triangles(std::move(vertices), std::move(triangles));
+  const double side = 1.0 / over_layer;
+  return sheet(squares, 0.5 - side * squares / 2, side, height);
 }
 
 /// Particles in columns that begin on the ground.

@@ -2,6 +2,7 @@
 /// everything.
 
 #include "boxes.h"
+#include "sheets.h"
 
 #include "contact/contact.h"
 #include "contact/end_of_step.h"
@@ -47,24 +48,9 @@ Triangles bumpy_ball(int n)
 }
 
 /// A wavy sheet across the unit cube, which does not reach its sides: it goes on straight beyond its border.
-Triangles sheet(int n)
+Triangles waves(int n)
 {
-  std::vector<Vector<3>> vertices;
-  std::vector<std::array<Index, 3>> triangles;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i)
-    {
-      const double x = 0.2 + 0.6 * i / n, y = 0.2 + 0.6 * j / n;
-      vertices.push_back({x, y, 0.5 + 0.1 * std::sin(9 * x) * std::cos(7 * y)});
-    }
-  for (Index j = 0; j < n; ++j)
-    for (Index i = 0; i < n; ++i)
-    {
-      const Index a = j * (n + 1) + i, c = a + n + 2;
-      triangles.push_back({a, a + 1, c});
-      triangles.push_back({a, c, c - 1});
-    }
-  return make_triangles(std::move(vertices), std::move(triangles));
+  return sheet(n, 0.2, 0.6 / n, [](double x, double y) { return 0.5 + 0.1 * std::sin(9 * x) * std::cos(7 * y); });
 }
 
 Polyline wavy_line(int n, bool closed)
@@ -149,7 +135,7 @@ void compare(const Surface<D>& surface, int cells, int per_cell)
 
 TEST(ContactBounds, ForcesOfABumpyBody) { compare<3>(bumpy_ball(16), 6, 4); }
 TEST(ContactBounds, ForcesOfFineTriangles) { compare<3>(bumpy_ball(60), 4, 1); }
-TEST(ContactBounds, ForcesOfASheetWithABorder) { compare<3>(sheet(14), 6, 4); }
+TEST(ContactBounds, ForcesOfASheetWithABorder) { compare<3>(waves(14), 6, 4); }
 TEST(ContactBounds, ForcesOfAClosedLine) { compare<2>(wavy_line(60, true), 8, 6); }
 TEST(ContactBounds, ForcesOfAnOpenLine) { compare<2>(wavy_line(40, false), 8, 6); }
 TEST(ContactBounds, ForcesOfBoxes)

@@ -2,6 +2,8 @@
 
 #include "contact/triangle_rises.h"
 
+#include "sheets.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,24 +17,9 @@ constexpr Index squares = 14; ///< over the unit square
 
 /// A sheet over the unit square.
 template <class F>
-Triangles sheet(F&& height)
+Triangles unit_sheet(F&& height)
 {
-  std::vector<Vector<3>> vertices;
-  std::vector<std::array<Index, 3>> triangles;
-  for (int j = 0; j <= squares; ++j)
-    for (int i = 0; i <= squares; ++i)
-    {
-      const double x = double(i) / squares, y = double(j) / squares;
-      vertices.push_back({x, y, height(x, y)});
-    }
-  for (Index j = 0; j < squares; ++j)
-    for (Index i = 0; i < squares; ++i)
-    {
-      const Index a = j * (squares + 1) + i, c = a + squares + 2;
-      triangles.push_back({a, a + 1, c});
-      triangles.push_back({a, c, c - 1});
-    }
-  return make_triangles(std::move(vertices), std::move(triangles));
+  return sheet(squares, 0, 1.0 / squares, height);
 }
 
 /// Points around a sheet: a walk finds the nearest triangle, or says nothing.
@@ -65,20 +52,21 @@ double found_without_search(Triangles surface)
 
 TEST(TriangleRises, LetNoSearchBeNeededOverHills)
 {
-  EXPECT_GT(found_without_search(sheet([](double x, double y) { return 0.04 * std::sin(8 * x) * std::cos(9 * y); })),
-            0.6);
+  EXPECT_GT(
+      found_without_search(unit_sheet([](double x, double y) { return 0.04 * std::sin(8 * x) * std::cos(9 * y); })),
+      0.6);
 }
 
 TEST(TriangleRises, AreRightInRoughGround)
 {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> height(-0.05, 0.05);
-  EXPECT_GT(found_without_search(sheet([&](double, double) { return height(random); })), 0.05);
+  EXPECT_GT(found_without_search(unit_sheet([&](double, double) { return height(random); })), 0.05);
 }
 
 TEST(TriangleRises, OfTheInsideOfABowlAndOfACap)
 {
   const auto bowl = [](double x, double y) { return 1.5 * ((x - 0.5) * (x - 0.5) + (y - 0.5) * (y - 0.5)); };
-  EXPECT_GT(found_without_search(sheet(bowl)), 0.4);
-  EXPECT_GT(found_without_search(sheet([&](double x, double y) { return -bowl(x, y); })), 0.4);
+  EXPECT_GT(found_without_search(unit_sheet(bowl)), 0.4);
+  EXPECT_GT(found_without_search(unit_sheet([&](double x, double y) { return -bowl(x, y); })), 0.4);
 }
