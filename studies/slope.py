@@ -111,8 +111,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     options = p.parse_args(arguments)
     check_slope_options(p, options)
     if options.integration is None:
-        cohesive = not options.paper and options.cohesion > 0
-        options.integration = stable_integration(options.particles_per_cell, cohesive)
+        stable = stable_integration(options.particles_per_cell, options.cohesion > 0)
+        options.integration = "particles" if options.paper else stable
     if options.paper:
         check(
             p, options.initial in (None, "zero"), lambda: f"--initial is {options.initial}, expected zero with --paper"
