@@ -88,7 +88,7 @@ class ConsolidationSite:
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
 
-        With averaged strains, `nmd`, they are so as they are; an equilibration would take forces without averages.
+        With averaged strains, `nmd`, they take over the state of the elements as it is, without an equilibration.
 
         Raises:
             InputError: the water has a boundary condition other than reservoirs.
