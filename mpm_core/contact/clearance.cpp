@@ -28,6 +28,16 @@ double apart(const Vector<D>& a, const Vector<D>& b)
   return std::sqrt(sum);
 }
 
+/// From the centre of a cell to its farthest vertex [m].
+template <int D>
+double reach_of(const Mesh<D>& mesh, Index cell)
+{
+  double reach = 0;
+  for (Index node : mesh.cells[cell])
+    reach = std::max(reach, apart<D>(mesh.points[node], mesh.shapes[cell].centre));
+  return reach;
+}
+
 /// The box around a cell, as it lies to the surface at its start.
 template <int D>
 Region<D> box_of(const Mesh<D>& mesh, Index cell, const RigidBody<D>& body)
@@ -105,15 +115,6 @@ void look_around(const Mesh<D>& mesh, Index cell, const Vector<D>& x, const Dist
 } // namespace
 
 template <int D>
-double reach_of(const Mesh<D>& mesh, Index cell)
-{
-  double reach = 0;
-  for (Index node : mesh.cells[cell])
-    reach = std::max(reach, apart<D>(mesh.points[node], mesh.shapes[cell].centre));
-  return reach;
-}
-
-template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
 {
   if (!contact.bounds.empty() && contact.travel <= contact.keeps_for)
@@ -148,8 +149,6 @@ void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact)
   contact.reach = std::min(rotation_reach<D>(contact.surface, body.centre), farthest);
 }
 
-template double reach_of<2>(const Mesh<2>&, Index);
-template double reach_of<3>(const Mesh<3>&, Index);
 template void keep_clearance<2>(const Mesh<2>&, Contact<2>&);
 template void keep_clearance<3>(const Mesh<3>&, Contact<3>&);
 } // namespace mpm::contact

@@ -11,10 +11,6 @@ namespace mpm::contact
 template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact);
 
-/// From the centre of a cell to its farthest vertex [m].
-template <int D>
-double reach_of(const Mesh<D>& mesh, Index cell);
-
 /// Whether a particle of a cell may touch the surface before that has travelled so far. It is no farther from the
 /// centre of its cell than the vertices are; twice as much again is for its radius and for its motion in a step.
 template <int D>

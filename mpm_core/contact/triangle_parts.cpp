@@ -7,7 +7,6 @@ namespace mpm::contact
 namespace
 {
 double size_of(const TriangleBox& box) { return norm<3>(difference<3>(box.upper, box.lower)); }
-
 } // namespace
 
 Region<3> box_of(const Triangles& surface, Index t)

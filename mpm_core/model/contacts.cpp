@@ -48,11 +48,12 @@ void convert_near_surfaces(Model<G>& model, double ahead)
     const double travel = step_travel(contact, body, ahead);
     const auto is_near = [&](Index cell)
     {
-      const auto& bound = contact.bounds[static_cast<std::size_t>(cell)];
-      if (!may_be_near(bound, contact.travel + travel)) // bounds depend on when they were found: not what is near
+      contact::CellBound<D> bound = contact.bounds[static_cast<std::size_t>(cell)];
+      if (!may_be_near(bound, contact.travel + travel))
         return false;
-      const Vector<D> centre = as_at_start<D>(contact.body, model.mesh.shapes[cell].centre);
-      return distance<D>(contact.surface, centre).value - 3 * bound.reach <= travel;
+      // Bounds depend on when they were found; what is near does not.
+      bound.distance = distance<D>(contact.surface, as_at_start<D>(contact.body, model.mesh.shapes[cell].centre)).value;
+      return may_be_near(bound, travel);
     };
     for (Index p = 0; p < model.particles.size(); ++p)
       if (const Index cell = model.particles.cell[p]; is_resting(model.particles, p) && is_near(cell))
