@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[3]
@@ -50,7 +51,8 @@ def test_ruff_has_nothing_to_say():
 
 
 def test_types_are_right(tmp_path):
-    if shutil.which("mypy") is None:
-        pytest.skip("needs mypy")
+    # What mypy accepts depends on the types that NumPy declares, and these change with NumPy's version.
+    if shutil.which("mypy") is None or int(np.__version__.split(".")[0]) > 1:
+        pytest.skip("needs mypy and NumPy 1, Debian 12's")
     code, text = call("mypy", "--cache-dir", tmp_path)
     assert code == 0, text
