@@ -29,11 +29,10 @@ class AssembledStiffness:
         first = self._comm.scan(n) - n
         of_normal = np.tile(np.arange(size) < strain.normal, n)[:, None] / strain.normal
         part = matrix(self._comm, (n * size, n), np.repeat(first + np.arange(n), size)[:, None], of_normal)
-        divergence = part.copy().transpose().matMult(strain.plain)
-        divergence.scale(strain.normal)
-        change = strain.means[0].matMult(strain.means[1].matMult(divergence))
-        change.axpy(-1.0, divergence)
-        self._change = part.matMult(change)
+        self._of_normal = part
+        self._divergence = part.copy().transpose().matMult(strain.plain)
+        self._divergence.scale(strain.normal)
+        self._around_nodes = strain.mean_of_nodes.transpose(PETSc.Mat())
         components = size * (first + np.arange(n))[:, None] + np.arange(size)
         self._columns = np.repeat(components, size, axis=0)
         self._tangent = matrix(self._comm, (n * size, n * size), self._columns, 1.0)
@@ -80,11 +79,22 @@ class AssembledStiffness:
 
     def _averaged_by(self, fractions: NDArray[np.float64]) -> PETSc.Mat:
         """Strain of cells that are averaged by these fractions (n,)."""
-        operator, rows = self._change.copy(), self._change.createVecLeft()
-        rows.array[:] = np.repeat(fractions, self._strain.size)
-        operator.diagonalScale(L=rows)
-        operator.axpy(1.0, self._strain.plain)
+        strain, around = self._strain, self._around_nodes.copy()
+        volumes, per_volume = strain.weights(fractions)
+        around.diagonalScale(L=_vector(around.createVecLeft(), per_volume), R=_vector(around.createVecRight(), volumes))
+        around.scale(strain.corners)
+        change = strain.mean_of_nodes.matMult(around.matMult(self._divergence))
+        change.axpy(-1.0, self._divergence)
+        change.diagonalScale(L=_vector(change.createVecLeft(), fractions))
+        operator = self._of_normal.matMult(change)
+        operator.axpy(1.0, strain.plain)
         return operator
+
+
+def _vector(vector: PETSc.Vec, values: NDArray[np.float64]) -> PETSc.Vec:
+    """A vector with these values of this rank."""
+    vector.array[:] = values
+    return vector
 
 
 class FactoredStiffness:

@@ -13,9 +13,10 @@ from petsc4py import PETSc
 class AveragedStrain:
     """The strain of `AveragedKinematics` as an operator on displacements, and forces by its transpose.
 
-    It is B + m (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components and the means M over nodes and
-    back over cells. Multiplied out, its rows reach over two rings of cells (60 times d entries in three dimensions); B and the
-    two factors of M have 3 to 12.
+    It is B + m f (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components, the fractions f by which
+    cells are averaged, and the means M over nodes, weighted by f V, and back over cells. With these weights a uniform strain or
+    stress remains as it is, also where soils of different fractions meet. Multiplied out, its rows reach over two rings of cells
+    (60 times d entries in three dimensions); B and the two factors of M have 3 to 12.
 
     Args:
         comm: ranks of the body.
@@ -54,23 +55,36 @@ class AveragedStrain:
         rows, columns = _strain_rows(gradients, radii), np.repeat(dofs.reshape(n, -1), self.size, axis=0)
         self.plain = matrix(comm, (n * self.size, n_dofs), columns, rows)
         """The plain strain"""
-        to_nodes = matrix(comm, (n, n_nodes), nodes, (volumes * present)[:, None]).transpose()
-        around = to_nodes.getRowSum()
-        around.reciprocal()
-        to_nodes.diagonalScale(L=around)
-        self.means = matrix(comm, (n, n_nodes), nodes, 1 / corners), to_nodes
-        """The mean over a cell's nodes, and that over the cells around a node by volume, which is taken first"""
-        self._strain_of = _Product(self.plain)
-        self._mean_over_nodes, self._mean_around_nodes = (_Product(factor) for factor in self.means)
+        self.mean_of_nodes = matrix(comm, (n, n_nodes), nodes, 1 / corners)
+        """The mean over a cell's nodes"""
+        self._present, self.corners = present, corners
+        self._strain_of, self._over_nodes = _Product(self.plain), _Product(self.mean_of_nodes)
         # Products with PETSc's own transposes would add up what ranks send in the order in which it arrives.
         self._forces_of = _Product(self.plain.transpose(PETSc.Mat()))
-        self._to_nodes, self._to_cells = (_Product(factor.transpose(PETSc.Mat())) for factor in self.means)
+        self._to_nodes = _Product(self.mean_of_nodes.transpose(PETSc.Mat()))
+
+    def weights(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Weights of the mean over the cells around a node: the volume of each cell in it, and one over their sum per own node.
+
+        Args:
+            fractions: by which the cells are averaged, (n,).
+
+        Returns:
+            Shapes (n,) [m^D] and (nodes,) [1/m^D]; the second is zero where no cell around a node is averaged.
+
+        Note:
+            Collective.
+        """
+        volumes = fractions * self.volumes * self._present
+        around = self.corners * self._to_nodes(volumes)
+        return volumes, np.divide(1.0, around, out=np.zeros_like(around), where=around > 0)
 
     def of(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         """Averaged strain of a displacement of this rank's own dofs: (n, S). Collective."""
         strain = self._strain_of(displacement).reshape(-1, self.size)
         volumetric = strain[:, : self.normal].sum(axis=1)
-        mean = self._mean_over_nodes(self._mean_around_nodes(volumetric))
+        volumes, per_volume = self.weights(self.of_strains)
+        mean = self._over_nodes(self.corners * per_volume * self._to_nodes(volumes * volumetric))
         strain[:, : self.normal] += (self.of_strains * (mean - volumetric))[:, None] / self.normal
         return strain
 
@@ -78,7 +92,9 @@ class AveragedStrain:
         """Forces on this rank's own dofs of a stress (n, S). Collective."""
         forces = self.volumes[:, None] * stress
         pressure = self.of_forces * forces[:, : self.normal].sum(axis=1) / self.normal
-        forces[:, : self.normal] += (self._to_cells(self._to_nodes(pressure)) - pressure)[:, None]
+        volumes, per_volume = self.weights(self.of_forces)
+        mean = self._over_nodes(self.corners * per_volume * self._to_nodes(pressure))
+        forces[:, : self.normal] += (volumes * mean - pressure)[:, None]
         return self._forces_of(forces.ravel())
 
 

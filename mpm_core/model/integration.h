@@ -24,6 +24,21 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
+/// The fraction of nodal mixed discretisation in a cell.
+template <int D>
+inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)
+{
+  return integration.averaged_of_cell.empty() ? integration.averaged_everywhere : integration.averaged_of_cell[cell];
+}
+
+/// The volume by which a cell takes part in the means over nodes: means that are weighted by it leave a uniform strain
+/// or stress as it is, also where soils of different fractions meet.
+template <class G, int D = G::dim>
+inline double averaged_volume(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  return averaged_fraction(field.integration, cell) * integrated_volume(mesh, field, cell);
+}
+
 /// Finds what the cells integrate in this step, where it is not the sum over their particles: a full cell integrates
 /// the mean stress of its particles over its volume (mixed), or the mean stress by the weights of dual domains.
 /// @post field.integration.whole tells which cells are full

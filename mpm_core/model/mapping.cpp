@@ -1,6 +1,5 @@
 #include "model/mapping.h"
 
-#include "model/integration.h"
 #include "model/pore_forces.h"
 #include "model/resting_nodes.h"
 #include "model/water_mapping.h"
@@ -41,7 +40,8 @@ double mean_of(const Working<G>& stress)
   return sum * (1.0 / G::n_normal);
 }
 
-/// Averages over nodes the mean stress times volume of filled cells.
+/// Averages over nodes the mean stress of filled cells. Only the fractions of stress and volume that are averaged take
+/// part in the means: where soils of different fractions meet, a uniform pressure then remains in equilibrium.
 /// @post integration.mean_stress_of_cell has what was averaged, for `change_by_averaging`
 /// @param integral_of  mean stress times volume of a cell; a callable Index -> double
 template <class G, class IntegralOf>
@@ -51,8 +51,9 @@ void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, Veloc
   field.mean_stress.resize(mesh.points.size());
   auto& own = field.integration.mean_stress_of_cell; // kept for what follows, since moments are far apart in memory
   own.resize(static_cast<std::size_t>(mesh.owned_cells));
-  const auto volume_of = [&](Index c) { return own[c].volume = integrated_volume(mesh, field, c); };
-  const auto keep_integral = [&](Index c, double) { return own[c].value = integral_of(c); };
+  const auto volume_of = [&](Index c) { return own[c].volume = averaged_volume(mesh, field, c); };
+  const auto keep_integral = [&](Index c, double)
+  { return own[c].value = averaged_fraction(field.integration, c) * integral_of(c); };
   average_over_nodes(mesh, field.part, volume_of, keep_integral, exchange, field.mean_stress);
 }
 
@@ -88,9 +89,8 @@ void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const 
                              VelocityField<G>& field)
 {
   find_averaged_fractions(mesh, runs, field);
-  average_mean_stress<G>(
-      mesh, exchange, field,
-      [&](Index c) { return averaged_fraction(field.integration, c) * mean_of<G>(integrated_stress(mesh, field, c)); });
+  average_mean_stress<G>(mesh, exchange, field,
+                         [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
 }
 } // namespace
 
@@ -210,7 +210,7 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
   // Averages of stress have found the volumes, and left them side by side.
   const bool known = !field.integration.averaged_by_law.empty();
   const auto volume_of = [&](Index c)
-  { return known ? field.integration.mean_stress_of_cell[c].volume : integrated_volume(mesh, field, c); };
+  { return known ? field.integration.mean_stress_of_cell[c].volume : averaged_volume(mesh, field, c); };
   with_velocity_of_vertices(mesh, field,
                             [&](auto&& velocity_of)
                             {
@@ -236,7 +236,7 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
                       std::span<Working<G>> stress)
 {
   average_mean_stress<G>(mesh, exchange, field,
-                         [&](Index c) { return averaged_fraction(field.integration, c) * mean_of<G>(stress[c]); });
+                         [&](Index c) { return mean_of<G>(stress[c]); });
   for (Index c : field.part.cells)
   {
     if (field.integration.mean_stress_of_cell[c].volume == 0)

@@ -2,6 +2,7 @@
 /// @file
 /// What explicit and implicit steps take from the particles at their start, and the strains that nodes give the cells.
 
+#include "model/integration.h"
 #include "model/model.h"
 
 #include <algorithm>
@@ -13,8 +14,8 @@ namespace mpm::model
 /// particles.
 ///
 /// With nodal mixed discretisation the stresses are averaged as the strains will be, in each cell by the least fraction
-/// that its soils have in `integration.averaged_by_law`: with volume weights the average is its own transpose, so that
-/// the forces do the work of the particles' stresses on averaged strains.
+/// that its soils have in `integration.averaged_by_law`: weighted by `averaged_volume`, the average is its own
+/// transpose, so that the forces do the work of the particles' stresses on averaged strains.
 /// @post cells that have become empty are left out of the field's part of the mesh, where it is to shrink
 /// @note Collective where stresses are integrated over whole cells, or averaged
 template <class G, int D = G::dim>
@@ -79,20 +80,12 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
 
 /// Averages the mean of the normal components of the cells' stress times volume, as strains are averaged.
 ///
-/// The forces of these stresses do the work of the particles' stresses on averaged strains: with volume weights the
-/// average is its own transpose.
+/// The forces of these stresses do the work of the particles' stresses on averaged strains.
 /// @param stress  of each owned cell [N m]
 /// @note Collective
 template <class G, int D = G::dim>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress);
-
-/// The fraction of nodal mixed discretisation in a cell.
-template <int D>
-inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)
-{
-  return integration.averaged_of_cell.empty() ? integration.averaged_everywhere : integration.averaged_of_cell[cell];
-}
 
 /// Volumetric strain of a cell after nodal mixed discretisation.
 /// @param own  of the cell before

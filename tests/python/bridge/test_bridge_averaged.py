@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from bridge_cases import CLAY, MESHES, POISSON, YOUNG, clay_block, column, slope_model, slope_particles
+from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.fem import linear_solver
+
+LAYERS = [f"layer {k}" for k in (1, 2, 3, 4)]
 
 
 def strain_of(dim, field):
@@ -29,6 +32,44 @@ def test_linear_field_is_left_alone():
 def test_plane_strain_stays_plane():
     strain = strain_of(2, lambda x: np.stack([x[0] ** 2, x[0] * x[1]]))
     assert not strain[:, 2].any()
+
+
+@pytest.mark.parametrize("as_particles", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_meet(dim, as_particles):
+    """Forces of clay are averaged, those of sand with little dilation not, or by half: inside they add up to zero."""
+    domain, facet_tags, supports, _ = column(dim)
+    clay, sand = mpm.MohrCoulomb(young=3e6, poisson=0.45, cohesion=1e4, friction_angle=0.0), loam(2.0)
+    heights = domain.geometry.x[domain.geometry.dofmap.array.reshape(-1, dim + 1)].mean(axis=1)[:, dim - 1]
+    number = (heights > 0.5).astype(np.int32)
+    assert 0 < number.sum() < len(number)
+    tags = meshtags(domain, dim, np.arange(len(number), dtype=np.int32), number)
+    options = {"degree": 1, "nmd": True, "as_particles": as_particles, "cell_tags": tags}
+    kinematics = bridge.QuasiStatic(domain, {0: clay, 1: sand}, facet_tags, supports, **options)._kinematics
+    n = len(kinematics._strain.volumes)
+    stress = np.zeros((n, 4 if dim == 2 else 6))
+    stress[:, :3] = -1e4
+    forces = np.array(kinematics.internal_forces(stress).array).reshape(-1, dim)
+    x = kinematics._space.tabulate_dof_coordinates()[:, :dim]
+    inside = ((x > x.min(axis=0) + 1e-9) & (x < x.max(axis=0) - 1e-9)).all(axis=1)
+    assert inside.any() and np.abs(forces[inside]).max() < 1e-12 * np.abs(forces).max()
+
+
+def test_clay_below_sand_settles_as_in_quadratic_elements():
+    """A bank of sand on soft clay, 1:1.5; forces that did not balance where the soils meet moved it by twice as much."""
+    moved = {}
+    for degree in (1, 2):
+        domain, cell_tags, facet_tags = bridge.read_mesh(MESHES / "embankment.geo", MPI.COMM_WORLD)
+        supports = [bridge.fixed("base"), bridge.roller("axis", (1, 0)), bridge.roller("right", (1, 0))]
+        body, tags, facets = bridge.soil_mesh(domain, cell_tags, facet_tags, tag=["clay", *LAYERS])
+        clay = mpm.MohrCoulomb(young=3e6, poisson=0.45, cohesion=15e3, friction_angle=0.0)
+        sand = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=5e3, friction_angle=32.0, dilation_angle=5.0)
+        laws = {"clay": clay, **{layer: sand for layer in LAYERS}}
+        model = bridge.QuasiStatic(body, laws, facets, supports, degree, cell_tags=tags, nmd=degree == 1)
+        model.solve(bridge.Load(unit_weight=19e3))
+        assert model.converged
+        moved[degree] = np.abs(model.displacement.x.array).max()
+    assert moved[1] == pytest.approx(moved[2], rel=0.05)
 
 
 def test_particles_average_alike():

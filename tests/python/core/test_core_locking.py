@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from core_cases import box
+from core_cases import DIMS, box
 
 import mpm_core as mpm
+from mpm_core import _core
 
 # Young's modulus and the shear traction of the benchmark; its answer at (48, 52) is 16.44 with nu = 0.499999975. The
 # displacement of a nearly incompressible body differs from the incompressible one by the order of G / K = 0.002 with
@@ -55,3 +56,29 @@ def test_mixed_discretisation_frees_them(deflections):
     errors = [1 - deflections[n, True] / BENCHMARK for n in (8, 16)]
     assert 0 < errors[1] < 0.12
     assert errors[1] < 0.5 * errors[0]  # and it converges
+
+
+@pytest.mark.parametrize("integration", [mpm.Integration.PARTICLES, mpm.Integration.MIXED])
+@pytest.mark.parametrize("dim", DIMS)
+def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_meet(dim, integration):
+    """Of clay all of the strain is averaged, of sand a part; nodes inside must feel no force of a pressure that both have."""
+    clay, sand = mpm.MohrCoulomb(young=3e6, poisson=0.45, cohesion=1e4, friction_angle=0.0), mpm.MohrCoulomb(
+        young=2e7, poisson=0.3, cohesion=5e3, friction_angle=32.0, dilation_angle=5.0
+    )
+    assert _core.fraction_of_averages(clay) != _core.fraction_of_averages(sand)
+    upper = np.array([[-1.0] * (dim - 1) + [0.5], [2.0] * dim])
+    mesh = box([4] * dim, shake=0.2, body=upper)
+    model = mpm.Model(mesh, [clay, sand])
+    for tag in (0, 1):
+        model.seed(density=2000.0, per_cell=6 if dim == 2 else 10, cell_tag=tag, material=tag)
+    pressure = 1e4
+    stress = np.zeros_like(model.particles.stress)
+    stress[:, :3] = -pressure
+    model.particles.set("stress", stress)
+    for axis in range(dim):
+        for end in (1, 2):
+            model.roller(2 * axis + end, np.eye(dim)[axis])
+    *_, report = model.explicit(1e-4, dt=1e-4, nmd=True, integration=integration)
+    # A pressure on the sides of a cell gives its nodes this velocity in the step, in the order of magnitude.
+    scale = 1e-4 * pressure / (2000.0 * 0.25)
+    assert np.abs(model.particles.velocity).max() < 1e-10 * scale
