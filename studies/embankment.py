@@ -112,8 +112,8 @@ def main(arguments: list[str] | None = None) -> int:
     apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)
-    if not failed_particles:
-        weaken(site, model, a.factor)
+    factor = 1.0 if failed_particles else a.factor
+    weaken(site, model, factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = site_slides.slide(a, model, folder, interrupt)
@@ -122,7 +122,7 @@ def main(arguments: list[str] | None = None) -> int:
         "finished_run": stopped is None, "stopped_because": stopped, "stage_without_equilibrium_fem": failed,
         "stage_without_equilibrium_particles": failed_particles,
         "settlement_m": rows[-1]["settlement_m"] if rows else None, "sideways_m": rows[-1]["sideways_m"] if rows else None,
-        "stress_difference_of_particles_to_fem": apart, "factor": a.factor, "largest_displacement_of_slide_m": moved,
+        "stress_difference_of_particles_to_fem": apart, "factor": factor, "largest_displacement_of_slide_m": moved,
         "particles": comm.allreduce(len(model.particles)),
         "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
         "wall_seconds": {"stages_fem": built - start, "all": perf_counter() - start},
@@ -131,13 +131,14 @@ def main(arguments: list[str] | None = None) -> int:
         **(stage_pictures(site.stages, rows, pictures, folder) if a.pictures else {}),
         **site_slides.slide_pictures(a, result, scene, folder),
     }
-    movie = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
+    slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"
+    movie = [particle_movie(slide, scene, result.frames)]
     write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn)
     if comm.rank == 0:
         for who, message in (("finite elements", failed), ("particles", failed_particles), ("slide", stopped)):
             if message:
                 print(f"{who}: {message}", file=sys.stderr)
-        print(f"slide with the strength divided by {a.factor:g}: largest displacement {moved:.3f} m after "
+        print(f"slide, {slide}: largest displacement {moved:.3f} m after "
               f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip
     return interrupt.exit_code or (1 if stopped else 0)
 

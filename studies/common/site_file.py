@@ -38,6 +38,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from mpm_core.setup_warnings import keeps_volume
 
 from .options import add_number, study_parser
 from .parameters import ParameterError, checked_values
@@ -77,7 +78,11 @@ class Site:
         return mpm.Geometry.AXISYMMETRIC if self.axisymmetric else None
 
     def finite_elements(self, degree: int, laws: dict[int, Any] | None = None, **options: Any) -> bridge.QuasiStatic:
-        """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective."""
+        """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective.
+
+        Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise.
+        """
+        options.setdefault("nmd", degree == 1 and keeps_volume([*self.laws.values(), *self.further_laws]))
         body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
         return bridge.QuasiStatic(
             body,
