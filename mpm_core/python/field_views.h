@@ -50,6 +50,21 @@ py::array_t<T> copied_field(const FieldView& field, bool by_columns = false)
   return array;
 }
 
+/// Copies of the two components of a field as vectors of three, (n, 3), the third one zero.
+template <class T>
+py::array_t<T> padded_field(const FieldView& field)
+{
+  py::array_t<T> array(std::vector<std::size_t>{field.rows, 3});
+  T* out = array.mutable_data();
+  for (std::size_t row = 0; row < field.rows; ++row, out += 3)
+  {
+    out[0] = static_cast<T>(field.components[0][row]);
+    out[1] = static_cast<T>(field.components[1][row]);
+    out[2] = 0;
+  }
+  return array;
+}
+
 inline py::object copied_field(const IndexView& field)
 {
   return std::visit(

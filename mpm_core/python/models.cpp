@@ -246,7 +246,7 @@ void bind_model(py::module_& m, const std::string& suffix)
                     return entries;
                   })
       .def("column", &column<G>)
-      .def("copied_fields", &copied_fields<G>)
+      .def("copied_fields", &copied_fields<G>, py::arg("names"), py::arg("single"), py::arg("padded"))
       .def("require_fields",
            [](const M& model, const std::vector<std::string>& particles, const std::vector<std::string>& nodes)
            {

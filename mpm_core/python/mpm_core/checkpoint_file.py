@@ -47,12 +47,19 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
     file.add_common("description", np.array([description.encode()]))
     own = {"particles": len(groups["particles"]["id"]), **{name: len(a) for name, a in groups["cells"].items()}}
     counts = comm.allgather(own)
+
+    def add(name: str, rows: NDArray[Any], counts_of_rows: list[int]) -> None:
+        file.add(name, rows, counts_of_rows)
+        file.wait()
+        if comm.rank == 0:  # at once, since it could not hold all of them
+            file.store()
+
     for name, rows in groups["particles"].items():
-        file.add(f"particles/{name}", rows, [count["particles"] for count in counts])
+        add(f"particles/{name}", rows, [count["particles"] for count in counts])
     for name, rows in groups["cells"].items():
-        file.add(f"cells/{name}", rows, [count[name] for count in counts])
+        add(f"cells/{name}", rows, [count[name] for count in counts])
     for name, rows in {**groups["ranks"], **{f"rows_of_{k}": np.array([n]) for k, n in own.items()}}.items():
-        file.add(f"ranks/{name}", rows, [1] * comm.size)
+        add(f"ranks/{name}", rows, [1] * comm.size)
 
     def put_in_place() -> None:
         file.close(durable=True)

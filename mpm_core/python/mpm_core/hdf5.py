@@ -1,8 +1,9 @@
-"""HDF5 files of arrays whose rows lie on all ranks. The first rank writes them with h5py, one after another."""
+"""HDF5 files of arrays whose rows lie on all ranks. The first rank writes them with h5py."""
 
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -14,67 +15,92 @@ from numpy.typing import NDArray
 
 
 class RowsFile:
-    """A new HDF5 file to which each rank adds its rows of arrays.
+    """A new HDF5 file of arrays, whose rows are gathered from all ranks to the first one, which writes the file.
 
-    What the system refuses to write is an error of `close` only, which the first rank calls, so that no rank waits for another;
-    the file is removed then.
+    What the system refuses to write is an error of `close` only, so that no rank waits for another; the file is removed then.
 
     Args:
         path: of the file; an older one is replaced.
         comm: communicator whose first rank writes.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
         checksums: protect data by checksums (Fletcher 32), and HDF5's own tables by those of its format 1.10.
-
-    Note:
-        Collective, as all methods but `close` are.
     """
 
     def __init__(self, path: str, comm: MPI.Comm, *, compression: int = 0, checksums: bool = False) -> None:
-        self._path, self._comm = path, comm
-        self._refusal: OSError | None = None
-        self._file: Any = None
+        self._path, self._comm, self._checksums = path, comm, checksums
         self._options: dict[str, Any] = {"fletcher32": True} if checksums else {}
         if compression:
             self._options |= {"compression": "gzip", "compression_opts": compression}
-        if comm.rank == 0:
-            import h5py  # not where a run writes nothing
-
-            self._h5py = h5py
-            try:
-                self._sink = _Sink(path, "w+")
-            except OSError as refusal:
-                self._refusal = refusal
-            else:
-                self._file = h5py.File(self._sink, "w", libver=("v110", "v110") if checksums else None)
+        self._arrays: dict[str, NDArray[Any]] = {}
+        self._gathers: list[MPI.Request] = []
+        self._file: Any = None
+        self._refusal: OSError | None = None
 
     def add_common(self, name: str, values: NDArray[Any]) -> None:
         """Add an array that is the same on all ranks."""
-        if self._file is not None:
-            self._file.create_dataset(name, data=values, **self._options)
+        if self._comm.rank == 0:
+            self._arrays[name] = values
 
     def add(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> None:
-        """Add an array.
+        """Begin to gather an array; `wait` ends it. Collective.
 
         Args:
             name: path within the file.
-            rows: this rank's rows, (n,) or (n, k).
+            rows: this rank's rows, (n,) or (n, k); they must not change before they are written.
             counts: number of rows of each rank.
         """
-        whole = _gathered(self._comm, rows, counts)
-        if self._file is None or whole is None:
+        rows = np.ascontiguousarray(rows)
+        if self._comm.size == 1:
+            self._arrays[name] = rows
             return
-        if self._options and whole.size:
-            self._file.create_dataset(name, data=whole, **self._options)
+        whole = None
+        if self._comm.rank == 0:
+            whole = self._arrays[name] = np.empty((sum(counts), *rows.shape[1:]), rows.dtype)
+        width = math.prod(rows.shape[1:])
+        self._gathers.append(
+            self._comm.Igatherv(rows, whole if whole is None else [whole, [n * width for n in counts]])
+        )
+
+    def wait(self) -> None:
+        """Wait until all arrays are gathered. Collective."""
+        MPI.Request.Waitall(self._gathers)
+        self._gathers.clear()
+
+    def store(self) -> None:
+        """Write the arrays that are gathered, on the first rank, by any of its threads."""
+        import h5py  # not where a run writes nothing
+
+        if self._file is None and self._refusal is None:
+            self._open()
+        for name, values in self._arrays.items() if self._file is not None else ():
+            if self._options and values.size:
+                h5py.File(self._file).create_dataset(name, data=values, **self._options)
+                continue
+            # As create_dataset does it, in a fifth of the time, which counts in frames of many small fields.
+            kind, space = h5py.h5t.py_create(values.dtype), h5py.h5s.create_simple(values.shape)
+            dataset = h5py.h5d.create(self._file, name.encode(), kind, space, self._creation)
+            dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, values)
+        self._arrays.clear()
+
+    def _open(self) -> None:
+        import h5py
+
+        try:
+            self._sink = _Sink(self._path, "w+")
+        except OSError as refusal:
+            self._refusal = refusal
             return
-        # As create_dataset does it, in a fifth of the time, which counts in frames of many small fields.
-        all_rows, space = self._h5py.h5s.ALL, self._h5py.h5s.create_simple(whole.shape)
-        kind = self._h5py.h5t.py_create(whole.dtype)
-        creation = self._h5py.h5p.create(self._h5py.h5p.DATASET_CREATE)
-        creation.set_obj_track_times(False)  # the same frame makes the same file, whenever it is written
-        self._h5py.h5d.create(self._file.id, name.encode(), kind, space, creation).write(all_rows, all_rows, whole)
+        access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+        access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)  # nothing of it stays open when it is closed
+        access.set_fileobj_driver(h5py.h5fd.fileobj_driver, self._sink)
+        if self._checksums:
+            access.set_libver_bounds(h5py.h5f.LIBVER_V110, h5py.h5f.LIBVER_V110)
+        self._file = h5py.h5f.create(self._path.encode(), h5py.h5f.ACC_TRUNC, fapl=access)
+        self._creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        self._creation.set_obj_track_times(False)  # the same frame makes the same file, whenever it is written
 
     def close(self, durable: bool = False) -> None:
-        """Close the file, on the first rank.
+        """Write what is gathered and close the file, on the first rank.
 
         Args:
             durable: wait until its data are on the disk.
@@ -82,6 +108,7 @@ class RowsFile:
         Raises:
             OSError: with path and reason: the file could not be written.
         """
+        self.store()
         if self._file is not None:
             self._file.close()
             if durable:
@@ -93,31 +120,6 @@ class RowsFile:
                     os.unlink(self._path)
         if self._refusal is not None:
             raise OSError(self._refusal.errno, self._refusal.strerror, self._path)
-
-
-class HeldRows:
-    """The arrays of a `RowsFile`, gathered to the first rank, which can write them later and by another thread."""
-
-    def __init__(self, path: str, comm: MPI.Comm, compression: int) -> None:
-        self._path, self._comm, self._compression = path, comm, compression
-        self._arrays: dict[str, NDArray[Any]] = {}
-
-    def add(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> None:
-        """Add an array as `RowsFile.add` does; its values must not change any more. Collective."""
-        whole = _gathered(self._comm, rows, counts)
-        if whole is not None:
-            self._arrays[name] = whole
-
-    def close(self) -> None:
-        """Write the file, on the first rank.
-
-        Raises:
-            OSError: with path and reason: the file could not be written.
-        """
-        file = RowsFile(self._path, MPI.COMM_SELF, compression=self._compression)
-        for name, whole in self._arrays.items():
-            file.add(name, whole, [len(whole)])
-        file.close()
 
 
 class _Sink(io.FileIO):
@@ -144,14 +146,3 @@ class _Sink(io.FileIO):
     def truncate(self, size: int | None = None) -> int:
         self.attempt(lambda: super(_Sink, self).truncate(size))
         return size or 0
-
-
-def _gathered(comm: MPI.Comm, rows: NDArray[Any], counts: Sequence[int]) -> NDArray[Any] | None:
-    """Rows of all ranks by rising rank, on the first rank."""
-    rows = np.ascontiguousarray(rows)
-    if comm.size == 1:
-        return rows
-    whole = np.empty((sum(counts), *rows.shape[1:]), rows.dtype) if comm.rank == 0 else None
-    width = int(np.prod(rows.shape[1:]))
-    comm.Gatherv(rows, None if whole is None else [whole, [n * width for n in counts]])
-    return whole

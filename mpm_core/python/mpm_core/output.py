@@ -264,7 +264,7 @@ class ModelOutput:
         for output in self._outputs:
             try:
                 if isinstance(output, ParticleOutput):
-                    fields = self._model._core.copied_fields(self._fields, self._float32)
+                    fields = self._model._core.copied_fields(self._fields, self._float32, padded=True)
                     output.write(self._model.time, {**fields, **more})
                 elif isinstance(output, BodyOutput):
                     output.write()

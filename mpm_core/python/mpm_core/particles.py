@@ -112,7 +112,7 @@ class Particles:
             InputError: a name that no field has.
         """
         self._require_all("single")
-        return self._core.copied_fields(names, True)
+        return self._core.copied_fields(names, single=True, padded=False)
 
     def to_dataframe(self, *names: str) -> Any:
         """The particles of this rank as a table of pandas, by their numbers.

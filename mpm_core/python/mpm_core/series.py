@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError, RunError
 from .collective import check_same_path, write_on_first_rank
-from .hdf5 import HeldRows, RowsFile
+from .hdf5 import RowsFile
 
 _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 _TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}
@@ -26,7 +26,7 @@ _HEAD = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
 _TAIL = "</Grid>\n</Domain>\n</Xdmf>\n"
 SHORT = 1 << 19
 """Characters of an XDMF file that is rewritten for each frame, some 150 frames of all fields; see `REWRITING` for longer ones"""
-REWRITING = 0.02
+REWRITING = 0.005
 """Fraction of the time in which a long XDMF file is rewritten; for each frame it would take the square of their number"""
 
 
@@ -136,10 +136,10 @@ class Series:
         path = self.folder / f"{name}.h5"
         if self._closed:
             raise RunError(f"cannot write {self.folder}: it is closed")
-        kind = RowsFile if self._thread is None else HeldRows
-        file = kind(str(path), self.comm, compression=self._compression)
+        file = RowsFile(str(path), self.comm, compression=self._compression)
         frame = Frame(file, f"{self.folder.name}/{name}.h5", self.real)
         yield frame
+        file.wait()
         text = f"{head}{''.join(frame.text)}"
 
         def write() -> None:
@@ -244,7 +244,7 @@ class Output:
 class Frame:
     """A file of a series that is being written."""
 
-    def __init__(self, file: RowsFile | HeldRows, address: str, real: np.dtype[Any]) -> None:
+    def __init__(self, file: RowsFile, address: str, real: np.dtype[Any]) -> None:
         self._file, self._address, self._real = file, address, real
         self.text: list[str] = []
         """Its description in the XDMF file"""
