@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
-from common.files import OutputError
 from common.movie import frame_of, particle_movie
 from common.options import add_count, add_number, study_parser
 from common.page import Page
@@ -117,12 +116,12 @@ def main(arguments: list[str] | None = None) -> int:
             "Load imbalance (maximum over mean) [-]", limits=(1.0, 1.05 * max(first.imbalance)))  # fmt: skip
         page = Page(movies=[particle_movie(name, scene, run.frames, {"rank": RANK}) for name, run in runs.items()],
                     captions={"imbalance": "Load imbalance: maximum over mean number of particles per rank"})  # fmt: skip
-        print(f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
-              f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions; "
-              f"results in {folder}")  # fmt: skip
-    write_summary(folder, a, results, comm, page, pictures)
-    return 0
+    said = (
+        f"load imbalance: {results['mean_imbalance_first_partition']:.2f} with the first partition, "
+        f"{results['mean_imbalance_repartitioned']:.2f} with {repartitioned.repartitions} repartitions"
+    )
+    return write_summary(folder, a, results, comm, page, pictures, said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -19,7 +19,6 @@ from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.flow_impact import bore
 from common.history import History
 from common.movie import particle_movie
@@ -241,4 +240,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -13,7 +13,6 @@ from time import perf_counter
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
-from common.files import OutputError
 from common.options import check, study_parser
 from common.ranks import run_study
 from common.results import open_results
@@ -31,7 +30,6 @@ from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 
@@ -122,15 +120,15 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder))
-    if comm.rank == 0:
-        print(f"limit analysis: {spiral.unit_weight / 1e3:.2f} kN/m3 with associated flow, {davis_unit_weight(a) / 1e3:.2f} "
-              "with Davis' reduced strength without dilation")  # fmt: skip
-        if spiral.curve[0, 0] < 0:
-            print("its slip line starts behind the mesh: --crest is too short to compare")
-        print(f"{found.lines()}\nresults in {folder}")
+    said = (
+        f"limit analysis: {spiral.unit_weight / 1e3:.2f} kN/m3 with associated flow, {davis_unit_weight(a) / 1e3:.2f} "
+        "with Davis' reduced strength without dilation\n"
+    )
+    if spiral.curve[0, 0] < 0:
+        said += "its slip line starts behind the mesh: --crest is too short to compare\n"
+    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder), said=said + found.lines())
     return found.exit_code()
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

@@ -12,7 +12,6 @@ from time import process_time
 
 import numpy as np
 from common.field_plots import bend, save_curves
-from common.files import OutputError
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.ranks import run_study
@@ -137,10 +136,8 @@ def main(arguments: list[str] | None = None) -> int:
     )}  # fmt: skip
     captions = {"load_displacement": "Unit weight over displacement on the way to collapse."}
     summary = {"limit_analysis_unit_weight": expected, "runs": rows, "curves": curves}
-    write_summary(folder, a, summary, comm, Page(captions=captions), pictures)
-    print(f"results in {folder}")
-    return 0
+    return write_summary(folder, a, summary, comm, Page(captions=captions), pictures, said="")
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -17,7 +17,6 @@ from time import perf_counter
 import numpy as np
 from common.field_plots import save_log_log, save_side_by_side
 from common.figures import Pictures
-from common.files import OutputError
 from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_choice, add_count, add_number, study_parser
 from common.page import Page
@@ -236,10 +235,8 @@ def main(arguments: list[str] | None = None) -> int:
     }
     scene = case.scene() if frames else None
     movies = [particle_movie(name, scene, shown) for name, shown in zip(("FEM", "MPM"), zip(*frames))]
-    write_summary(folder, a, summary, comm, Page(movies=movies, slider=("unit weight", "kN/m\u00b3")), pictures)
-    if comm.rank == 0:
-        print(f"results in {folder}")
-    return 0
+    page = Page(movies=movies, slider=("unit weight", "kN/m\u00b3"))
+    return write_summary(folder, a, summary, comm, page, pictures, said="")
 
 
 def line(row: dict) -> str:
@@ -253,4 +250,4 @@ def line(row: dict) -> str:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -22,7 +22,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import save_figure
-from common.files import OutputError
 from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.plots import CURVES, WIDTH, paper_style
@@ -270,11 +269,10 @@ def main(arguments: list[str] | None = None) -> int:
     ratios = speed_up(rows)
     results = {f"explicit_over_newton_{soil}_seconds_ratio": ratio for soil, ratio in ratios.items()}
     captions = {"cost": "Cost of equilibrium; hollow markers with an arrow are lower bounds."}
-    write_summary(folder, a, {**results, "equilibrium": rows, "steps": steps}, comm, Page(captions=captions),
-                  {"cost": lambda: save_costs(folder / "cost.png", rows)})  # fmt: skip
-    print(f"results in {folder}")
-    return 0
+    pictures = {"cost": lambda: save_costs(folder / "cost.png", rows)}
+    results |= {"equilibrium": rows, "steps": steps}
+    return write_summary(folder, a, results, comm, Page(captions=captions), pictures, said="")
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -16,7 +16,6 @@ from time import process_time
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.followed import cells_near, mean_displacement, numbers_in
 from common.movie import frame_of, particle_frame, particle_movie
 from common.options import add_count, add_number, check, study_parser
@@ -237,13 +236,12 @@ def main(arguments: list[str] | None = None) -> int:
         "cells": "Resting cells (triangles) and particles at the end",
     }  # fmt: skip
     movie = particle_movie(KINDS["coupled"], runs["coupled"]["scene"], runs["coupled"]["frames"])
-    write_summary(folder, a, summary, comm, Page(movies=[movie], captions=captions), drawn(runs, folder))
-    if comm.rank == 0:
-        print(f"crest {summary['relative_difference_of_crest']:.1%} and toe {summary['relative_difference_of_toe']:.1%} apart, "
-              f"in {summary['ratio_of_seconds']:.0%} of the time; {summary['converted_fraction']:.0%} of the cells turned into "
-              f"particles; results in {folder}")  # fmt: skip
-    return 0
+    said = (
+        f"crest {summary['relative_difference_of_crest']:.1%} and toe {summary['relative_difference_of_toe']:.1%} apart, in "
+        f"{summary['ratio_of_seconds']:.0%} of the time; {summary['converted_fraction']:.0%} of the cells turned into particles"
+    )
+    return write_summary(folder, a, summary, comm, Page(movies=[movie], captions=captions), drawn(runs, folder), said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -28,7 +28,6 @@ from common.earthquake_site import (
     rock_impedances,
 )
 from common.figures import Pictures
-from common.files import OutputError
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.motions import ricker
@@ -263,13 +262,13 @@ def main(arguments: list[str] | None = None) -> int:
     scene = scene_of(model, [bridge.SOIL, STIFF])
     page = Page(movies=[particle_movie("slope", scene, frames)], captions=captions)
     pictures = drawn(a, folder, record, history, slips, ratios, frames, scene) if a.pictures else {}
-    write_summary(folder, a, summary, comm, page, pictures)
-    if comm.rank == 0:
-        print(f"slope displaced by {summary['slope_displacement_m']:.3f} m, Newmark's blocks by {slips['toe'][-1]:.3f} and "
-              f"{slips['crest'][-1]:.3f} m; linear amplification within "
-              f"{summary['largest_error_of_linear_amplification']:.1%} of the closed form; results in {folder}")  # fmt: skip
-    return 0
+    said = (
+        f"slope displaced by {summary['slope_displacement_m']:.3f} m, Newmark's blocks by {slips['toe'][-1]:.3f} and "
+        f"{slips['crest'][-1]:.3f} m; linear amplification within {summary['largest_error_of_linear_amplification']:.1%} of "
+        "the closed form"
+    )
+    return write_summary(folder, a, summary, comm, page, pictures, said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

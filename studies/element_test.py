@@ -6,14 +6,12 @@ pressure is drawn. A law of your own is given by --python-law FILE.py:CLASS, or 
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import save_figure
-from common.files import OutputError
 from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
 from common.plots import paper_style
@@ -135,14 +133,10 @@ def main(arguments: list[str] | None = None) -> int:
     end = {name: float(history[name][-1]) for name in COLUMNS}
     summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
     pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
-    write_summary(folder, a, summary, pictures=pictures)
     largest = history["q_Pa"].max()
-    print(f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa")
-    if stopped:
-        print(f"the test ended early: {stopped}", file=sys.stderr)
-    print(f"results in {folder}")
-    return 1 if stopped else 0
+    said = f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa"
+    return write_summary(folder, a, summary, pictures=pictures, said=said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

@@ -14,7 +14,6 @@ from time import perf_counter
 
 import numpy as np
 from common import site_slides
-from common.files import OutputError
 from common.interrupt import Interrupt
 from common.movie import particle_movie
 from common.options import study_parser
@@ -133,15 +132,14 @@ def main(arguments: list[str] | None = None) -> int:
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"
     movie = [particle_movie(slide, scene, result.frames)]
-    write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn)
     if comm.rank == 0:
-        for who, message in (("finite elements", failed), ("particles", failed_particles), ("slide", stopped)):
+        for who, message in (("finite elements", failed), ("particles", failed_particles)):
             if message:
                 print(f"{who}: {message}", file=sys.stderr)
-        print(f"slide, {slide}: largest displacement {moved:.3f} m after "
-              f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip
-    return interrupt.exit_code or (1 if stopped else 0)
+    said = f"slide, {slide}: largest displacement {moved:.3f} m after {result.history['time_s'][-1]:.3g} s"
+    code = write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn, said)
+    return interrupt.exit_code or code
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

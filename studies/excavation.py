@@ -8,12 +8,10 @@ computes the difference that stages make in plastic soil.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from time import perf_counter
 
 import numpy as np
-from common.files import OutputError
 from common.options import add_switch, study_parser
 from common.page import Page
 from common.ranks import run_study
@@ -97,17 +95,13 @@ def main(arguments: list[str] | None = None) -> int:
     captions = {"stages_displacement": "The soil after each stage, by its displacement",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
                 "movements": "Largest movements after each stage"}  # fmt: skip
-    write_summary(
-        folder, a, summary, comm, Page(captions=captions), stage_pictures(site.stages, rows, pictures, folder)
+    said = "\n".join(
+        f"{name.replace('_', ' ')}: {'not carried at once' if value is None else f'{value:.2g}'}"
+        for name, value in compared.items()
     )
-    if comm.rank == 0:
-        for name, value in compared.items():
-            print(f"{name.replace('_', ' ')}: {'not carried at once' if value is None else f'{value:.2g}'}")
-        if stopped:
-            print(f"ended early: {stopped}", file=sys.stderr)
-        print(f"results in {folder}")
-    return 1 if stopped else 0
+    drawn = stage_pictures(site.stages, rows, pictures, folder)
+    return write_summary(folder, a, summary, comm, Page(captions=captions), drawn, said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

@@ -13,7 +13,6 @@ from time import perf_counter
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
-from common.files import OutputError
 from common.options import add_count, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import ROOT, open_results
@@ -23,7 +22,6 @@ from common.summary import write_summary
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 AXIS, BASE, FAR, FOOTING = 1, 2, 3, 5
@@ -165,11 +163,10 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_settlement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder))
-    if comm.rank == 0:
-        print(f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}\nresults in {folder}")
+    said = f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}"
+    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder), said=said)
     return found.exit_code()
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

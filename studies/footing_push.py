@@ -19,7 +19,6 @@ import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
@@ -213,4 +212,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

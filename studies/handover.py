@@ -15,7 +15,6 @@ from time import perf_counter
 import numpy as np
 from common.field_plots import save_curves
 from common.figures import Pictures
-from common.files import OutputError
 from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
@@ -29,7 +28,6 @@ from common.watch import Watch
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 from particle_player import Movie
 
 comm = MPI.COMM_WORLD
@@ -152,11 +150,8 @@ def main(arguments: list[str] | None = None) -> int:
         "handovers": [row_of(run) for run in runs],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, Page(movies=movies(runs) if comm.rank == 0 else ()),
-                  drawn(runs, folder))  # fmt: skip
-    if comm.rank == 0:
-        print_summary(summary, folder)
-    return 0
+    page = Page(movies=movies(runs) if comm.rank == 0 else ())
+    return write_summary(folder, a, summary, comm, page, drawn(runs, folder), said(summary))
 
 
 def row_of(run: dict) -> dict:
@@ -173,20 +168,21 @@ def row_of(run: dict) -> dict:
     }
 
 
-def print_summary(summary: dict, folder: Path) -> None:
-    print(
-        f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3"
-    )
-    print("load   unit weight  out of balance before, after  newly yielded  run-out   crest")
+def said(summary: dict) -> str:
+    """What is printed in the end."""
+    lines = [
+        f"collapse of the finite elements at {summary['collapse_unit_weight_of_the_finite_elements'] / 1e3:.2f} kN/m3",
+        "load   unit weight  out of balance before, after  newly yielded  run-out   crest",
+    ]
     for row in summary["handovers"]:
         balance = "          -         -                -   "
         if row["newly_yielded_fraction"] is not None:
             balance = (f"{row['out_of_balance_ratio_before']:13.1e}{row['out_of_balance_ratio_after']:13.1e}"
                        f"{row['newly_yielded_fraction']:17.2%}")  # fmt: skip
-        print(f"{row['fraction_of_collapse']:5.0%}{row['unit_weight'] / 1e3:8.2f} kN/m3{balance:>43}"
-              f"{row['runout_m']:9.4f} m{row['crest_displacement_m']:8.4f} m")  # fmt: skip
-    print(f"run-out changes by {summary['largest_relative_change_of_runout']:.1%} at most; results in {folder}")
+        lines.append(f"{row['fraction_of_collapse']:5.0%}{row['unit_weight'] / 1e3:8.2f} kN/m3{balance:>43}"
+                     f"{row['runout_m']:9.4f} m{row['crest_displacement_m']:8.4f} m")  # fmt: skip
+    return "\n".join([*lines, f"run-out changes by {summary['largest_relative_change_of_runout']:.1%} at most"])
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -15,7 +15,6 @@ from time import perf_counter
 from types import ModuleType
 
 from common.figures import Pictures
-from common.files import OutputError
 from common.options import add_count, check, study_parser
 from common.page import Page
 from common.ranks import run_study
@@ -25,9 +24,6 @@ from locking_cases import CASES
 from locking_cases.pictures import save_errors, save_pressures
 from locking_cases.runs import Found
 from mpi4py import MPI
-
-import fenics_bridge as bridge
-import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
 SCHEMES = ("implicit", "explicit")
@@ -133,11 +129,8 @@ def main(arguments: list[str] | None = None) -> int:
         **results,
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, Page(captions=captions), pictures)
-    if comm.rank == 0:
-        print(f"results in {folder}")
-    return 0
+    return write_summary(folder, a, summary, comm, Page(captions=captions), pictures, said="")
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, bridge.InputError, OutputError)
+    run_study(main)

@@ -9,7 +9,6 @@ with half of it are compared.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,7 +18,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from common.animation import film_frames, save_animation
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import particle_frame, particle_movie
@@ -246,20 +244,17 @@ def main(arguments: list[str] | None = None) -> int:
         }
         for r in results
     }  # fmt: skip
-    stopped = any(r.stopped for r in results)
-    write_summary(folder, a, {"finished_run": not stopped, "cells": found, "difference_between_meshes": differences(results)},
-                  comm, Page(movies=movies), pictures if a.pictures else {})  # fmt: skip
-    if comm.rank == 0:
-        for result in results:
-            if result.stopped:
-                print(f"the run with cells of {result.cell_size:g} m ended early: {result.stopped}", file=sys.stderr)
-        for size, f in found.items():
-            print(f"{size}: failed back {f['retrogression_m']:.2f} m, run-out {f['runout_m']:.2f} m, "
-                  f"work of the stresses {f['work_of_stresses_J_per_m'] / 1e6:.3f} MJ/m, "
-                  f"{'at rest' if f['at_rest'] else 'not at rest'} after {f['time_s']:.1f} s")  # fmt: skip
-        print(f"results in {folder}")
-    return interrupt.exit_code or (1 if stopped else 0)
+    stopped = "; ".join(f"with cells of {r.cell_size:g} m {r.stopped}" for r in results if r.stopped) or None
+    said = "\n".join(
+        f"{size}: failed back {f['retrogression_m']:.2f} m, run-out {f['runout_m']:.2f} m, work of the stresses "
+        f"{f['work_of_stresses_J_per_m'] / 1e6:.3f} MJ/m, {'' if f['at_rest'] else 'not '}at rest after {f['time_s']:.1f} s"
+        for size, f in found.items()
+    )
+    summary = {"finished_run": stopped is None, "stopped_because": stopped, "cells": found,
+               "difference_between_meshes": differences(results)}  # fmt: skip
+    code = write_summary(folder, a, summary, comm, Page(movies=movies), pictures if a.pictures else {}, said)
+    return interrupt.exit_code or code
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

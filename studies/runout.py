@@ -15,7 +15,6 @@ from time import perf_counter
 
 import numpy as np
 from common.figures import Pictures
-from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -244,15 +243,12 @@ def main(arguments: list[str] | None = None) -> int:
         "particle_steps_per_second": report.particle_steps / seconds, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
     pictures = write_maps(a, found, rupture, folder) if comm.rank == 0 else {}
-    write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {})
-    if comm.rank == 0:
-        if stopped:
-            print(f"the run ended early: {stopped}", file=sys.stderr)
-        print(f"front {summary['front_m']:.1f} m from the centre, which fell {fall:.1f} m over {travel:.1f} m; "
-              f"fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps/s\n"
-              f"results in {folder}")  # fmt: skip
-    return 1 if stopped else 0
+    said = (
+        f"front {summary['front_m']:.1f} m from the centre, which fell {fall:.1f} m over {travel:.1f} m; fastest "
+        f"{summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps/s"
+    )
+    return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

@@ -14,7 +14,6 @@ from time import perf_counter
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
-from common.files import OutputError
 from common.options import add_flag, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import open_results
@@ -170,11 +169,10 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder))
-    if comm.rank == 0:
-        print(f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}\nresults in {folder}")
+    said = f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}"
+    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder), said=said)
     return found.exit_code()
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

@@ -16,7 +16,6 @@ from time import perf_counter
 
 import dolfinx
 import numpy as np
-from common.files import OutputError
 from common.options import add_count, study_parser
 from common.ranks import run_study
 from common.results import open_results
@@ -158,4 +157,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

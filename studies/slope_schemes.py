@@ -17,7 +17,6 @@ from time import process_time
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.movie import particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -228,13 +227,13 @@ def main(arguments: list[str] | None = None) -> int:
         row["over_explicit"] = row["crest_displacement_m"] / reference
     names = dict(zip(table, runs))
     movies = [particle_movie(name, scene, run.frames) for name, run in names.items()]
-    write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]), drawn(runs, scene, folder))
     if comm.rank == 0:
-        print_table(table, folder)
+        print_table(table)
+    write_summary(folder, a, {"runs": table}, comm, Page(movies=movies[:2]), drawn(runs, scene, folder), said="")
     return 1 if any(run.stopped for run in runs) else 0
 
 
-def print_table(table: dict[str, dict], folder: Path) -> None:
+def print_table(table: dict[str, dict]) -> None:
     print(f"{'':36} crest [m]  over explicit  ended at [s]           steps  iterations  CPU [s]  out of balance")
     for name, r in table.items():
         state = "at rest" if r["at_rest"] else "moving"
@@ -242,8 +241,7 @@ def print_table(table: dict[str, dict], folder: Path) -> None:
               f"{r['steps']:5}  {r['iterations']:10}  {r['cpu_seconds']:7.2f}  {r['unbalanced_ratio']:14.2e}")  # fmt: skip
         if r["stopped_because"]:
             print(f"  ended early: {r['stopped_because']}", file=sys.stderr)
-    print(f"results in {folder}")
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -21,7 +21,6 @@ from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
 from common.earth_pressure import coulomb, stress_field, wall_acceleration
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
@@ -288,4 +287,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

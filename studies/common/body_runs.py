@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -63,7 +62,8 @@ class BodyRun:
     history: History
     frames: list[dict] = field(default_factory=list)
     stopped: str | None = None
-    exit_code: int = 0
+    interrupted: int = 0
+    """Exit code of a run that a signal ended"""
     particle_steps_per_second: float = 0.0
 
 
@@ -145,7 +145,7 @@ def follow(
             probe.close()
         frames = [gathered(comm, frame) for frame in kept]
         result.frames = [frame for frame in frames if frame is not None]
-        result.exit_code = interrupt.exit_code or (1 if result.stopped else 0)
+        result.interrupted = interrupt.exit_code
     return result
 
 
@@ -200,14 +200,9 @@ def write_results(
         "time_s": report.time, "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction,
         "particle_steps_per_second": result.particle_steps_per_second, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
-    write_summary(
-        folder, a, summary, model.comm, Page(movies=list(movies), captions={**captions, **CAPTIONS}), pictures
-    )
-    if model.comm.rank == 0:
-        if result.stopped:
-            print(f"the run ended early: {result.stopped}; what there is has been written", file=sys.stderr)
-        print(f"{said}\nresults in {folder}")
-    return result.exit_code
+    page = Page(movies=list(movies), captions={**captions, **CAPTIONS})
+    code = write_summary(folder, a, summary, model.comm, page, pictures, said)
+    return result.interrupted or code
 
 
 def scheme(a: Namespace) -> dict[str, Any]:

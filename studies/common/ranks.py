@@ -14,7 +14,9 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from .files import NOT_WRITTEN, PROGRAM
+from mpm_core import InputError, RunError
+
+from .files import NOT_WRITTEN, PROGRAM, OutputError
 
 
 def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
@@ -63,8 +65,8 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     Args:
         main: the study. When it returns 0 but a picture or film could not be written, the code is 1, and the last lines say
             why.
-        expected: errors whose message is all that the user needs; they end the script with code 2. Ctrl-C, where the
-            study does not catch it by `Interrupt`, ends it with code 130.
+        expected: errors whose message is all that the user needs, beside those of Talus; they end the script with code 2.
+            Ctrl-C, where the study does not catch it by `Interrupt`, ends it with code 130.
     """
     comm, script = MPI.COMM_WORLD, Path(sys.argv[0])
     name = script.parent.name if script.stem == "__main__" else script.stem
@@ -76,7 +78,7 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
         for reason in NOT_WRITTEN:
             print(f"{PROGRAM} {name}: {reason}", file=sys.stderr)
         sys.exit(code or (1 if NOT_WRITTEN else 0))
-    except expected as error:
+    except (InputError, RunError, OutputError, *expected) as error:
         if comm.rank == 0:
             print(f"{PROGRAM} {name}: {error}", file=sys.stderr)
         sys.exit(2)

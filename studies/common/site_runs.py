@@ -59,14 +59,12 @@ def site_study(
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    write_summary(
-        folder, a, summary, comm, pictures=_drawn(folder, sizes, runs, label, site.axisymmetric, model.cell_tags)
-    )
-    if comm.rank == 0:
-        for row in rows:
-            sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
-            print(f"cells of {row['cell_size_m'] or np.nan:g} m: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
-        print(f"results in {folder}")
+    said = []
+    for row in rows:
+        sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
+        said.append(f"cells of {row['cell_size_m'] or np.nan:g} m: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
+    drawn = _drawn(folder, sizes, runs, label, site.axisymmetric, model.cell_tags)
+    write_summary(folder, a, summary, comm, pictures=drawn, said="\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -191,11 +190,7 @@ def site_slide(a: Namespace) -> int:
     }  # fmt: skip
     scene = scene_of(model, sorted(site.laws))
     movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
-    write_summary(folder, a, summary, comm, Page(movies=movies, captions=CAPTIONS),
-                  slide_pictures(a, result, scene, folder))  # fmt: skip
-    if comm.rank == 0:
-        print(f"strength divided by {a.factor:g}: largest displacement {moved:.3f} m after "
-              f"{result.history['time_s'][-1]:.3g} s\nresults in {folder}")  # fmt: skip
-        if stopped:
-            print(f"the run ended early: {stopped}", file=sys.stderr)
-    return interrupt.exit_code or (1 if stopped else 0)
+    said = f"strength divided by {a.factor:g}: largest displacement {moved:.3f} m after {result.history['time_s'][-1]:.3g} s"
+    page, pictures = Page(movies=movies, captions=CAPTIONS), slide_pictures(a, result, scene, folder)
+    code = write_summary(folder, a, summary, comm, page, pictures, said)
+    return interrupt.exit_code or code

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import sys
 from argparse import Namespace
 from collections.abc import Mapping
 from datetime import datetime, timezone
@@ -28,7 +29,8 @@ def write_summary(
     comm: MPI.Comm = MPI.COMM_WORLD,
     page: Page | None = None,
     pictures: Pictures | None = None,
-) -> None:
+    said: str | None = None,
+) -> int:
     """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names; then pictures and page.
 
     The pictures come second, so that a full disk costs them and not the results. Everything goes to the page ``report.html``
@@ -41,12 +43,22 @@ def write_summary(
         results: numbers, texts, lists or mappings of these, NumPy's too, by name (names end in their unit: ``_m``).
         page: what the study adds to its page, such as moving particles.
         pictures: figures and films, drawn on the first rank when the summary is on the disk.
+        said: what the study prints at its end; where the results are follows, and why the run ended early. None prints nothing.
+
+    Returns:
+        The study's exit code: 1 where the results have a reason as ``stopped_because``, else 0.
 
     Raises:
         OutputError: on all ranks, with path and reason, when ``summary.json`` cannot be written. A picture, a film or the page
             that cannot be written costs only itself.
     """
     on_first_rank(comm, lambda: _write(folder, options, results, comm, page, pictures or {}), OutputError)
+    stopped = results.get("stopped_because")
+    if said is not None and comm.rank == 0:
+        print("\n".join([*filter(None, [said]), f"results in {folder}"]), flush=True)
+        if stopped:
+            print(f"the run ended early: {stopped}; what there is has been written", file=sys.stderr)
+    return 1 if stopped else 0
 
 
 def _write(

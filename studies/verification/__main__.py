@@ -13,7 +13,6 @@ from time import process_time
 
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
-from common.files import OutputError
 from common.options import add_flag, check, study_parser
 from common.ranks import run_study
 from common.results import ROOT, note_what_was_written, open_results, subfolder
@@ -122,4 +121,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, OutputError)
+    run_study(main)

@@ -12,13 +12,10 @@ STUDIES = Path(__file__).parents[1]
 if str(STUDIES) not in sys.path:
     sys.path.insert(0, str(STUDIES))  # a case imports what studies share, and other studies
 
-from common.files import OutputError  # noqa: E402
 from common.options import add_flag, study_parser  # noqa: E402
 from common.ranks import run_study  # noqa: E402
 from common.results import note_what_was_written, open_results  # noqa: E402
 from mpi4py import MPI  # noqa: E402
-
-import mpm_core as mpm  # noqa: E402
 
 
 class Kind(Enum):
@@ -105,4 +102,4 @@ def run_alone(case: Callable[[bool, Path], Result]) -> None:
             note_what_was_written(folder)
         return 0 if all(check.passed or check.limit for check in result.checks) else 1
 
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)
