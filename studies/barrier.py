@@ -13,17 +13,16 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.flow_impact import bore
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_number, check, study_parser
-from common.plots import CURVES, Scene, paper_style
+from common.plots import CURVES, Scene
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -186,18 +185,14 @@ def full_force(a: Namespace, history: History) -> float | None:
 
 def draw_force(path: Path, a: Namespace, history: History) -> None:
     """The force over time, with those of the two bores."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.6, 3.2), layout="constrained")
+    with curve_figure(path) as axes:
         axes.plot(history["time_s"], 1e-3 * unit_force(a) * history["force_factor"], color=CURVES[0], label="computed")
         for (_, force), name, style in zip(
             bores(a), ("bore in a fluid", "bore in sand, passive"), (":", "--"), strict=True
         ):
             axes.axhline(1e-3 * unit_force(a) * force, color="black", linewidth=0.9, linestyle=style, label=name)
         axes.set(xlabel="Time [s]", ylabel="Force on the wall [kN/m]", xlim=(0, None), ylim=(0, None))
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower right")
-        save_figure(figure, path, dpi=200)
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:

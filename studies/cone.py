@@ -16,16 +16,15 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
 from common.cone_theory import lu, spherical_limit_pressure, teh_houlsby
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
-from common.plots import CURVES, Scene, paper_style
+from common.plots import CURVES, Scene
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
@@ -193,8 +192,7 @@ def in_the_end(history: History) -> tuple[float, float | None]:
 
 def draw_resistance(path: Path, a: Namespace, history: History) -> None:
     """The cone factor over the depth, which goes down."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(3.8, 4.6), layout="constrained")
+    with curve_figure(path, (3.8, 4.6)) as axes:
         depth = history["depth_m"] / (2 * a.radius)
         axes.plot(history["cone_factor"], depth, color=CURVES[0], label=f"{a.face} cone")
         for (name, value), line in zip(estimates(a).items(), ("--", ":")):
@@ -202,10 +200,7 @@ def draw_resistance(path: Path, a: Namespace, history: History) -> None:
         strength = "$s_u$" if a.friction_angle == 0 else "$c$"
         axes.set(xlabel=f"Cone resistance over {strength} [-]", ylabel="Depth of the shoulder over the diameter [-]",
                  xlim=(0, None), ylim=(depth[-1], depth[0]))  # fmt: skip
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower left")
-        save_figure(figure, path, dpi=200)
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:

@@ -9,12 +9,10 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
-from common.figures import save_figure
+from common.figures import curve_figure
 from common.history import History
 from common.options import add_choice, add_count, add_number, study_parser
-from common.plots import paper_style
 from common.ranks import run_study
 from common.results import open_results
 from common.slope_case import add_soil_options
@@ -107,19 +105,16 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         ),
         (strain, history[last[0]] * last[1], strain_label, last[2]),
     ]
-    with paper_style():
-        figure, axes = plt.subplots(1, 3, figsize=(10, 3.2), layout="constrained")
+    with curve_figure(path, (10, 3.2), panels=3) as axes:
         for ax, (x, y, x_label, y_label) in zip(axes, panels, strict=True):
             ax.plot(x, y, color="#1f3b73")
             ax.plot(x[:1], y[:1], "o", color="black", markersize=4, markerfacecolor="white", clip_on=False, zorder=3)
             ax.set_xlabel(x_label)
             ax.set_ylabel(y_label)
             ax.set_ylim(min(0.0, 1.05 * y.min()), max(1.05 * y.max(), 1e-12))
-            ax.grid(linewidth=0.3, color="#d0d0d0")
         axes[0].set_xlim(
             min(0.0, 1.05 * axes[0].dataLim.x0), 1.05 * axes[0].dataLim.x1
         )  # nothing looks larger than it is
-        save_figure(figure, path, dpi=200)
 
 
 def main(arguments: list[str] | None = None) -> int:

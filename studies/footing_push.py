@@ -14,15 +14,14 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
-from common.plots import CURVES, Scene, paper_style
+from common.plots import CURVES, Scene
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
@@ -158,8 +157,7 @@ def collapse_factor(a: Namespace, history: History) -> float | None:
 
 def draw_load(path: Path, a: Namespace, history: History) -> None:
     """The load factor over the settlement, with the exact one."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.6, 3.2), layout="constrained")
+    with curve_figure(path) as axes:
         settled = history["settlement_m"] / (2 * a.half_width)
         axes.plot(settled, history["load_factor"], color=CURVES[0], label=f"{a.base} {a.shape} footing")
         axes.axhline(
@@ -172,10 +170,7 @@ def draw_load(path: Path, a: Namespace, history: History) -> None:
             xlim=(0, None),
             ylim=(0, None),
         )
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower right")
-        save_figure(figure, path, dpi=200)
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:

@@ -14,17 +14,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common.animation import film_frames, save_animation
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import particle_frame, particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, paper_style, save_particles
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
@@ -197,8 +196,7 @@ def drawn(a: Namespace, result: Slide, scene: Scene | None, folder: Path) -> Pic
 
 def compare(results: list[Slide], folder: Path) -> None:
     """The measures over time on all mesh sizes; on the first rank."""
-    with paper_style():
-        figure, axes = plt.subplots(1, len(MEASURES), figsize=(10, 3.2), layout="constrained")
+    with curve_figure(folder / "meshes.png", (10, 3.2), panels=len(MEASURES)) as axes:
         for ax, (column, label) in zip(axes, MEASURES.items(), strict=True):
             for result, style in zip(results, ("-", "--")):
                 values = result.history[column] * (1e-6 if "[MJ" in label else 1.0)
@@ -206,9 +204,7 @@ def compare(results: list[Slide], folder: Path) -> None:
                     result.history["time_s"], values, style, color="#1f3b73", label=f"cells of {result.cell_size:g} m"
                 )
             ax.set(xlabel="Time [s]", ylabel=label, xlim=(0, None), ylim=(0, None))
-            ax.grid(linewidth=0.3, color="#d0d0d0")
         axes[0].legend(frameon=False)
-        save_figure(figure, folder / "meshes.png", dpi=200)
 
 
 def differences(results: list[Slide]) -> dict[str, float]:

@@ -16,7 +16,7 @@ from time import process_time
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure, save_figure
 from common.movie import particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -175,8 +175,7 @@ def save_pair(path: Path, scene: Scene, runs: list[Run], key: str, quantity: Qua
 
 def save_crests(path: Path, runs: list[Run]) -> None:
     """Displacement of the crest over time, on a logarithmic axis: one scheme takes ten times as long as the other."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(5.2, 3.3), layout="constrained")
+    with curve_figure(path, (5.2, 3.3)) as axes:
         for k, run in enumerate(runs):
             time, crest = np.array(run.curve)[1:].T
             axes.semilogx(
@@ -187,9 +186,7 @@ def save_crests(path: Path, runs: list[Run]) -> None:
                 label=run.name,
             )
         axes.set(xlabel="Time [s]", ylabel="Displacement of the particle at the crest [m]", ylim=(0, None))
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(loc="lower right")
-        save_figure(figure, path)
 
 
 def drawn(runs: list[Run], scene: Scene | None, folder: Path) -> Pictures:

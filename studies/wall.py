@@ -14,17 +14,16 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
 from common.earth_pressure import coulomb, stress_field, wall_acceleration
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
-from common.plots import CURVES, GREY, Scene, paper_style
+from common.plots import CURVES, GREY, Scene
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -223,8 +222,7 @@ def in_the_end(a: Namespace, history: History, column: str) -> float:
 
 def draw_pressure(path: Path, a: Namespace, history: History) -> None:
     """The coefficient over the displacement of the wall, or over time where it is free, with the bounds."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.6, 3.2), layout="constrained")
+    with curve_figure(path) as axes:
         free = a.motion == "free"
         along = history["time_s"] - at_rest(a) if free else np.abs(history["wall_displacement_m"]) / a.height
         axes.plot(along, history["coefficient"], color=CURVES[0], label="computed")
@@ -239,10 +237,7 @@ def draw_pressure(path: Path, a: Namespace, history: History) -> None:
             )
         xlabel = "Time since the sand was at rest [s]" if free else "Displacement of the wall over its height [-]"
         axes.set(xlabel=xlabel, ylabel="Coefficient of earth pressure [-]", xlim=(0, None), ylim=(0, None))
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend()
-        save_figure(figure, path, dpi=200)
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:

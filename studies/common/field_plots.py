@@ -18,7 +18,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator
 import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
-from .figures import save_figure
+from .figures import curve_figure, save_figure
 from .plots import (
     CURVES,
     ROUND_TICKS,
@@ -148,15 +148,14 @@ def save_curves(
         limits: of the axes; None to fit.
         per_colour: curves that follow one another in one colour, each with a line of its own.
     """
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
+    with curve_figure(path, (4.9, 3.3)) as axes:
         for k, (name, (x, y)) in enumerate(curves.items()):
             axes.plot(x, y, ("o-", "s:")[k % per_colour], color=CURVES[k // per_colour % len(CURVES)], markersize=2.5,
                       linewidth=1.1, label=name)  # fmt: skip
         if reference:
             axes.axhline(reference[0], color="black", linestyle="--", linewidth=0.9, label=reference[1])
-        _finish(axes, labels, limits)
-        _save(figure, path)
+        axes.set(xlabel=labels[0], ylabel=labels[1], xlim=limits[0], ylim=limits[1])
+        axes.legend(fontsize=8, loc="best")
 
 
 def save_convergence(
@@ -192,8 +191,7 @@ def save_log_log(
 ) -> None:
     """Draw differences over the mesh size, or what `axis` says, in logarithmic axes, with a line of a slope beside them."""
     sizes = np.asarray(sizes)
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
+    with curve_figure(path, (4.9, 3.6)) as axes:
         for k, (name, values) in enumerate(curves.items()):
             axes.loglog(sizes, values, "os^v"[k % 4] + "-", color=CURVES[k % len(CURVES)], markersize=4, label=name)
         lowest = np.nanmin([value for values in curves.values() for value in values])
@@ -203,12 +201,8 @@ def save_log_log(
         axes.minorticks_off()
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        axes.set_xlabel(axis)
-        axes.set_ylabel(label)
-        axes.tick_params(top=True, right=True, which="both")
-        axes.grid(linewidth=0.3, color="#d0d0d0")
+        axes.set(xlabel=axis, ylabel=label)
         axes.legend(fontsize=8)
-        _save(figure, path)
 
 
 def bend(curves: Sequence[np.ndarray], fraction: float = 0.8) -> float:
@@ -217,16 +211,6 @@ def bend(curves: Sequence[np.ndarray], fraction: float = 0.8) -> float:
     curves: (k, 2) load and displacement, each with the load rising; fraction: of a curve's last load, where it still is steep
     """
     return 3.0 * max(np.interp(fraction * curve[-1, 0], *curve.T) for curve in curves)
-
-
-def _finish(axes: Axes, labels: tuple[str, str], limits: tuple) -> None:
-    axes.set_xlabel(labels[0])
-    axes.set_ylabel(labels[1])
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
-    axes.tick_params(top=True, right=True)
-    axes.grid(linewidth=0.3, color="#d0d0d0")
-    axes.legend(fontsize=8, loc="best")
 
 
 # --- fields ----------------------------------------------------------------------------------------------------------

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -11,6 +13,7 @@ from matplotlib.figure import Figure
 from .files import NOT_WRITTEN, expendable
 from .progress import counted
 
+STYLE = Path(__file__).with_name("paper.mplstyle")
 Pictures = Mapping[str, Callable[[], object]]
 """Functions that draw pictures, by the names of their files; called on the first rank only, so without collective calls"""
 
@@ -50,3 +53,23 @@ def save_figure(figure: Figure, path: Path, **look: object) -> None:
         _note(path.name, error)
     finally:
         plt.close(figure)
+
+
+def paper_style() -> AbstractContextManager[None]:
+    """Fonts and lines of all pictures, as a context."""
+    return plt.style.context(STYLE)
+
+
+@contextmanager
+def curve_figure(path: Path, size: tuple[float, float] = (4.6, 3.2), panels: int = 1) -> Iterator[Any]:
+    """Axes for curves, with a grid and ticks on all sides; in the end the picture is written, see `save_figure`.
+
+    Args:
+        path: of the picture.
+        size: width and height [inches].
+        panels: axes side by side; of one the axes are given, of several an array of them.
+    """
+    with paper_style(), plt.rc_context({"axes.grid": True, "xtick.top": True, "ytick.right": True}):
+        figure, axes = plt.subplots(1, panels, figsize=size, layout="constrained")
+        yield axes
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

@@ -7,7 +7,6 @@ Each quantity keeps its colour map and unit everywhere (`particle_player.Quantit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from copy import copy
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from matplotlib.figure import Figure
 from particle_player import Quantity, Scene, axis_labels, boundary_edges, colour_limits, disc_diameter  # noqa: F401
 from particle_player.scene import ROUND_TICKS
 
-from .figures import save_figure
+from .figures import curve_figure, paper_style, save_figure
 
 SOIL = "#b98a5e"
 GREY = "#8c8c8c"
@@ -33,14 +32,6 @@ BODY = "#1d3a5f"
 """Colour of rigid surfaces"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 WIDTH = 6.9  # in; a page's text width
-STYLE = Path(__file__).with_name("paper.mplstyle")
-
-
-def paper_style() -> AbstractContextManager[None]:
-    """Fonts and lines of all pictures, as a context."""
-    return plt.style.context(STYLE)
-
-
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
 VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="viridis")
@@ -178,23 +169,17 @@ def save_history(
         markers: single points to compare with: time, value, name.
         dashed: names of curves in dashes, so that one below that coincides with it is seen.
     """
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.6, 3.0), layout="constrained")
+    with curve_figure(path, (4.6, 3.0)) as axes:
         for k, (name, values) in enumerate(curves.items()):
             style = "--" if name in dashed else "-"
             axes.plot(time, values, style, color=CURVES[k % len(CURVES)], label=name)
         for t, value, name in markers:
             axes.plot(t, value, "o", color="black", markersize=4, markerfacecolor="white", label=name)
-        axes.set_xlabel("Time [s]")
-        axes.set_ylabel(label)
-        axes.set_xlim(0, max(float(np.max(time, initial=0.0)), 1e-12))
+        axes.set(xlabel="Time [s]", ylabel=label, xlim=(0, max(float(np.max(time, initial=0.0)), 1e-12)))
         if limits:
             axes.set_ylim(*limits)
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         if len(curves) + len(markers) > 1:
             axes.legend()
-        _save(figure, path)
 
 
 def _save(figure: Figure, path: Path) -> None:

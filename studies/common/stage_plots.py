@@ -19,7 +19,7 @@ import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
 from .field_plots import Field, gathered
-from .figures import Pictures
+from .figures import Pictures, curve_figure
 from .plots import CURVES, Quantity, paper_style
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
@@ -99,17 +99,13 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
 
 def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequence[float]], label: str) -> None:
     """Values after each stage, by name of the curve; NaN where there is none."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(5.4, 3.4), layout="constrained")
+    with curve_figure(path, (5.4, 3.4)) as axes:
         for k, (name, values) in enumerate(curves.items()):
             axes.plot(range(1, len(names) + 1), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
         axes.set_xticks(range(1, len(names) + 1), names, rotation=25, ha="right")
         axes.set_ylabel(label)
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(fontsize=8)
-        figure.savefig(path)
-        plt.close(figure)
 
 
 def stage_pictures(

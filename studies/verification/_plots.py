@@ -7,8 +7,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from common.figures import save_figure
-from common.plots import CURVES, WIDTH, paper_style
+from common.figures import curve_figure
+from common.plots import CURVES, WIDTH
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 Curve = tuple[np.ndarray, np.ndarray]
@@ -42,8 +42,7 @@ def save_comparison(
         joined: lines through the computed points, of which some dozen are marked.
         equal: one scale for both axes.
     """
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.4), layout="constrained")
+    with curve_figure(path, (4.9, 3.4)) as axes:
         for k, (name, (x, y)) in enumerate(computed.items()):
             look = {
                 "marker": "os^vDP"[k % 6],
@@ -58,10 +57,7 @@ def save_comparison(
         axes.set(xlabel=labels[0], ylabel=labels[1], xlim=limits[0], ylim=limits[1])
         if equal:
             axes.set_aspect("equal")
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         _legend(axes)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
 def save_refinement(
@@ -73,11 +69,9 @@ def save_refinement(
         numbers: of cells, rising; label: what they count.
         panels: errors by the name of their curve, by the label of their panel.
     """
-    with paper_style():
-        figure, row = plt.subplots(
-            1, len(panels), figsize=(WIDTH if len(panels) > 1 else 4.9, 3.0), squeeze=False, layout="constrained"
-        )
-        for axes, (what, curves) in zip(row[0], panels.items()):
+    with curve_figure(path, (WIDTH if len(panels) > 1 else 4.9, 3.0), panels=len(panels)) as row:
+        row = np.atleast_1d(row)
+        for axes, (what, curves) in zip(row, panels.items()):
             for k, (name, values) in enumerate(curves.items()):
                 axes.loglog(
                     numbers, values, "os^vD"[k % 5] + "-", color=CURVES[k % len(CURVES)], markersize=4, label=name
@@ -87,7 +81,4 @@ def save_refinement(
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
             axes.set(xlabel=label, ylabel=what)
-            axes.tick_params(top=True, right=True, which="both")
-            axes.grid(linewidth=0.3, color="#d0d0d0")
-        _legend(row[0][0])
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+        _legend(row[0])

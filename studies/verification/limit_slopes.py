@@ -9,10 +9,9 @@ elements converge from above and may end below the spiral where another mechanis
 a friction angle of 30° carries any weight.
 """
 
-import matplotlib.pyplot as plt
 from _case import Check, Result, run_alone
-from common.figures import save_figure
-from common.plots import CURVES, paper_style
+from common.figures import curve_figure
+from common.plots import CURVES
 from common.slope_fem import slope_on_ground
 from mpi4py import MPI
 
@@ -75,8 +74,7 @@ def run(quick: bool, folder) -> Result:
 
 def save_factors(path, found):
     """Stability factors over the angle of the slope."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.4), layout="constrained")
+    with curve_figure(path, (4.9, 3.4)) as axes:
         for k, friction in enumerate(sorted({f for _, f in found})):
             angles = sorted(a for a, f in found if f == friction)
             computed, expected = zip(*(found[a, friction] for a in angles))
@@ -85,9 +83,7 @@ def save_factors(path, found):
         axes.set(xlabel="Angle of the slope [degrees]", ylabel=r"Stability factor $\gamma H / c$ [-]", xticks=ANGLES)
         axes.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
         axes.minorticks_off()
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend()
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
 if __name__ == "__main__":
