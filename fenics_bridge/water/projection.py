@@ -24,10 +24,12 @@ class PressureProjection:
 
     (Bochev and Dohrmann 2006; White and Borja 2008.) For a linear pressure it is tau int grad dp . T grad q with the second
     moments T of the cell about its centroid over its volume. With m = 1,
-        tau = m (D + 1) max(0, 3/2 (1 / M + S) - 6 k dt / (gamma_w h^2)),
+        tau = (D + 1) max(0, 3/2 (1 / M + S) - 6 k dt / (gamma_w h^2)),
     M the oedometric modulus, S = n / K_w, h the longest edge, is the least factor with which layers of simplices cut from cubes
     have, in uniaxial strain, no positive off-diagonal entry in the system of the pressures, so that these obey a maximum
-    principle. But the nodes of a layer do not all move alike, which leaves 1 to 3 %; m is `MARGIN`.
+    principle. But the nodes of a layer do not all move alike, which leaves 1 to 3 %. The term is therefore `MARGIN` times as
+    large, and has 3 G for M where that is less (Poisson's ratio above 1/4), as displacements that alternate from node to node
+    shear the soil.
 
     Args:
         domain: mesh of the body.
@@ -53,7 +55,7 @@ class PressureProjection:
         from_centroid = corners - corners.mean(axis=1, keepdims=True)
         moments = np.einsum("cki,ckj->cij", from_centroid, from_centroid) / ((dim + 1) * (dim + 2))
         self._stiffness, storage, mobility, density = (np.zeros(n) for _ in range(4))
-        self._stiffness[points.cells] = np.array([law.p_wave_modulus for law in laws])[points.material]
+        self._stiffness[points.cells] = np.array([_resisting(law) for law in laws])[points.material]
         for soil, own in zip(soils, cells):
             own = own[own < n]
             storage[own], density[own] = soil.porosity / modulus, soil.density or 0.0
@@ -77,3 +79,8 @@ class PressureProjection:
         rows = compat.cell_dofs(function.function_space)[: len(values), 0]
         function.x.array.reshape(-1, values.shape[1])[rows] = values
         function.x.scatter_forward()
+
+
+def _resisting(law: Law) -> float:
+    """Modulus [Pa] with which soil resists displacements that alternate from node to node."""
+    return min(law.p_wave_modulus, 3 * law.shear_modulus)

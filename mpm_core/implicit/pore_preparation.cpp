@@ -16,6 +16,13 @@ namespace
 /// Factor of the pressure projection over the least factor that suffices in uniaxial strain.
 constexpr double projection_margin = 4;
 
+/// Modulus with which soil resists a compression, that with which it resists displacements that alternate from node to
+/// node, and what its mass adds to the latter over its density.
+struct Resistance
+{
+  double compressed, alternating, per_density;
+};
+
 /// Sums over the particles of a run of the properties of their water, V times ...
 template <int D>
 struct PoreSums
@@ -70,7 +77,7 @@ MeanShapes<D> mean_shapes(const CellShape<D>& shape, const CellMoments<G>& momen
 /// Adds a particle to the sums of its cell and, by affine extrapolation of its pressure, of the cell's nodes.
 template <class G, int D = G::dim>
 void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water, const Run& run, Index p,
-                  double modulus, double inertia, double factor, const StandingWater<D>& standing,
+                  const Resistance& soil, double factor, const StandingWater<D>& standing,
                   const Anisotropy<D>& anisotropy, const CellMoments<G>& moments, PoreCell<D>& cell, PoreSums<D>& sums,
                   std::vector<NodalWater>& nodes)
 {
@@ -84,14 +91,15 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   if (dries)
     stored += particles.porosity[0][p] *
               wetness_at(water.retention[static_cast<std::size_t>(run.material)], pressure).by_saturation;
-  const double compliance = 1 / modulus + stored;
+  const double compliance = 1 / soil.compressed + stored;
   cell.grains = std::max(cell.grains, 1 - particles.porosity[0][p]);
   add_pore_load(mesh.shapes[run.cell], particles, water, standing, moments, run.material, p, volume, cell.load);
   sums.volume += volume;
   add<D>(volume * mobility, anisotropy.tensor, sums.mobility);
   sums.least += volume * mobility * anisotropy.least;
   sums.compliance += volume * compliance;
-  sums.swung += volume * (1 / (modulus + inertia * particles.mass[p] / particles.volume[p]) + stored);
+  const double resists = soil.alternating + soil.per_density * particles.mass[p] / particles.volume[p];
+  sums.swung += volume * (1 / resists + stored);
   for (int k = 0; k <= D; ++k)
   {
     const Index node = mesh.cells[run.cell][k];
@@ -140,13 +148,15 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   std::vector<PoreSums<D>> sums(step.pore.cells.size());
   for (const Run& run : step.runs)
   {
-    const double modulus = p_wave_modulus(model.laws[static_cast<std::size_t>(run.material)]);
+    const Law& law = model.laws[static_cast<std::size_t>(run.material)];
     const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
     const auto standing = standing_water(mesh, *model.water, run.cell);
     const auto anisotropy = anisotropy_of<D>(*model.water, run.material);
-    const double inertia = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
+    const double per_density = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
+    const double compressed = p_wave_modulus(law);
+    const Resistance soil{compressed, std::min(compressed, 3 * shear_modulus(law)), per_density};
     for (Index p = run.first; p < run.last; ++p)
-      add_particle<G>(mesh, model.particles, *model.water, run, p, modulus, inertia, factor, standing, anisotropy,
+      add_particle<G>(mesh, model.particles, *model.water, run, p, soil, factor, standing, anisotropy,
                       field.moments[run.cell], step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)],
                       nodes);
   }

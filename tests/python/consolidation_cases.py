@@ -28,10 +28,10 @@ class Column:
     porosity = 0.4
 
     def __init__(self, element, cells, dim=2, boundary=None, load=10e3, buoyant=0.0, conductivity=1e-8, poisson=0.3,
-                 water_modulus=np.inf, comm=MPI.COMM_WORLD, nmd=False):  # fmt: skip
+                 water_modulus=np.inf, comm=MPI.COMM_WORLD, nmd=False, across=2):  # fmt: skip
         self.width, self.size, self.load, self.buoyant = 0.2, load + buoyant, load, buoyant
         side = [self.width] * (dim - 1)
-        domain, _, facet_tags = bridge.box_mesh(comm, (*side, 1.0), (*[2] * (dim - 1), cells))
+        domain, _, facet_tags = bridge.box_mesh(comm, (*side, 1.0), (*[across] * (dim - 1), cells))
         self.facet_tags = facet_tags
         self.law = mpm.LinearElastic(young=10e6, poisson=poisson)
         self.oedometer = self.law.p_wave_modulus

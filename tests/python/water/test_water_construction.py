@@ -82,7 +82,7 @@ def test_layers_of_fill_settle_as_the_sum_of_loads_on_terzaghis_layer(element):
 
 def _settled_slowly(step):
     """Settlements at T = 0.16 and 0.5 of a layer that is placed until T = 0.3, in equal steps."""
-    model, found = _model(_ground(), water.Element.STABILISED), []
+    model, found = _model(_ground(columns=4), water.Element.STABILISED), []
     model.reconfigure(off=[SECOND], duration=0.3 * PERIOD)
     for factor in (0.16, 0.5):
         _run(model, factor, step, 1.0)
