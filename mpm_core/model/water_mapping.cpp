@@ -2,6 +2,7 @@
 
 #include "model/anisotropy.h"
 #include "model/mapping.h"
+#include "model/material_points.h"
 #include "parallel/agreement.h"
 #include "transfer/lanes.h"
 
@@ -287,12 +288,43 @@ void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt
   average_over_nodes(mesh, field.motion.part, volume_of, outflow_of, exchange, field.motion.volumetric_strain);
 }
 
+template <class G>
+std::vector<double> averaged_pressures(Model<G>& model)
+{
+  constexpr int D = G::dim;
+  const Mesh<D>& mesh = model.mesh;
+  const Particles<D>& particles = model.particles;
+  std::vector<VolumeMean> cells(static_cast<std::size_t>(mesh.owned_cells)), nodes(mesh.points.size());
+  std::vector<Index> filled;
+  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
+    for (const Run& run : points.runs)
+    {
+      filled.push_back(run.cell);
+      for (Index p = run.first; p < run.last; ++p)
+      {
+        cells[run.cell].value += particles.volume[p] * particles.pore_pressure[0][p];
+        cells[run.cell].volume += particles.volume[p];
+      }
+    }
+  const MeshPart part = make_part<D>(mesh, filled, model.exchange.shared_nodes);
+  average_over_nodes(
+      mesh, part, [&](Index c) { return cells[c].volume; }, [&](Index c, double) { return cells[c].value; },
+      model.exchange, nodes);
+  std::vector<double> pressures(particles.size());
+  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
+    for (const Run& run : points.runs)
+      for (Index p = run.first; p < run.last; ++p)
+        pressures[p] = mean_of_nodes<D>(mesh.cells[run.cell], nodes);
+  return pressures;
+}
+
 #define INSTANTIATE(G)                                                                                                 \
   template void split_phases(Model<G>&);                                                                               \
   template void water_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&, const std::vector<Run>&,  \
                                const PoreWater&, const VelocityField<G>&, WaterField<G>&);                             \
   template void find_flux(const Mesh<G::dim>&, const VelocityField<G>&, const PoreWater&, WaterField<G>&);             \
   template double outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                                   \
+  template std::vector<double> averaged_pressures(Model<G>&);                                                          \
   template void average_outflow(const Mesh<G::dim>&, NodeExchange&, double, WaterField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -217,6 +217,13 @@ void bind_model(py::module_& m, const std::string& suffix)
              map_to_nodes(model);
              return out_of_balance(model, gravity);
            })
+      .def("averaged_pressures",
+           [](M& model)
+           {
+             prepare(model);
+             const std::vector<double> pressures = averaged_pressures(model);
+             return py::array_t<double>(static_cast<py::ssize_t>(pressures.size()), pressures.data());
+           })
       .def("run_explicit",
            [](M& model, const ExplicitOptions& options, const RunOptions& run)
            {

@@ -57,13 +57,18 @@ def __getattr__(name: str) -> object:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def own_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray]:
-    """The particles of a plane model on this rank as they are, and all rigid surfaces. Collective where there are such."""
+def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str, np.ndarray]:
+    """The particles of a plane model on this rank as they are, and all rigid surfaces. Collective.
+
+    Args:
+        averaged: whether pore pressures are those that act where an explicit run averages volumetric strains.
+    """
+    pressures = {"pore_pressure": model.averaged_pore_pressure().astype(np.float32)} if averaged else {}
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
     pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
     if model.has_water:
-        pore |= model.particles.single(*WET_QUANTITIES)
+        pore |= model.particles.single(*WET_QUANTITIES) | pressures
         del pore["position"]
     area = p["volume"]
     if model.geometry == mpm.Geometry.AXISYMMETRIC:

@@ -40,6 +40,8 @@ def test_a_slide_of_two_phases_is_the_same_on_any_partition(comm, owners_of):
     assert report.plastic_fraction > 0
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
     assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-8)
+    squared = [(one.averaged_pore_pressure() ** 2).sum() for one in (model, alone)]
+    assert comm.allreduce(squared[0]) == pytest.approx(squared[1], rel=1e-8)
     for name in ("mass", "kinetic_energy", "drag_work", "support_work", "unbalanced_ratio"):
         assert getattr(report, name) == pytest.approx(getattr(expected, name), rel=1e-8)
 

@@ -190,6 +190,21 @@ class PoreWater(Conditions):
         self.particles.set("pressure_gradient", gradient)
         self.saturate()
 
+    def averaged_pore_pressure(self) -> NDArray[np.float64]:
+        """Pore pressures [Pa] that act on soil and water where `nmd=True` averages volumetric strains. Collective.
+
+        In explicit steps these are the means of the cells' pressures over nodes, as forces take them. The pressures of particles
+        may alternate from cell to cell besides, and are too low in the cells at a drained surface; neither does any work.
+
+        Returns:
+            Of the particles of this rank, shape (n,); the same for all in a cell.
+
+        Raises:
+            InputError: on all ranks, for a model without water.
+        """
+        self._require_water()
+        return self._core.averaged_pressures()
+
     def saturate(self) -> None:
         """Give particles the saturation of their pressures, and the mass of the water that they then have.
 
