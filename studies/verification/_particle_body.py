@@ -20,9 +20,9 @@ class ParticleBody:
     period: length^2 / c_v [s], of the oedometric modulus
     """
 
-    def __init__(self, mesh, supports, drained, load, law, mobility, length, geometry=None, weight=1e-3):
+    def __init__(self, mesh, supports, drained, load, law, mobility, length, geometry=None, weight=1e-3, nmd=False):
         """mesh, supports, load: as for `water.Consolidation`; drained: tags; mobility: k / gamma_w [m2/(Pa s)]
-        weight: of the pore water [N/m3]
+        weight: of the pore water [N/m3]; nmd: average volumetric strains over nodes
         """
         domain, _, facet_tags = mesh
         self.law, self.period = law, length**2 / (mobility * law.p_wave_modulus)
@@ -35,7 +35,7 @@ class ParticleBody:
         self._motion = (lambda time: load(time).displacement) if callable(load) else lambda time: 0.0
         for tag, pressure in ({} if callable(load) else load.pressure).items():
             self.model.press_surface(tag, pressure)
-        self._steps, self._factor, self.plate_force = SmallMotion(self.model), 0.0, 0.0
+        self._steps, self._factor, self.plate_force = SmallMotion(self.model, nmd), 0.0, 0.0
 
     def drain(self, tags):
         """Let water leave at these parts of the surface."""

@@ -1,4 +1,4 @@
-"""Strip footing on clay that does not drain: bearing capacity by soil and pore water, and by total stresses.
+"""Clay that does not drain, under a strip footing and in a slope: limit loads by soil and pore water, and by total stresses.
 
 Half of a rough footing is pushed into weightless ground with cohesion and without friction until its load no longer rises;
 the limit load is 2 + π times the cohesion (Prandtl 1920). The water in the pores keeps the volume constant, as k → 0.
@@ -7,7 +7,8 @@ undrained law, which is the expected value below. Linear displacement and pressu
 do not: the water keeps the volume around each node, but in addition the skeleton resists the change of volume of each cell,
 so that its effective stresses rise without limit. Elements and particles whose volumetric strains are averaged over nodes
 (NMD) do not have this error. They carry the load of linear elements of total stresses with averaged strains, which is above
-that of quadratic elements on coarse meshes.
+that of quadratic elements on coarse meshes. A slope of 45° under its own weight likewise: what separates it from quadratic elements
+is the mesh, not the water.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ SIZES = (0.24, 0.12, 0.06)
 AXIS, BASE, FAR, FREE, PRESSED = 1, 2, 3, 4, 5
 LIMIT = 2 + np.pi
 SUPPORTS = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
+COARSE_SLOPE = "the weight converges from above with linear elements as in total stresses"
 COARSE = "the load converges from above; cells of 0.24 m are coarse"
 
 
@@ -77,6 +79,32 @@ def coupled(size, element, nmd=False):
     return np.array(loads)
 
 
+def slope(size):
+    """Unit weights, in multiples of cohesion over height, under which a slope of 45° collapses, to 1/2000 of it.
+
+    By total stresses with quadratic and with averaged linear elements, and by soil and water with the latter.
+    """
+    background = bridge.slope_mesh(comm, height=1.0, angle=45.0, crest=1.2, cell_size=size, kind="fitted")
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    supports, found = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)], []
+    for degree in (2, 1):
+        model = bridge.QuasiStatic(domain, undrained(), facet_tags, supports, degree, nmd=degree == 1)
+        model.solve(bridge.Load(unit_weight=20 * COHESION), first_step=0.2, tolerance=1e-3)
+        found.append(model.load.unit_weight / COHESION)
+    soil = water.PorousSoil(1e-17, porosity=POROSITY)
+    model = water.Consolidation(
+        domain, clay(), soil, facet_tags, supports, [], element=water.Element.STABILISED, nmd=True, unit_weight=1e-3
+    )
+    carried, more = 0.0, 2 * COHESION
+    while more > 3e-3 * COHESION:
+        model.load = bridge.Load(unit_weight=carried + more)
+        if model.advance(1.0).converged:
+            carried += more
+        else:
+            more /= 2
+    return [*found, carried / COHESION]
+
+
 def particles(size, *, wet=True):
     """Load by implicit particles with NMD and water, or the undrained law, one per cell: work of the footing over its path."""
     model = mpm.Model(bridge.background_mesh(*ground(size)), clay() if wet else undrained())
@@ -117,6 +145,13 @@ def run(quick: bool, folder) -> Result:
         found |= {f"cells of {size:g} m, {name}": (100 * way, curves[name]) for name in shown}
         checks.append(Check(f"load of total stresses over the cohesion, cells of {size:g} m", LIMIT, "2 + π, Prandtl 1920",
                             expected, 0.05, limit=COARSE if size > 0.2 else "", method="P2"))  # fmt: skip
+    for size in (0.1,) if quick else (0.1, 0.05):
+        quadratic, linear, wet = slope(size)
+        name = f"slope, unit weight at collapse over the cohesion, cells of {size:g} m"
+        checks.append(Check(name, quadratic, "total stresses, P2", wet, 0.02, "1/m", limit=COARSE_SLOPE if size > 0.05 else "",
+                            method="P1-P1, NMD"))  # fmt: skip
+        checks.append(Check(f"{name}, beside linear elements", linear, "total stresses, P1 with averages", wet, 0.02, "1/m",
+                            method="P1-P1, NMD"))  # fmt: skip
     if comm.rank == 0:
         labels = "Settlement over half the width [%]", "Load over the cohesion [-]"
         save_comparison(
