@@ -89,8 +89,7 @@ void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const 
                              VelocityField<G>& field)
 {
   find_averaged_fractions(mesh, runs, field);
-  average_mean_stress<G>(mesh, exchange, field,
-                         [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
+  average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
 }
 } // namespace
 
@@ -235,8 +234,7 @@ template <class G, int D>
 void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                       std::span<Working<G>> stress)
 {
-  average_mean_stress<G>(mesh, exchange, field,
-                         [&](Index c) { return mean_of<G>(stress[c]); });
+  average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(stress[c]); });
   for (Index c : field.part.cells)
   {
     if (field.integration.mean_stress_of_cell[c].volume == 0)
