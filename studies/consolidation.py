@@ -9,7 +9,6 @@ displacements.
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,7 +21,6 @@ from common.consolidation_site import ConsolidationSite, read_consolidation_site
 from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
-from common.files import OutputError
 from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, add_switch, study_parser
 from common.page import Page
@@ -219,16 +217,12 @@ def main(arguments: list[str] | None = None) -> int:
         if particles.scene is not None:
             movies = [particle_movie("particles", particles.scene, particles.frames, {"displacement": DISPLACEMENT})]
     page = Page(movies=movies, slider=("t", "days"), captions=CAPTIONS)
-    write_summary(folder, a, summary, comm, page, drawn(site, files, folder))
-    if comm.rank == 0:
-        for name in site.points:
-            theirs = f", particles {1e3 * summary[f'settlement_{name}_particles_m']:.4g} mm" if a.particles else ""
-            print(f"settlement, {name}: {1e3 * summary[f'settlement_{name}_m']:.4g} mm{theirs}")
-        if stopped:
-            print(f"ended early: {stopped}", file=sys.stderr)
-        print(f"results in {folder}")
-    return 1 if stopped else 0
+    lines = []
+    for name in site.points:
+        theirs = f", particles {1e3 * summary[f'settlement_{name}_particles_m']:.4g} mm" if a.particles else ""
+        lines.append(f"settlement, {name}: {1e3 * summary[f'settlement_{name}_m']:.4g} mm{theirs}")
+    return write_summary(folder, a, summary, comm, page, drawn(site, files, folder), said="\n".join(lines))
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 import numpy as np
-from common.files import OutputError
 from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
@@ -21,7 +20,6 @@ from common.water_slope_runs import water_slope_study
 from common.water_slopes import add_water_slope_options, safety, steady_safety
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 from fenics_bridge import water
 
 
@@ -51,4 +49,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

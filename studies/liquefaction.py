@@ -22,7 +22,6 @@ from common import body_runs
 from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
 from common.figures import Pictures, save_figure
-from common.files import OutputError
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
@@ -236,4 +235,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

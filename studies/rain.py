@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from common.files import OutputError
 from common.options import study_parser
 from common.ranks import run_study
 from common.slope_site import SlopeSite
@@ -18,7 +17,6 @@ from common.water_slope_runs import water_slope_study
 from common.water_slopes import add_water_slope_options, safety
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 from fenics_bridge import water
 
 
@@ -40,4 +38,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

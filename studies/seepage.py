@@ -7,7 +7,6 @@ If boundary values change in time, transient flow is computed from the steady st
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
@@ -16,7 +15,6 @@ import numpy as np
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
-from common.files import OutputError
 from common.flow_steps import FlowSteps
 from common.options import add_count, add_number, study_parser
 from common.page import Page
@@ -30,7 +28,6 @@ from common.water_site import DAY, WaterSite, in_days, read_water_site
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-import mpm_core as mpm
 from fenics_bridge import water
 from fenics_bridge.compat import cell_dofs
 
@@ -145,15 +142,10 @@ def main(arguments: list[str] | None = None) -> int:
         "last_time_days": flow.time / DAY, "stored_water_m2": flow.stored_water(),
         "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(site, files, pictures, folder))
-    if comm.rank == 0:
-        for name, value in steady.items():
-            print(f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day")
-        if stopped:
-            print(f"ended early: {stopped}", file=sys.stderr)
-        print(f"results in {folder}")
-    return 1 if stopped else 0
+    lines = [f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day" for name, value in steady.items()]
+    page = Page(captions=CAPTIONS)
+    return write_summary(folder, a, summary, comm, page, drawn(site, files, pictures, folder), said="\n".join(lines))
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, OutputError)
+    run_study(main)

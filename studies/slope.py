@@ -21,7 +21,6 @@ from common.animation import film_frames, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
 from common.ensemble import Ensemble, further_members
 from common.figures import Pictures
-from common.files import OutputError
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import PORE, fem_frame, has_pore_pressure, particle_movie
@@ -401,4 +400,4 @@ def print_summary(summary: dict, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    run_study(main, mpm.InputError, mpm.RunError, OutputError)
+    run_study(main)

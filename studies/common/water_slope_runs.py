@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Callable
 from time import perf_counter
@@ -66,13 +65,9 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     summary["wall_seconds"] = perf_counter() - start
     values = {name: found.value for name, found in limits.items()}
     page = Page(movies=movies, captions=CAPTIONS | SLIDE_CAPTIONS)
-    write_summary(folder, a, summary, comm, page, slope_pictures(folder, instants, values) | pictures)
-    if comm.rank == 0:
-        fails = "stands" if failed is None else f"fails after {in_days(failed)}"
-        print(f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {in_days(worst.time)}")
-        for name, value in values.items():
-            print(f"{name}: {value:.3f}")
-        if stopped:
-            print(f"the run ended early: {stopped}", file=sys.stderr)
-        print(f"results in {folder}")
-    return 1 if stopped else code or (0 if shown else UNDECIDED)
+    fails = "stands" if failed is None else f"fails after {in_days(failed)}"
+    lines = [f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {in_days(worst.time)}"]
+    lines += [f"{name}: {value:.3f}" for name, value in values.items()]
+    drawn = slope_pictures(folder, instants, values) | pictures
+    early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
+    return early or code or (0 if shown else UNDECIDED)
