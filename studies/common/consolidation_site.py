@@ -30,6 +30,8 @@ from .slope_case import GRAVITY
 from .water_site import DAY, condition, porous_soil
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points")
+BALANCED = 1e-9
+"""Out-of-balance ratio of particles at the beginning"""
 POROUS = ("conductivity", "dip", "porosity")
 
 
@@ -88,7 +90,8 @@ class ConsolidationSite:
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
 
-        With averaged strains, `nmd`, they take over the state of the elements as it is, without an equilibration.
+        With averaged strains, `nmd`, steps of particles in small displacements average forces of frictional soil too, elements
+        those of soil that dilates only (`AveragedKinematics`); an equilibration, which keeps the pore pressures, makes up for it.
 
         Raises:
             InputError: the water has a boundary condition other than reservoirs.
@@ -109,7 +112,8 @@ class ConsolidationSite:
             anisotropy=anisotropy if any(factors is not None for factors in anisotropy) else None,
         )
         self.load_particles(model, fem.time)
-        bridge.initialise(model, fem, equilibrate=not nmd)
+        bridge.initialise(model, fem, equilibrate=False)
+        model.equilibrate(nmd=nmd, small_displacements=True, tolerance=BALANCED)
         return model
 
     def load_particles(self, model: mpm.Model, time: float) -> None:

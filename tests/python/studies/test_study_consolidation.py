@@ -56,6 +56,30 @@ def test_particles_take_no_other_water_than_reservoirs(tmp_path):
         ground.particles(ground.at_rest(water.Element.STABILISED), 3)
 
 
+@pytest.mark.parametrize("dilation", [0.0, 25.0])
+@pytest.mark.parametrize("nmd", [False, True])
+def test_particles_begin_at_rest(dilation, nmd, tmp_path):
+    """Also where elements average strains only, of soil that does not dilate, and particles their forces as well."""
+    from common.consolidation_site import read_consolidation_site
+    from common.wet_particles import SmallMotion
+
+    from fenics_bridge import water
+
+    path = tmp_path / "site.toml"
+    site = SITE.replace("friction_angle = 25.0", f"friction_angle = 25.0\ndilation_angle = {dilation}")
+    site = site.replace("[[0.0, 0.0], [10.0, 20e3]]", "0.0").replace("near_size = 0.25", "near_size = 1.0")
+    path.write_text(site.replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
+    ground = read_consolidation_site(path, MPI.COMM_SELF)
+    fem = ground.at_rest(water.Element.STABILISED, nmd)
+    model = ground.particles(fem, 3, nmd)
+    assert model.out_of_balance(nmd=nmd) < 1e-9
+    there = fem.evaluate_at(model.particles.position)["pressure"][:, 0]
+    np.testing.assert_allclose(model.particles.pore_pressure, there, rtol=0, atol=1e-9 * there.max())
+    motion = SmallMotion(model, nmd)
+    list(motion.advance(86400.0, 86400.0))
+    assert np.abs(motion.moved).max() < 1e-10
+
+
 @pytest.mark.parametrize("elements", ["P2-P1", "P1-P1"])
 def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     import consolidation
