@@ -22,6 +22,7 @@ from common.slope_fem import (
     add_ground_option,
     check_fem_slope_options,
     mesh_sizes,
+    outside_line,
     slope_fem,
     step_line,
     weight,
@@ -80,7 +81,8 @@ def davis_unit_weight(a: Namespace) -> float:
     """Limit analysis with the strength that Davis (1968) gives soil without dilation: tan(phi*) = sin(phi), c* = c cos(phi)."""
     phi = np.radians(a.friction_angle)
     reduced = float(np.degrees(np.arctan(np.sin(phi))))
-    return bridge.log_spiral(a.height, a.angle, float(a.cohesion * np.cos(phi)), reduced, a.crest).unit_weight
+    cohesion = float(a.cohesion * np.cos(phi))
+    return bridge.log_spiral(a.height, a.angle, cohesion, reduced, a.crest, depth=a.depth).unit_weight
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
@@ -105,7 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
                           "collapse_weight_factor", "Factor of all unit weights [-]")  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
-    spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest)
+    spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest, depth=a.depth)
     sizes = mesh_sizes(a)
     runs = {angle: [collapse(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(spiral), a.friction_angle, sizes, runs)
@@ -122,11 +124,9 @@ def main(arguments: list[str] | None = None) -> int:
     }
     said = (
         f"limit analysis: {spiral.unit_weight / 1e3:.2f} kN/m3 with associated flow, {davis_unit_weight(a) / 1e3:.2f} "
-        "with Davis' reduced strength without dilation\n"
+        f"with Davis' reduced strength without dilation\n{outside_line(a, spiral.curve)}{found.lines()}"
     )
-    if spiral.curve[0, 0] < 0:
-        said += "its slip line starts behind the mesh: --crest is too short to compare\n"
-    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder), said=said + found.lines())
+    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder), said=said)
     return found.exit_code()
 
 

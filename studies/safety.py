@@ -25,6 +25,7 @@ from common.slope_fem import (
     add_ground_option,
     check_fem_slope_options,
     mesh_sizes,
+    outside_line,
     slope_fem,
     step_line,
     weight,
@@ -124,19 +125,19 @@ def particle_summary(found: bridge.ParticleSafety) -> dict[str, object]:
 def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
     """Slip line of limit analysis with the strength divided by the factor of safety; None where the surface slides."""
     reduced = float(np.degrees(np.arctan(np.tan(np.radians(a.friction_angle)) / factor)))
-    return (
-        bridge.log_spiral(a.height, a.angle, a.cohesion / factor, reduced, a.crest).curve if reduced < a.angle else None
-    )
+    if reduced >= a.angle:
+        return None
+    return bridge.log_spiral(a.height, a.angle, a.cohesion / factor, reduced, a.crest, depth=a.depth).curve
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def drawn(a: Namespace, found: CollapseRuns, folder: Path) -> Pictures:
+def drawn(a: Namespace, found: CollapseRuns, line: np.ndarray | None, folder: Path) -> Pictures:
     """Mechanism, displacement over the factor, and convergence. Collective."""
     labels = "Largest displacement [mm]", "Factor that divides the strength [-]"
     return {
-        **found.mechanism_pictures(folder, slip_line(a, found.target.reference), "log-spiral, limit analysis"),
+        **found.mechanism_pictures(folder, line, "log-spiral, limit analysis"),
         **found.curve_pictures(folder, "factor_displacement", labels, lowest=0.98 * a.start),
     }
 
@@ -156,7 +157,7 @@ def main(arguments: list[str] | None = None) -> int:
                           lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {})  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
-    limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight)
+    limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight, depth=a.depth)
     sizes = mesh_sizes(a)
     runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(limit), a.friction_angle, sizes, runs)
@@ -169,8 +170,10 @@ def main(arguments: list[str] | None = None) -> int:
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,
     }
-    said = f"limit analysis, associated flow: {limit:.3f}\n{found.lines()}"
-    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder), said=said)
+    line = slip_line(a, limit)
+    outside = "" if line is None else outside_line(a, line)
+    said = f"limit analysis, associated flow: {limit:.3f}\n{outside}{found.lines()}"
+    write_summary(folder, a, summary, comm, pictures=drawn(a, found, line, folder), said=said)
     return found.exit_code()
 
 

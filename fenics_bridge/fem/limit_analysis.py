@@ -4,35 +4,45 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
 
+_Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class LogSpiral:
-    """Rotational mechanism through the toe of a slope: the soil above a logarithmic spiral rotates about its pole.
+    """Rotational mechanism of a slope: the soil above a logarithmic spiral rotates about its pole.
 
     Coordinates are those of `slope_mesh`, with the shoulder of the slope at (crest, height).
     """
 
     unit_weight: float
     """Unit weight at collapse [N/m3]"""
-    pole: NDArray[np.float64]
+    pole: _Array
     """Pole of the rotation [m], shape (2,)"""
-    curve: NDArray[np.float64]
-    """Slip surface from the crest to the toe [m], shape (k, 2)"""
+    curve: _Array
+    """Slip surface from the crest to the toe, to the slope above it or to the ground before it [m], shape (k, 2)"""
 
 
-def log_spiral(height: float, angle: float, cohesion: float, friction_angle: float, crest: float = 0.0) -> LogSpiral:
-    """Least upper bound of the collapse load over all spirals through the toe, with associated flow.
+def log_spiral(
+    height: float,
+    angle: float,
+    cohesion: float,
+    friction_angle: float,
+    crest: float = 0.0,
+    *,
+    depth: float | None = None,
+) -> LogSpiral:
+    """Least upper bound of the collapse load over all spirals, with associated flow.
 
     Equates the work of the weight with the dissipation along the spiral (Chen 1975, Limit Analysis and Soil Plasticity,
-    ch. 9). On flat slopes with little friction the best spiral dips below the level of the toe before it rises to it: the
-    ground there is taken as the same soil. `curve` of the result shows its depth.
+    ch. 9). Without friction the spirals are circles, and those that end before the toe are the base failures of Taylor (1937,
+    Stability of earth slopes).
 
     Args:
         height: height of the slope [m].
@@ -40,27 +50,34 @@ def log_spiral(height: float, angle: float, cohesion: float, friction_angle: flo
         cohesion: cohesion of the soil [Pa].
         friction_angle: friction angle of the soil [degrees].
         crest: horizontal coordinate of the shoulder [m].
+        depth: of the ground of the same soil below the toe [m], into which spirals may reach: they end before the toe, at the
+            toe, or on the slope. None: they end at the toe, however deep they dip below its level before; `curve` of the
+            result shows it.
 
     Raises:
-        InputError: angles or lengths out of range.
+        InputError: angles or lengths out of range, or a slope so little steeper than the friction angle that it always stands.
     """
-    if not 0 <= friction_angle < angle <= 90:
+    slope = _checked(height, angle, cohesion, friction_angle, depth)
+    best = _best(slope)
+    if not np.isfinite(best.load):
         raise InputError(
-            f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
-            "0 <= friction_angle < angle <= 90"
+            f"angle: got {angle!r} degrees, expected one further above friction_angle={friction_angle!r} degrees: there is no "
+            "mechanism"
         )
-    if not (height > 0 and cohesion > 0):
-        raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
-    shape = (math.radians(angle), math.tan(math.radians(friction_angle)))
-    start, end = _best_angles(*shape)
-    spiral, moment, dissipation = _mechanism(start, end, *shape)
-    size = height / (spiral[0, 1] - spiral[-1, 1])
-    toe = np.array([crest + height / math.tan(shape[0]) if angle < 90 else crest, 0.0])
-    pole = toe - size * spiral[-1]
-    return LogSpiral(cohesion * dissipation / (moment * size), pole, pole + size * spiral)
+    size = height / best.height
+    pole = np.array([crest, height]) - size * best.shoulder
+    return LogSpiral(float(best.load) * cohesion / height, pole, pole + size * best.spiral)
 
 
-def log_spiral_safety(height: float, angle: float, cohesion: float, friction_angle: float, unit_weight: float) -> float:
+def log_spiral_safety(
+    height: float,
+    angle: float,
+    cohesion: float,
+    friction_angle: float,
+    unit_weight: float,
+    *,
+    depth: float | None = None,
+) -> float:
     """Factor of safety of a slope by the mechanism of `log_spiral`: the strength divided by it just fails at the unit weight.
 
     Args:
@@ -69,6 +86,7 @@ def log_spiral_safety(height: float, angle: float, cohesion: float, friction_ang
         cohesion: cohesion of the soil [Pa].
         friction_angle: friction angle of the soil [degrees].
         unit_weight: unit weight of the soil [N/m3].
+        depth: see `log_spiral`.
 
     Raises:
         InputError: angles or lengths out of range.
@@ -77,47 +95,133 @@ def log_spiral_safety(height: float, angle: float, cohesion: float, friction_ang
     for _ in range(24):
         factor = math.sqrt(low * high)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
-        stands = reduced >= angle or log_spiral(height, angle, cohesion / factor, reduced).unit_weight > unit_weight
+        stands = reduced >= angle or (
+            _best(_checked(height, angle, cohesion, reduced, depth)).load * cohesion / factor > unit_weight * height
+        )
         low, high = (factor, high) if stands else (low, factor)
     return factor
 
 
-def _best_angles(slope: float, tangent: float) -> NDArray[np.float64]:
-    """Start and end angle of the spiral with the least collapse load: a grid search, refined around its best point."""
-    centre, half = np.array([0.5 * np.pi / 2, 0.6 * np.pi]), np.array([0.5 * np.pi / 2, 0.4 * np.pi])
-    for _ in range(16):
-        grid = [np.linspace(c - h, c + h, 7) for c, h in zip(centre, half)]
-        loads = [[_load(start, end, slope, tangent) for end in grid[1]] for start in grid[0]]
-        i, j = np.unravel_index(np.argmin(loads), (7, 7))
-        centre, half = np.array([grid[0][i], grid[1][j]]), half * 0.5
-    return centre
+class _Slope(NamedTuple):
+    """What decides about the best spiral."""
+
+    angle: float
+    """Angle of the slope [rad]"""
+    tangent: float
+    """Tangent of the friction angle"""
+    depth: float | None
+    """Of the ground below the toe over the height of the slope"""
 
 
-def _load(start: Any, end: Any, slope: float, tangent: float) -> Any:
-    """Dimensionless collapse load, gamma H / c; infinite where the angles make no mechanism."""
-    if not 0 < start < end < np.pi:
-        return np.inf
-    spiral, moment, dissipation = _mechanism(start, end, slope, tangent)
-    height = spiral[0, 1] - spiral[-1, 1]
-    behind = _shoulder(spiral, slope)[0] - spiral[0, 0]
-    return dissipation * height / moment if moment > 0 and height > 0 and behind >= 0 else np.inf
+class _Mechanisms(NamedTuple):
+    """Spirals of any array of angles, with radius 1 at their starts, and coordinates about the pole."""
+
+    load: Any
+    """Dimensionless collapse loads, gamma H / c; infinite where the angles make no mechanism"""
+    height: Any
+    """Height of the slope"""
+    shoulder: _Array
+    """Shoulder of the slope, shape (..., 2)"""
+    spiral: _Array
+    """Shape (..., k, 2)"""
 
 
-def _mechanism(start: float, end: float, slope: float, tangent: float) -> tuple[Any, ...]:
-    """Spiral (k, 2) about the pole, with radius 1 at its start; first moment of the soil's area; dissipation over c."""
-    angles = np.linspace(start, end, 101)
-    radius = np.exp((angles - start) * tangent)
-    spiral = -radius[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = np.vstack([spiral, _shoulder(spiral, slope)]).T
-    x_next, y_next = np.roll(x, -1), np.roll(y, -1)
-    moment = -np.sum((x + x_next) * (x * y_next - x_next * y)) / 6  # the soil to the left of the pole goes down
-    swept = end - start
-    dissipation = (radius[-1] ** 2 - 1) / (2 * tangent) if tangent > 0 else swept
-    return spiral, moment, dissipation
+def _checked(height: float, angle: float, cohesion: float, friction_angle: float, depth: float | None) -> _Slope:
+    if not 0 <= friction_angle < angle <= 90:
+        raise InputError(
+            f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
+            "0 <= friction_angle < angle <= 90"
+        )
+    if not (height > 0 and cohesion > 0):
+        raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
+    if depth is not None and not depth >= 0:
+        raise InputError(f"depth: got {depth!r} m, expected a number of at least 0, or None")
+    return _Slope(
+        math.radians(angle), math.tan(math.radians(friction_angle)), None if depth is None else depth / height
+    )
 
 
-def _shoulder(spiral: NDArray[np.float64], slope: float) -> Any:
-    """Where the slope from the spiral's end, the toe, meets the level of its start."""
-    height = spiral[0, 1] - spiral[-1, 1]
-    back = height / math.tan(slope) if slope < math.pi / 2 else 0.0
-    return np.array([spiral[-1, 0] - back, spiral[0, 1]])
+def _best(slope: _Slope) -> _Mechanisms:
+    """The mechanism with the least load."""
+    kinds = (_through_slope,) if slope.depth is None else (_through_slope, _before_toe)
+    return min((_searched(kind, slope) for kind in kinds), key=lambda found: float(found.load))
+
+
+def _searched(mechanisms: Any, slope: _Slope) -> _Mechanisms:
+    """The best of the mechanisms that two shares between 0 and 1 describe: a grid search, refined around its best point."""
+    centre, half, points = np.full(2, 0.5), 0.5, 25
+    for _ in range(20):
+        start, end = np.clip(centre[:, None] + half * np.linspace(-1, 1, points), 1e-6, 1 - 1e-6)
+        loads = mechanisms(slope, *np.meshgrid(start, end, indexing="ij")).load
+        i, j = np.unravel_index(np.argmin(loads), loads.shape)
+        centre, half, points = np.array([start[i], end[j]]), 0.4 * half, 13
+    return mechanisms(slope, *centre)
+
+
+def _through_slope(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanisms:
+    """Spirals that end at the toe, or so far above it, on the slope, that they reach no deeper than the ground."""
+    start = start_share * np.pi / 2
+    end = start + end_share * (np.pi - start)
+    x, y = _points(slope, start, end)
+    rise = y[..., 0] - y[..., -1]
+    depth = math.inf if slope.depth is None else slope.depth
+    height = np.maximum(rise, (y[..., 0] - y.min(axis=-1)) / (1 + depth))
+    return _mechanisms(slope, end - start, (x, y), x[..., -1], height)
+
+
+def _before_toe(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanisms:
+    """Spirals that rise to the ground before the toe, and reach no deeper than the ground.
+
+    The pole is above the middle of the slope, as far as the toe is above the spiral: a slope further to the left has lost soil
+    that drives, one further to the right has soil that resists.
+    """
+    assert slope.depth is not None
+    start = start_share * np.pi / 2
+    lowest = np.pi / 2 + np.arctan(slope.tangent)
+    (top, bottom), level = (_level(slope, start, angle) for angle in (start, lowest)), slope.depth / (1 + slope.depth)
+    below, above = np.broadcast_arrays(lowest + 0 * start, np.pi)
+    for _ in range(50):  # the end that is as high above the lowest point as the ground is deep
+        middle = 0.5 * (below + above)
+        is_above = _level(slope, start, middle) > bottom + level * (top - bottom)
+        below, above = np.where(is_above, below, middle), np.where(is_above, middle, above)
+    end = lowest + end_share * (above - lowest)
+    x, y = _points(slope, start, end)
+    height = y[..., 0] - y[..., -1]
+    back = height / math.tan(slope.angle)
+    toe = np.minimum(np.maximum(0.5 * back, x[..., 0] + back), x[..., -1])
+    return _mechanisms(slope, end - start, (x, y), toe, height)
+
+
+def _level(slope: _Slope, start: Any, angle: Any) -> Any:
+    return -np.exp((angle - start) * slope.tangent) * np.sin(angle)
+
+
+def _points(slope: _Slope, start: Any, end: Any) -> tuple[_Array, _Array]:
+    """Coordinates of 101 points of spirals, of shape (..., 101)."""
+    swept = np.asarray(end - start)[..., None] * np.linspace(0, 1, 101)
+    angles, radius = np.asarray(start)[..., None] + swept, np.exp(swept * slope.tangent)
+    return -radius * np.cos(angles), -radius * np.sin(angles)
+
+
+def _mechanisms(slope: _Slope, swept: Any, spiral: tuple[_Array, _Array], toe: Any, height: Any) -> _Mechanisms:
+    """Loads from the spirals, where the slope meets the level of their ends, and its height."""
+    x, y = spiral
+    rise = y[..., 0] - y[..., -1]
+    shoulder = toe - rise / math.tan(slope.angle)
+    corners = np.stack([x[..., 0], shoulder, toe, x[..., -1]], axis=-1)
+    with np.errstate(all="ignore"):
+        surface = y[..., -1:] + np.clip((corners[..., 2:3] - x) * math.tan(slope.angle), 0, rise[..., None])
+        is_below = (y <= surface + 1e-9).all(axis=-1)
+        around = np.concatenate([x, corners[..., 2:0:-1]], axis=-1), np.concatenate([y, y[..., [-1, 0]]], axis=-1)
+        moment = _moment(*around)
+        ratio = np.exp(2 * swept * slope.tangent)
+        dissipation = (ratio - 1) / (2 * slope.tangent) if slope.tangent > 0 else swept
+        is_possible = is_below & (moment > 0) & (rise > 0) & (shoulder >= x[..., 0])
+        load = np.where(is_possible, dissipation * height / moment, np.inf)
+    return _Mechanisms(load, height, np.stack([shoulder, y[..., 0]], axis=-1), np.stack([x, y], axis=-1))
+
+
+def _moment(x: _Array, y: _Array) -> Any:
+    """First moment about the pole of the soil's areas; the soil to the left of the pole goes down."""
+    x_next, y_next = np.roll(x, -1, axis=-1), np.roll(y, -1, axis=-1)
+    return -np.sum((x + x_next) * (x * y_next - x_next * y), axis=-1) / 6

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable
 
+import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
@@ -97,8 +99,8 @@ def slope_fem(
     """
     a = options
     if depth > 0:
-        runout = a.height + 2 * depth
-        domain, facet_tags, supports = slope_on_ground(comm, a.height, a.angle, a.crest, cell_size, depth, runout)
+        shape = a.height, a.angle, a.crest, cell_size, depth, _runout(a.height, depth)
+        domain, facet_tags, supports = slope_on_ground(comm, *shape)
     else:
         background = bridge.slope_mesh(
             comm, height=a.height, angle=a.angle, crest=a.crest, cell_size=cell_size, kind=a.mesh, runout=cell_size
@@ -106,6 +108,29 @@ def slope_fem(
         domain, _, facet_tags = bridge.soil_mesh(*background)
         supports = SUPPORTS
     return bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, **finite_elements(a))
+
+
+def _runout(height: float, depth: float) -> float:
+    """Length of the ground before the toe [m]."""
+    return height + 2 * depth
+
+
+def outside_line(options: argparse.Namespace, slip_line: np.ndarray) -> str:
+    """Says on a line where the slip line of limit analysis leaves the mesh; empty where it does not.
+
+    Args:
+        slip_line: (k, 2) from the crest [m].
+    """
+    a = options
+    behind = -float(slip_line[0, 0])
+    toe = a.crest + (a.height / math.tan(math.radians(a.angle)) if a.angle < 90 else 0.0)
+    before = float(slip_line[-1, 0]) - toe - _runout(a.height, a.depth)
+    said = (
+        f"its slip line starts {behind:.2g} m behind the mesh: --crest is too short to compare\n" if behind > 0 else ""
+    )
+    return said + (
+        f"its slip line ends {before:.2g} m before the mesh, whose side holds the soil up\n" if before > 0 else ""
+    )
 
 
 def weight(unit_weight: float) -> bridge.Load:

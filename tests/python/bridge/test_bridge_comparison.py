@@ -64,6 +64,47 @@ def test_spiral_of_a_flat_slope_with_little_friction_dips_below_the_toe():
     assert bridge.log_spiral(1.0, 60, 1e3, 10.0).curve[:, 1].min() == 0.0
 
 
+@pytest.mark.parametrize(
+    ("angle", "depth", "number"),
+    [
+        (15, 500, 0.181),
+        (30, 500, 0.181),
+        (30, 1, 0.172),
+        (30, 0.5, 0.164),
+        (30, 0, 0.133),
+        (60, 500, 0.191),
+        (90, 500, 0.261),
+    ],
+)
+def test_circles_give_the_stability_numbers_of_taylor(angle, depth, number):
+    """c / (gamma H) without friction after Taylor (1937), to the three digits that he gives."""
+    spiral = bridge.log_spiral(2.0, angle, 1e3, 0.0, crest=1.0, depth=2.0 * depth)
+    assert 1e3 / (spiral.unit_weight * 2.0) == pytest.approx(number, abs=8e-4)
+    toe = 1.0 + 2.0 / np.tan(np.radians(angle))
+    end = spiral.curve[-1]
+    if angle >= 60:
+        assert end == pytest.approx((toe, 0.0))
+    elif depth == 0:  # on the slope, above ground that cannot fail
+        assert end[0] < toe and end[1] == pytest.approx((toe - end[0]) * np.tan(np.radians(angle)), rel=1e-6)
+        assert spiral.curve[:, 1].min() == pytest.approx(0.0, abs=1e-9)
+    else:
+        assert end[0] > toe and end[1] == pytest.approx(0.0, abs=1e-6)
+        assert spiral.pole[0] == pytest.approx(0.5 * (1.0 + toe))  # Taylor's midpoint circle
+        assert spiral.curve[:, 1].min() == pytest.approx(-2.0 * depth, rel=1e-3)
+    factor = bridge.log_spiral_safety(2.0, angle, 1e3, 0.0, spiral.unit_weight, depth=2.0 * depth)
+    assert factor == pytest.approx(1.0, rel=1e-5)
+
+
+def test_the_ground_limits_the_depth_of_spirals():
+    depths = (0.0, 0.2, 0.5, 1.0, 3.0)
+    loads = [bridge.log_spiral(1.0, 30, 1e3, 0.0, depth=depth).unit_weight for depth in depths]
+    assert (np.diff(loads) < 0).all() and loads[0] > bridge.log_spiral(1.0, 30, 1e3, 0.0).unit_weight > loads[2]
+    through_toe = bridge.log_spiral(1.0, 45, 1e3, 25.0)  # with so much friction, whatever the ground
+    for depth in (0.0, 1.0):
+        spiral = bridge.log_spiral(1.0, 45, 1e3, 25.0, depth=depth)
+        assert spiral.unit_weight == through_toe.unit_weight and (spiral.curve == through_toe.curve).all()
+
+
 def test_factor_of_safety_of_the_log_spiral():
     assert bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 20e3) == pytest.approx(1.053, rel=1e-3)
     at_collapse = bridge.log_spiral(1.0, 45, 1e3, 25.0).unit_weight
@@ -71,8 +112,20 @@ def test_factor_of_safety_of_the_log_spiral():
 
 
 @pytest.mark.parametrize(
-    "arguments", [(1.0, 20, 1e3, 25.0), (1.0, 95, 1e3, 25.0), (0.0, 45, 1e3, 25.0), (1.0, 45, 0.0, 25.0)]
+    "arguments",
+    [
+        (1.0, 20, 1e3, 25.0),
+        (1.0, 95, 1e3, 25.0),
+        (0.0, 45, 1e3, 25.0),
+        (1.0, 45, 0.0, 25.0),
+        (1.0, 25.00001, 1e3, 25.0),
+    ],
 )
 def test_slope_without_a_mechanism_is_refused(arguments):
     with pytest.raises(bridge.InputError, match="angle|height"):
         bridge.log_spiral(*arguments)
+
+
+def test_ground_of_negative_depth_is_refused():
+    with pytest.raises(bridge.InputError, match="depth: got -1.0 m, expected a number of at least 0, or None"):
+        bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 20e3, depth=-1.0)
