@@ -13,6 +13,7 @@ struct Table
   int width = 1;
   std::vector<double> values;
   double most_count = 0;       ///< where above 0, the numbers are counts: whole numbers from 0 to this one
+  bool is_positive = false;    ///< no number is below 0, such as a length of time
   bool may_be_unknown = false; ///< a number may be NaN, such as an energy that a law does not say
 };
 } // namespace mpm::base

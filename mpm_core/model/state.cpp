@@ -1,9 +1,11 @@
 #include "model/state.h"
 
+#include "materials/laws/stored_energy.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -160,10 +162,22 @@ void set_number(Model<G>& model, const Table& table, double value)
                   });
 }
 
-/// Whether a number has stored energy in it, which some laws do not say.
-bool is_of_stored_energy(std::string_view name)
+/// Whether a number has stored energy in it that some law of the model does not say.
+template <class G, int D = G::dim>
+bool may_be_unknown(const Model<G>& model, std::string_view name)
 {
-  return name == "energy_outflow_stored" || name == "energy_start_plastic_work";
+  const std::array<double, max_states> state{};
+  const auto says = [&](const Law& law) { return !std::isnan(stored_energy<D>(law, SymTensor<D>{}, state.data())); };
+  return (name == "energy_outflow_stored" || name == "energy_start_plastic_work") &&
+         !std::ranges::all_of(model.laws, says);
+}
+
+/// Whether a number cannot be below 0.
+bool is_positive(std::string_view name)
+{
+  constexpr std::array names{"last_dt", "seeded_mass", "outflow_mass", "energy_start_kinetic",
+                             "energy_outflow_kinetic"};
+  return std::ranges::find(names, name) != names.end() || name.starts_with("least_mass");
 }
 
 /// Files of before the energy balance do not have its numbers.
@@ -180,13 +194,15 @@ template <class G, int D>
 std::vector<Table> rank_state(const Model<G>& model)
 {
   std::vector<Table> tables;
-  for_each_number(model,
-                  [&](const std::string& name, Kind, const auto& number)
-                  {
-                    using Limits = std::numeric_limits<std::remove_cvref_t<decltype(number)>>;
-                    const double most_count = Limits::is_integer ? static_cast<double>(Limits::max()) : 0.0;
-                    tables.push_back({name, 1, {static_cast<double>(number)}, most_count, is_of_stored_energy(name)});
-                  });
+  for_each_number(
+      model,
+      [&](const std::string& name, Kind, const auto& number)
+      {
+        using Limits = std::numeric_limits<std::remove_cvref_t<decltype(number)>>;
+        const double most_count = Limits::is_integer ? static_cast<double>(Limits::max()) : 0.0;
+        tables.push_back(
+            {name, 1, {static_cast<double>(number)}, most_count, is_positive(name), may_be_unknown(model, name)});
+      });
   return tables;
 }
 

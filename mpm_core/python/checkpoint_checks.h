@@ -43,7 +43,8 @@ inline void check_values(Refusal& refusal, const std::string& name, std::span<co
   const bool is_positive = name == "mass" || name == "volume";
   for (double value : values)
     if (!std::isfinite(value) || (is_positive && !(value > 0)))
-      return refusal.note("/particles/" + name, "it has the value " + std::to_string(value));
+      return refusal.note("/particles/" + name, "it has the value " + std::to_string(value) + ", expected " +
+                                                    (is_positive ? "numbers above 0" : "finite numbers"));
 }
 
 inline void check_materials(Refusal& refusal, std::span<const std::int64_t> values, std::size_t materials)
@@ -97,9 +98,16 @@ inline void check_totals(Refusal& refusal, const Table& table)
   const double most = std::min(table.most_count, most_exact);
   const auto is_count = [most](double value) { return value >= 0 && value <= most && value == std::floor(value); };
   const auto is_total = [&table](double value)
-  { return std::abs(value) < most_total || (table.may_be_unknown && std::isnan(value)); };
+  {
+    return (std::abs(value) < most_total && (value >= 0 || !table.is_positive)) ||
+           (table.may_be_unknown && std::isnan(value));
+  };
+  const std::string expected = table.most_count > 0 ? "a whole number from 0 to " + std::to_string(most)
+                               : table.is_positive  ? "a number from 0 on"
+                                                    : "a finite number";
   for (double value : table.values)
     if (table.most_count > 0 ? !is_count(value) : !is_total(value))
-      return refusal.note("/ranks/" + table.name, "it has the value " + std::to_string(value));
+      return refusal.note("/ranks/" + table.name,
+                          "it has the value " + std::to_string(value) + ", expected " + expected);
 }
 } // namespace mpm::python

@@ -139,9 +139,22 @@ void place(const Model<G>& model, const std::vector<GlobalIndex>& cells, const p
     particles.cell[p] = numbers.at(cells[p]);
 }
 
+/// Refuses totals that no run writes.
+/// @param ranks  of all ranks of the file
+/// @throws RunError with path, array, value and what was expected
+template <class G, int D = G::dim>
+void check_totals_of(const Model<G>& model, const py::dict& ranks, const std::string& path)
+{
+  Refusal refusal;
+  for (const Table& table : tables_of(rank_state(model), ranks))
+    check_totals(refusal, table);
+  if (const std::string text = refusal.text(path); !text.empty())
+    throw RunError(text);
+}
+
 /// Replaces particles and state of a model by those of a file, after all have been checked.
 /// @param particles   fields of all that the file has; of this rank, or of an equal part where the partition is another
-/// @param ranks       of this rank; of all ranks of the file where the partition is another
+/// @param ranks       of this rank; of all ranks of the file where the partition is another; see check_totals_of
 /// @param owners      rank that owns the cell of each of these particles; None where the partition is that of the file
 /// @throws RunError on all ranks, with path, array and reason; the model is then as before
 /// @note Collective
@@ -161,8 +174,6 @@ void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, 
   agree(refusal);
   place(model, numbers, owners, restored);
   check_positions(refusal, model.mesh, restored);
-  for (const Table& table : rank_tables)
-    check_totals(refusal, table);
   for (const Table& table : cell_tables)
   {
     check_cells(refusal, model.mesh, table);
@@ -181,6 +192,7 @@ void bind(py::module_& m)
 {
   m.def("checkpoint_arrays", &checkpoint_arrays<G>);
   m.def("checkpoint_widths", &checkpoint_widths<G>);
+  m.def("check_totals", &check_totals_of<G>);
   m.def("restore", &restore<G>);
 }
 } // namespace

@@ -97,6 +97,49 @@ HOSTILE = {
     "a place in another cell": (swapped("particles/position"), "/particles/position in .* not in that particle's cell"),
     "cells of others": (swapped("particles/cell"), "/particles/position in .* not in that particle's cell"),
     "total": (placed("ranks/steps", 0, np.nan), "/ranks/steps in .* nan"),
+    "the same particle twice": (
+        lambda file: file["particles/id"].__setitem__(7, file["particles/id"][2]),
+        "/particles/id in .* the number .* twice, expected each number once",
+    ),
+    "a particle that was never seeded": (
+        placed("particles/id", 7, 10**6),
+        "/particles/id in .* number 1000000, expected numbers from 0 to",
+    ),
+    "a negative particle": (placed("particles/id", 7, -3), "/particles/id in .* number -3, expected numbers from 0 to"),
+    "no step": (
+        placed("ranks/last_dt", 0, 0.0),
+        "/ranks/last_dt in .* value 0.0 after .* steps, expected a number above 0",
+    ),
+    "a negative step": (
+        placed("ranks/last_dt", 0, -1e-3),
+        "/ranks/last_dt in .* -0.001000, expected a number from 0 on",
+    ),
+    "a step that is no number": (placed("ranks/last_dt", 0, np.nan), "/ranks/last_dt in .* nan, expected"),
+    "a step of another length": (
+        placed("ranks/last_dt", 0, 7.0),
+        "/ranks/last_dt in .* sum over ranks is .*, expected",
+    ),
+    "an energy that is no number": (
+        placed("ranks/energy_stress_work", 0, np.nan),
+        "/ranks/energy_stress_work in .* nan, exp",
+    ),
+    "an unknown energy": (
+        placed("ranks/energy_outflow_stored", 0, np.nan),
+        "/ranks/energy_outflow_stored in .* nan, exp",
+    ),
+    "an arbitrary energy": (
+        placed("ranks/external_work", 0, 1e15),
+        "/ranks/external_work in .* sum over ranks is 1.*, expected",
+    ),
+    "a negative energy": (
+        placed("ranks/energy_outflow_kinetic", 0, -5.0),
+        "/ranks/energy_outflow_kinetic in .* from 0 on",
+    ),
+    "another time": (
+        placed("ranks/time", 0, 3.0),
+        "/ranks/time in .* sum over ranks is .*, expected .*description says",
+    ),
+    "sums": (described(sums={"time": "soon"}), "sums in its description .* expected a table of numbers"),
     "a field that is missing": (without("particles/stress"), "/particles/stress"),
 }
 
@@ -105,6 +148,7 @@ HOSTILE = {
 def test_wrong_content_is_named(comm, shared_path, change, message):
     path = shared_path / "state.h5"
     model = sliding_slope(comm)
+    list(model.explicit(0.01))
     model.save(path)
     if comm.rank == 0:
         with h5py.File(path, "r+") as file:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -33,11 +34,24 @@ _OWNED_CELLS = "owned_cells"
 
 def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
-    text = collectively(model.comm, lambda: _text(_description(model), notes))
     groups = _core.checkpoint_arrays(model._core)
+    sums = _sums(_all_rows(model.comm, groups["ranks"]))
+    text = collectively(model.comm, lambda: _text({**_description(model), "sums": sums}, notes))
     if model.repartitions > 0:
         groups["cells"][_OWNED_CELLS] = _own_cells(model).astype(np.float64)
     write_file(os.fspath(path), model.comm, text, groups)
+
+
+def _all_rows(comm: MPI.Comm, ranks: Arrays) -> Arrays:
+    """The totals of all ranks, from a row of each."""
+    rows = comm.allgather([rows[0] for rows in ranks.values()])
+    return dict(zip(ranks, np.array(rows).T, strict=True))
+
+
+def _sums(ranks: Arrays) -> dict[str, float | None]:
+    """Sums of totals over ranks, free of round-off; None for one that a law does not say."""
+    sums = {name: math.fsum(rows) for name, rows in ranks.items()}
+    return {name: total if math.isfinite(total) else None for name, total in sums.items()}
 
 
 def _own_cells(model: Model) -> NDArray[np.int64]:
@@ -94,7 +108,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         before, water = _replace_contacts(model, *contacts), _water(model)
         _take_water(model, there.get("water"))
         try:
-            _core.restore(model._core, *_state(model, file, name), name)
+            _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
             _replace_contacts(model, *before)
             _take_water(model, water)
@@ -112,7 +126,9 @@ def _take_partition(model: Model, file: CheckpointFile, path: str) -> None:
     partition.take_partition(model, numbers)
 
 
-def _state(model: Model, file: CheckpointFile, path: str) -> tuple[Arrays, Arrays, Arrays, NDArray[np.int64] | None]:
+def _state(
+    model: Model, file: CheckpointFile, path: str, there: dict[str, Any]
+) -> tuple[Arrays, Arrays, Arrays, NDArray[np.int64] | None]:
     """Particles, cells and totals for `_core.restore`, and the rank that owns the cell of each of these particles.
 
     None stands for the ranks where each rank owns the cells that the particles of the same rank of the file are in.
@@ -126,23 +142,58 @@ def _state(model: Model, file: CheckpointFile, path: str) -> tuple[Arrays, Array
     }
     widths = _core.checkpoint_widths(model._core)
     n_ranks, n = file.length("ranks/rows_of_particles"), file.length("particles/id")
+    totals = file.totals(widths["ranks"], slice(0, n_ranks))
+    collectively(comm, lambda: _require_totals(model, path, totals, there), RunError)
     same = n_ranks == comm.size
     if same:
         particles = file.particles(columns, file.own_rows("particles", "particles/id"))
         same = comm.allreduce(int(np.isin(particles["cell"], _own_cells(model)).all()), MPI.MIN) == 1
     if same:
-        return (
-            particles,
-            file.cells(widths["cells"]),
-            file.totals(widths["ranks"], slice(comm.rank, comm.rank + 1)),
-            None,
-        )
+        _require_ids(comm, path, particles["id"], there["next_id"])
+        own_totals = {name: rows[comm.rank : comm.rank + 1] for name, rows in totals.items()}
+        return particles, file.cells(widths["cells"]), own_totals, None
     equal_part = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
     particles = file.particles(columns, equal_part)
+    _require_ids(comm, path, particles["id"], there["next_id"])
     own = _own_cells(model)
     owners, _ = find_items(comm, own, np.arange(len(own)), particles["cell"])
     collectively(comm, lambda: _require_owners(path, particles, owners), RunError)
-    return particles, {}, file.totals(widths["ranks"], slice(0, n_ranks)), np.ascontiguousarray(owners)
+    return particles, {}, totals, np.ascontiguousarray(owners)
+
+
+def _require_totals(model: Model, path: str, totals: Arrays, there: dict[str, Any]) -> None:
+    """Refuse totals that no run writes, and such as differ from the description: nothing else tells of a wrong energy."""
+    _core.check_totals(model._core, totals, path)
+    for steps, dt in zip(totals["steps"], totals["last_dt"], strict=True):
+        if (steps > 0) != (dt > 0):
+            expected = "a number above 0" if steps > 0 else "0"
+            raise RunError(f"cannot read /ranks/last_dt in {path}: it has the value {dt} after {steps:.0f} steps, "
+                           f"expected {expected}")  # fmt: skip
+    for name, total in _sums(totals).items():
+        expected_sum = there.get("sums", {}).get(name, total)  # older checkpoints have none
+        if total != expected_sum:
+            raise RunError(f"cannot read /ranks/{name} in {path}: its sum over ranks is {total}, expected {expected_sum}, as its "
+                           "description says")  # fmt: skip
+
+
+def _require_ids(comm: MPI.Comm, path: str, numbers: NDArray[np.int64], end: int) -> None:
+    """Refuse particles whose numbers are out of range, or that have the same. Collective."""
+
+    def refuse(row: int, what: str) -> None:
+        raise RunError(f"cannot read /particles/id in {path}: it has the number {numbers[row]}{what}")
+
+    def check_range() -> None:
+        for row in np.flatnonzero((numbers < 0) | (numbers >= end)):
+            refuse(row, f", expected numbers from 0 to {end - 1}")
+
+    collectively(comm, check_range, RunError)
+    ranks, rows = find_items(comm, numbers, np.arange(len(numbers)), numbers)
+
+    def check_once() -> None:
+        for row in np.flatnonzero((ranks != comm.rank) | (rows != np.arange(len(numbers)))):
+            refuse(row, " twice, expected each number once")
+
+    collectively(comm, check_once, RunError)
 
 
 def _require_owners(path: str, particles: Arrays, owners: NDArray[np.int64]) -> None:

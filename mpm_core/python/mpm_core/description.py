@@ -108,6 +108,10 @@ def _is_border(value: Any) -> bool:
     return len(value["held"]) == n and len(value["displacement"]) == n
 
 
+def _is_table_of_sums(value: Any) -> bool:
+    return isinstance(value, dict) and all(one is None or _is_number(one) for one in value.values())
+
+
 _PAIR = (_is_number, _is_number)
 _VECTOR = AnyOf([_PAIR, (_is_number, _is_number, _is_number)])
 _NONE = type(None)
@@ -140,7 +144,7 @@ _CONTROL = {"longest": _is_positive, "length": _is_positive, "iterations?": _is_
 
 _OPTIONAL = (
     "added_fields", "contacts", "far_field", "field_contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance",
-    "implicit", "notes",
+    "implicit", "notes", "sums",
 )  # fmt: skip
 """Entries that older files lack"""
 
@@ -168,4 +172,5 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "left_imbalance": (_is_number, "a number"),
     "implicit": (AnyOf([_NONE, _CONTROL]), "null, or the state of an implicit run"),
     "notes": (dict, "a table"),
+    "sums": (_is_table_of_sums, "a table of numbers"),
 }
