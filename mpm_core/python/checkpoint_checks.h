@@ -16,6 +16,9 @@ inline constexpr double most_exact = 9007199254740992.0;
 /// No total comes near it, and a whole number of 64 bits holds it.
 inline constexpr double most_total = 9e18;
 
+/// No value of a particle comes near it, and its square is finite.
+inline constexpr double most_value = 1e100;
+
 /// Largest distance of a particle outside of its cell, over the cell's height; far more than the search for cells
 /// allows.
 inline constexpr double most_outside = 1e-6;
@@ -42,7 +45,7 @@ inline void check_values(Refusal& refusal, const std::string& name, std::span<co
 {
   const bool is_positive = name == "mass" || name == "volume";
   for (double value : values)
-    if (!std::isfinite(value) || (is_positive && !(value > 0)))
+    if (!(std::abs(value) < most_value) || (is_positive && !(value > 0)))
       return refusal.note("/particles/" + name, "it has the value " + std::to_string(value) + ", expected " +
                                                     (is_positive ? "numbers above 0" : "finite numbers"));
 }

@@ -40,12 +40,12 @@ def described(**entries):
     return change
 
 
-def replaced(name, shape, dtype=np.int64):
-    """A dataset that claims a size and holds nothing."""
+def replaced(name, shape, dtype=np.int64, fill=None):
+    """A dataset that claims a size, and holds nothing unless there is something to fill it with."""
 
     def change(file):
         del file[name]
-        file.create_dataset(name, shape=shape, dtype=dtype)
+        file.create_dataset(name, shape=shape, dtype=dtype, data=None if fill is None else np.full(shape, fill))
 
     return change
 
@@ -60,6 +60,13 @@ def without(name):
 
     return change
 
+
+CONTACT = {
+    "surface": {"kind": "Plane"}, "friction": 0.0, "adhesion": 0.0, "penalty": 1.0, "bonded": False,
+    "body": {"start": 0, "mass": 0, "speed": 0, "velocity": [[], []], "spin": [[], []], "force": [[], []], "centre": [0, 0],
+             "inertia": [], "drive": [], "rotates": False},
+}  # fmt: skip
+WATER = {"unit_weight": 1e4, "modulus": "much", "kozeny_carman": False, "drained_surface": False, "conditions": []}
 
 HOSTILE = {
     "not UTF-8": (not_utf8, "description is damaged"),
@@ -103,9 +110,9 @@ HOSTILE = {
     ),
     "a particle that was never seeded": (
         placed("particles/id", 7, 10**6),
-        "/particles/id in .* number 1000000, expected numbers from 0 to",
+        "/particles/id in .* number 1000000, expected one below",
     ),
-    "a negative particle": (placed("particles/id", 7, -3), "/particles/id in .* number -3, expected numbers from 0 to"),
+    "a negative particle": (placed("particles/id", 7, -3), "/particles/id in .* number -3, expected one below"),
     "no step": (
         placed("ranks/last_dt", 0, 0.0),
         "/ranks/last_dt in .* value 0.0 after .* steps, expected a number above 0",
@@ -137,8 +144,34 @@ HOSTILE = {
     ),
     "another time": (
         placed("ranks/time", 0, 3.0),
-        "/ranks/time in .* sum over ranks is .*, expected .*description says",
+        "/ranks/time in .* value 3.0, expected .*description says",
     ),
+    "another time in the description": (described(time=3.0), "/ranks/time in .* expected 3.0, as its description says"),
+    "another number of ranks": (
+        described(ranks=10**9),
+        "rows_of_particles in .* one for each of the 1000000000 ranks",
+    ),
+    "a velocity without a square": (
+        placed("particles/velocity", 0, 1e300),
+        "/particles/velocity in .* expected finite",
+    ),
+    "a field that is longer": (
+        replaced("particles/mass", (500,), float, fill=1.0),
+        "/particles/mass in .* 500 rows, expected",
+    ),
+    "no description": (replaced("description", (0,), "S3"), "state.h5"),
+    "gravity in space": (described(gravity=[0, 0, -9.81]), "gravity in its description .* vectors of 2 numbers"),
+    "supports in space": (
+        described(supports=[[1, True, [0, 0, 0]]]),
+        "supports in its description .* vectors of 2 numbers",
+    ),
+    "a surface without a place": (described(contacts=[CONTACT]), "description cannot be used .*missing .* arguments"),
+    "collisions": (described(collisions=[{"a": 1}]), "collisions in its description"),
+    "absorbing": (described(absorbing={"a": 1}), "absorbing in its description"),
+    "water": (described(water=WATER), "description cannot be used .*could not convert string to float: 'much'"),
+    "no length of implicit steps": (described(implicit={"longest": 0, "length": 0}), "implicit in its description"),
+    "another mass": (placed("particles/mass", 3, 1e9), "/particles/mass in .* kg, as were seeded"),
+    "another mass of a cell": (placed("cells/moments", (1, 2), 1e9), "/cells/moments in .* kg, as its particles have"),
     "sums": (described(sums={"time": "soon"}), "sums in its description .* expected a table of numbers"),
     "a field that is missing": (without("particles/stress"), "/particles/stress"),
 }

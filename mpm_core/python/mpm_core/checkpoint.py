@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -101,19 +102,35 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
         if there.get("cuts") and there["ranks"] == model.comm.size:
             _take_partition(model, file, name)
             model.repartitions = there["cuts"]
-        for field in there.get("added_fields", []):
-            if field["name"] not in {known["name"] for known in model.particles.schedule()}:
-                model.add_field(**field)
+        with _usable(name):
+            for field in there.get("added_fields", []):
+                if field["name"] not in {known["name"] for known in model.particles.schedule()}:
+                    model.add_field(**field)
         contacts = tuple(there.get(name, []) for name in ("contacts", "collisions", "field_contacts"))
-        before, water = _replace_contacts(model, *contacts), _water(model)
-        _take_water(model, there.get("water"))
+        before, water = (model._contacts, model._collisions, model._field_contacts), _water(model)
         try:
+            with _usable(name):
+                _replace_contacts(model, *contacts)
+                _take_water(model, there.get("water"))
             _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
             _replace_contacts(model, *before)
             _take_water(model, water)
             raise
-    _take(model, there)
+    with _usable(name):
+        _take(model, there)
+
+
+@contextmanager
+def _usable(path: str) -> Iterator[None]:
+    """Name the file where an entry of its description has the right shape, but no use; it is the same on all ranks."""
+    try:
+        yield
+    except (InputError, TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
+        reason = str(error).partition("\n")[0]
+        raise RunError(
+            f"cannot read checkpoint {path}: its description cannot be used ({type(error).__name__}: {reason})"
+        ) from None
 
 
 def _take_partition(model: Model, file: CheckpointFile, path: str) -> None:
@@ -142,6 +159,9 @@ def _state(
     }
     widths = _core.checkpoint_widths(model._core)
     n_ranks, n = file.length("ranks/rows_of_particles"), file.length("particles/id")
+    if n_ranks != there["ranks"]:
+        raise RunError(f"cannot read /ranks/rows_of_particles in {path}: it has {n_ranks} rows, expected one for each of the "
+                       f"{there['ranks']} ranks that its description says")  # fmt: skip
     totals = file.totals(widths["ranks"], slice(0, n_ranks))
     collectively(comm, lambda: _require_totals(model, path, totals, there), RunError)
     same = n_ranks == comm.size
@@ -151,10 +171,13 @@ def _state(
     if same:
         _require_ids(comm, path, particles["id"], there["next_id"])
         own_totals = {name: rows[comm.rank : comm.rank + 1] for name, rows in totals.items()}
-        return particles, file.cells(widths["cells"]), own_totals, None
+        cells = file.cells(widths["cells"])
+        _require_mass(comm, path, particles, totals, cells)
+        return particles, cells, own_totals, None
     equal_part = slice(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size)
     particles = file.particles(columns, equal_part)
     _require_ids(comm, path, particles["id"], there["next_id"])
+    _require_mass(comm, path, particles, totals, {})
     own = _own_cells(model)
     owners, _ = find_items(comm, own, np.arange(len(own)), particles["cell"])
     collectively(comm, lambda: _require_owners(path, particles, owners), RunError)
@@ -169,6 +192,10 @@ def _require_totals(model: Model, path: str, totals: Arrays, there: dict[str, An
             expected = "a number above 0" if steps > 0 else "0"
             raise RunError(f"cannot read /ranks/last_dt in {path}: it has the value {dt} after {steps:.0f} steps, "
                            f"expected {expected}")  # fmt: skip
+    for name in ("time", "steps"):
+        if any(totals[name] != there[name]):
+            raise RunError(f"cannot read /ranks/{name} in {path}: it has the value {totals[name][0]}, expected {there[name]}, as "
+                           "its description says")  # fmt: skip
     for name, total in _sums(totals).items():
         expected_sum = there.get("sums", {}).get(name, total)  # older checkpoints have none
         if total != expected_sum:
@@ -184,7 +211,7 @@ def _require_ids(comm: MPI.Comm, path: str, numbers: NDArray[np.int64], end: int
 
     def check_range() -> None:
         for row in np.flatnonzero((numbers < 0) | (numbers >= end)):
-            refuse(row, f", expected numbers from 0 to {end - 1}")
+            refuse(row, f", expected one below {end}, as next_id of its description says")
 
     collectively(comm, check_range, RunError)
     ranks, rows = find_items(comm, numbers, np.arange(len(numbers)), numbers)
@@ -196,6 +223,23 @@ def _require_ids(comm: MPI.Comm, path: str, numbers: NDArray[np.int64], end: int
     collectively(comm, check_once, RunError)
 
 
+def _require_mass(comm: MPI.Comm, path: str, particles: Arrays, totals: Arrays, cells: Arrays) -> None:
+    """Refuse particles, and sums over cells, whose mass is not what was seeded and has not flowed out. Collective."""
+    own = float(particles["mass"].sum()) if (particles["mass"] > 0).all() else math.nan  # the core names such a one
+    mass, seeded = comm.allreduce(own), totals["seeded_mass"][0] - totals["outflow_mass"].sum()
+    tables = {name: float(rows[:, 2].sum()) for name, rows in cells.items() if name.startswith("moments")}
+
+    def check() -> None:
+        sums = [("particles/mass", mass, seeded, "as were seeded and have not flowed out")]
+        if tables:
+            sums.append((f"cells/{' and '.join(tables)}", sum(tables.values()), own, "as its particles have"))
+        for name, found, expected, why in sums:
+            if abs(found - expected) > 1e-9 * abs(expected):
+                raise RunError(f"cannot read /{name} in {path}: it has {found} kg, expected {expected} kg, {why}")
+
+    collectively(comm, check, RunError)
+
+
 def _require_owners(path: str, particles: Arrays, owners: NDArray[np.int64]) -> None:
     for row in np.flatnonzero(owners < 0):
         number, cell = particles["id"][row], particles["cell"][row]
@@ -205,17 +249,13 @@ def _require_owners(path: str, particles: Arrays, owners: NDArray[np.int64]) -> 
 _Entries: TypeAlias = list[dict[str, Any]]
 
 
-def _replace_contacts(
-    model: Model, contacts: _Entries, collisions: _Entries, of_fields: _Entries
-) -> tuple[_Entries, _Entries, _Entries]:
-    """Give the model other contacts and collisions; returns those that it had."""
-    before = model._contacts, model._collisions, model._field_contacts
+def _replace_contacts(model: Model, contacts: _Entries, collisions: _Entries, of_fields: _Entries) -> None:
+    """Give the model other contacts and collisions."""
     model._contacts, model._collisions, model._field_contacts = [], [], []
     _core.clear_contacts(model._core)
     collectively(model.comm, lambda: set_contacts(model, contacts))
     set_collisions(model, collisions)
     set_field_contacts(model, of_fields)
-    return before
 
 
 _COMPARED = {

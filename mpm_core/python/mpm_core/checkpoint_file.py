@@ -120,7 +120,7 @@ class CheckpointFile:
         def run() -> T:
             try:
                 return work()
-            except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as error:
+            except (OSError, RuntimeError, LookupError, ValueError, TypeError, MemoryError) as error:
                 what = f"checkpoint {self._path}" if name is None else f"/{name} in {self._path}"
                 reason = getattr(error, "strerror", None) or (str(error.args[0]) if error.args else str(error))
                 raise RunError(f"cannot read {what}: {reason}") from None
@@ -167,15 +167,19 @@ class CheckpointFile:
         """Names of the arrays of a group."""
         return self._tried(group, lambda: set(self._file[group]))
 
-    def rows(self, name: str, rows: slice, width: int = 1, whole: bool = False) -> NDArray[Any]:
-        """This rank's rows of an array of real or whole numbers: (n,), or (n, width)."""
+    def rows(
+        self, name: str, rows: slice, width: int = 1, whole: bool = False, length: int | None = None
+    ) -> NDArray[Any]:
+        """This rank's rows of an array of real or whole numbers: (n,), or (n, width); `length` is what the array must have."""
 
         def read() -> NDArray[Any]:
             dataset = self._dataset(name)
             if dataset.dtype != (np.int64 if whole else np.float64):
-                raise ValueError(f"it has the type {dataset.dtype}")
+                raise ValueError(f"it has the type {dataset.dtype}, expected {'int64' if whole else 'float64'}")
             if dataset.shape[1:] != (() if width == 1 else (width,)):
                 raise ValueError(f"it has the shape {dataset.shape}, expected {width} number(s) per row")
+            if length is not None and len(dataset) != length:
+                raise ValueError(f"it has {len(dataset)} rows, expected {length}")
             values = np.ascontiguousarray(dataset[rows])
             if len(values) != rows.stop - rows.start:
                 raise ValueError(f"it has {len(dataset)} rows, expected {rows.stop} at least")
@@ -198,9 +202,9 @@ class CheckpointFile:
 
     def particles(self, columns: Mapping[str, Column], rows: slice) -> Arrays:
         """Fields of the particles in some rows."""
-        there = self.names("particles")
+        there, length = self.names("particles"), self.length("particles/id")
         return {
-            name: self.rows(f"particles/{name}", rows, column.width, column.whole)
+            name: self.rows(f"particles/{name}", rows, column.width, column.whole, length)
             for name, column in columns.items()
             if column.width and (name in there or not column.optional)
         }

@@ -30,6 +30,13 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
                 f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, "
                 f"expected {expected}"
             )
+    vectors = {"gravity": [there["gravity"]], "supports": [vector for *_, vector in there["supports"] if vector]}
+    for name, of_entry in vectors.items():
+        if any(len(vector) != there["dimension"] for vector in of_entry):
+            raise RunError(
+                f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there[name])[:80]}, expected "
+                f"vectors of {there['dimension']} numbers"
+            )
     last = len(there["supports"])
     if not all(name.lstrip("-").isdigit() and _is_count(k) and k < last for name, k in there["prescribed"].items()):
         raise RunError(
@@ -82,6 +89,10 @@ def _is_number(value: Any) -> bool:
 def _is_positive(value: Any) -> bool:
     """Whether it is a number from 0 on."""
     return _is_number(value) and value >= 0
+
+
+def _is_above_zero(value: Any) -> bool:
+    return _is_number(value) and value > 0
 
 
 def _is_count(value: Any) -> bool:
@@ -140,11 +151,11 @@ _WATER = {
     "anisotropy?": [AnyOf([(_is_number,) * 3, ((_is_number,) * 3,) * 3])],
     "conditions": [(_is_tag, AnyOf([_is_number, [_PAIR]]), _is_number, bool, bool)],
 }  # fmt: skip
-_CONTROL = {"longest": _is_positive, "length": _is_positive, "iterations?": _is_positive, "cuts?": _is_positive}
+_CONTROL = {"longest": _is_above_zero, "length": _is_above_zero, "iterations?": _is_positive, "cuts?": _is_positive}
 
 _OPTIONAL = (
     "added_fields", "contacts", "far_field", "field_contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance",
-    "implicit", "notes", "sums",
+    "implicit", "notes", "sums", "collisions", "absorbing",
 )  # fmt: skip
 """Entries that older files lack"""
 
@@ -168,6 +179,15 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "water": (AnyOf([_NONE, _WATER]), "null, or the properties of the pore water"),
     "geometry": (set(Geometry.__members__), f"one of {', '.join(Geometry.__members__)}"),
     "velocity_fields": ([_is_count], "a list of whole numbers from 0 on"),
+    "collisions": (
+        [{"ball": _is_count, "other": _is_count, "friction": _is_positive, "restitution": _is_positive}],
+        "a list of collisions",
+    ),
+    "absorbing": (
+        AnyOf([_NONE, {"sides": [(_is_tag, _FREE, _FREE, _FREE, bool)], "nodes": [(_is_count, [list])],
+                       "incoming": AnyOf([_NONE, list]), "free_fields": [dict]}]),
+        "null, or the sides that absorb waves",
+    ),  # fmt: skip
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
     "implicit": (AnyOf([_NONE, _CONTROL]), "null, or the state of an implicit run"),
