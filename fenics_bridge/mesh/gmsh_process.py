@@ -48,7 +48,8 @@ def read_apart(path: Path, dim: int, result: Path, name: str, limits: Limits) ->
     """
     code, text = _ran(path, dim, result, name, limits)
     if code == gmsh_reader.REFUSED:
-        raise InputError(f"path: {name!r}: {text}")
+        perhaps = f"; perhaps it is damaged, or needs more than {limits.memory_bytes() / 1e9:.2g} GB, see memory_limit"
+        raise InputError(f"path: {name!r}: {text}{perhaps if text.endswith(gmsh_reader.NO_REASON) else ''}")
     if code == gmsh_reader.TOO_LARGE or any(word in text for word in ("bad_alloc", "MemoryError", "allocate memory")):
         raise InputError(f"path: gmsh needs more than {limits.memory_bytes() / 1e9:.2g} GB for {name!r}; if the mesh is so "
                          "large, raise memory_limit")  # fmt: skip

@@ -50,6 +50,10 @@ LAST_TAG = 2**31 - 1
 """gmsh and DOLFINx keep tags in 32 bits; of larger numbers gmsh keeps the low bits, which may be another group's tag"""
 
 
+NO_REASON = "it gives no reason"
+"""What stands for the reason of an error without one: newer versions of gmsh end so when they get no more memory"""
+
+
 class MeshError(Exception):
     """A mesh that cannot be used; says why."""
 
@@ -68,7 +72,7 @@ def gmsh_session() -> Iterator[Any]:
 
 def gmsh_message(error: Exception) -> str:
     """Message of gmsh about an error, on one line."""
-    return " ".join(str(error).split()) or gmsh.logger.getLastError() or "it gives no reason"
+    return " ".join(str(error).split()) or gmsh.logger.getLastError() or NO_REASON
 
 
 def read_file(path: Path, dim: int) -> dict[str, Any]:
@@ -111,6 +115,9 @@ def model_arrays(dim: int) -> dict[str, Any]:
     facets, facet_values = _entities(dim - 1, only_groups=True)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     points = coordinates.reshape(-1, 3)
+    if not np.isfinite(points).all():
+        row = int(np.argmin(np.isfinite(points).all(axis=1)))
+        raise MeshError(f"node {tags[row]} is at {tuple(points[row].tolist())}, expected finite coordinates")
     if not np.isin(cells, tags).all():
         raise MeshError("has cells with nodes that are not there")
     if dim == 2 and np.ptp(points[np.isin(tags, cells), 2]) > 1e-9 * np.ptp(points):

@@ -31,4 +31,7 @@ def test_one_line_stands_for_the_compilers(tmp_path):
     assert [line for line in first if "of the user" not in line] == [said]
     assert said not in second and len(second) == 2 and "a line of the user" in second[0]
     assert second[1] == "<string>:12: UserWarning: a warning of the user"  # not as a line of FFCx's log
-    assert "gcc" in (tmp_path / "forms.log").read_text()
+    log = (tmp_path / "forms.log").read_text()
+    assert (
+        "Calling JIT C compiler" in log or "gcc" in log
+    )  # newer versions of FFCx keep the compiler's own lines in their cache

@@ -64,6 +64,14 @@ def test_damaged_files_end_in_a_clear_error(good_files, tmp_path):
     assert refused > 10
 
 
+def test_a_node_without_a_place_is_named(tmp_path):
+    path = tmp_path / "nan.msh"
+    path.write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 nan 0\n3 0 1 0\n$EndNodes\n"
+                    "$Elements\n1\n1 2 2 1 1 1 2 3\n$EndElements\n")  # fmt: skip
+    with pytest.raises(mpm.InputError, match=r"nan.msh'?: node 2 is at \(1.0, nan, 0.0\), expected finite coordinates"):
+        bridge.read_mesh(path, MPI.COMM_SELF)
+
+
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
