@@ -7,6 +7,7 @@ are written into the file.
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,11 +24,9 @@ from .parameters import Parameter
 
 PAGE = Path(__file__).parent / "report_page"
 SCRIPTS = ("curves.js", "main.js")
-UNITS = {
-    "_J_per_m": "J/m", "_N_per_m": "N/m", "_kPa": "kPa", "_Pa": "Pa", "_m": "m", "_mm": "mm", "_s": "s", "_seconds": "s",
-    "_degrees": "degrees",
-}  # fmt: skip
-"""Unit of a quantity by the end of its name."""
+_ONE = "(?:mm|m|m2|m3|s|s2|Ns|N.s|Nm|N.m|N|kN|kPa|Pa|J|kg|rad|seconds|hours|days|degrees)"
+UNIT = re.compile(rf"_({_ONE}(?:(?:_per_|/){_ONE})?)$")
+"""Unit of a quantity by the end of its name, such as Pa, m_per_s or m/s"""
 SPECIAL = {
     "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"),
     "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
@@ -124,10 +123,12 @@ def name_and_unit(column: str) -> tuple[str, str]:
         return SPECIAL[column]
     if "unit_weight" in column:
         return _words(column), "N/m\u00b3"
-    for ending, unit in UNITS.items():
-        if column.endswith(ending):
-            return _words(column.removesuffix(ending)), unit
-    return _words(column), "-"
+    found = UNIT.search(column)
+    if found is None:
+        return _words(column), "-"
+    unit = found.group(1).replace("_per_", "/").replace("2", "\u00b2").replace("3", "\u00b3")
+    unit = unit.replace("seconds", "s").replace("Ns", "N s").replace("Nm", "N m").replace(".", " ")
+    return _words(column[: found.start()]), unit
 
 
 def _words(name: str) -> str:
@@ -149,8 +150,10 @@ def _curves(title: str, table: Mapping[str, np.ndarray]) -> dict:
     for number, (column, values) in enumerate(table.items()):
         name, unit = name_and_unit(column)
         numbers = [float(v) if np.isfinite(v) else None for v in values]
-        if number > 0 and len(set(numbers)) == 1:
-            constant.append(f"{name} {shown(numbers[0])}{'' if unit == '-' else f' {unit}'}")
+        # Before the first step there is no time step yet, or that of an equilibrium before the run.
+        of_run = numbers[1:] if column == "dt_s" else numbers
+        if number > 0 and len(set(of_run)) == 1:
+            constant.append(f"{name} {shown(of_run[0])}{'' if unit == '-' else f' {unit}'}")
         else:
             columns.append({"name": name, "unit": unit, "values": numbers})
     first, *others = columns

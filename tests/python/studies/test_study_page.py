@@ -19,11 +19,17 @@ SCENE = Scene(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]), np.arr
 QUANTITIES = {"shear_strain": SHEAR_STRAIN, "displacement": DISPLACEMENT, "vertical_stress": VERTICAL_STRESS}
 
 
-def frame(time, **values):
-    """Four particles in a row; what is not named is zero."""
-    zero = np.zeros(4)
-    position = np.column_stack([np.arange(4) / 4, zero])
-    return {"time": time, "position": position, "volume": np.full(4, 0.1), **dict.fromkeys(QUANTITIES, zero), **values}
+def frame(time, count=4, **values):
+    """Particles in a row; what is not named is zero."""
+    zero = np.zeros(count)
+    position = np.column_stack([np.arange(count) / count, zero])
+    return {
+        "time": time,
+        "position": position,
+        "volume": np.full(count, 0.1),
+        **dict.fromkeys(QUANTITIES, zero),
+        **values,
+    }
 
 
 def page(tmp_path, movies=(), curves=None):
@@ -47,7 +53,7 @@ def test_what_does_not_change_is_said_and_not_drawn(tmp_path):
     table = {
         "time_s": TIMES,
         "runout_m": TIMES**2,
-        "dt_s": np.full(5, 1e-3),
+        "dt_s": np.array([0.0, *np.full(4, 1e-3)]),
         "cuts": np.zeros(5),
         "none": np.full(5, np.nan),
     }
@@ -65,6 +71,13 @@ def test_no_panel_is_of_one_colour_at_first(tmp_path):
     before = Movie("FEM", SCENE, [frame(0.0, displacement=1e-3 * growing, vertical_stress=-8e3 * growing)], QUANTITIES)
     assert page(tmp_path, [slide])[1]["first"] == "shear_strain"
     assert page(tmp_path, [slide, before])[1]["first"] == "vertical_stress"
+    corner = Movie(
+        "FEM",
+        SCENE,
+        [frame(0.0, 100, shear_strain=np.eye(1, 100)[0], vertical_stress=np.linspace(-8e3, 0, 100))],
+        QUANTITIES,
+    )
+    assert page(tmp_path, [slide, corner])[1]["first"] == "vertical_stress"  # a particle at a corner is not seen
     still = Movie("still", SCENE, [frame(0.0)], QUANTITIES)
     assert page(tmp_path, [still])[1]["first"] == "shear_strain"
 
@@ -82,3 +95,8 @@ def test_names_of_columns_are_words_with_units():
     assert name_and_unit("kinetic_energy_J_per_m") == ("Kinetic energy of the particles", "J/m")
     assert name_and_unit("plastic_fraction") == ("Fraction of particles that yield", "-")
     assert name_and_unit("crest_displacement_m") == ("Crest displacement", "m")
+    assert name_and_unit("velocity_x_m/s") == ("Velocity x", "m/s")
+    assert name_and_unit("yield_acceleration_m_per_s2") == ("Yield acceleration", "m/s\u00b2")
+    assert name_and_unit("momentum_x_N.s") == ("Momentum x", "N s") == name_and_unit("momentum_x_Ns")
+    assert name_and_unit("force_normal_N") == ("Force normal", "N") and name_and_unit("mass_kg") == ("Mass", "kg")
+    assert name_and_unit("computing_seconds") == ("Computing", "s") and name_and_unit("bearing_factor_Nc")[1] == "-"
