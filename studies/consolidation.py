@@ -2,9 +2,9 @@
 
 The site is a TOML file (`meshes/fill.toml` unless another is given): a mesh of gmsh, soils with laws of effective stress and
 conductivities, supports, boundary conditions of the pore water, and loads over time. The ground is first in equilibrium under its
-weight and steady flow; from there displacements and pore pressures are computed together. With `--particles`, implicit particles
-with pore water start from the same equilibrium and are computed beside the finite elements, with the same steps and small
-displacements.
+weight and steady flow; from there displacements and pore pressures are computed together, while loads rise, pause and fall, and
+soil is placed and dug away in stages. With `--particles`, implicit particles with pore water start from the same equilibrium and
+are computed beside the finite elements, with the same steps and small displacements.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from common.consolidation_particles import ParticleGround, near_line
 from common.consolidation_plots import EXCESS, ExcessPicture, save_excess, save_isochrones, save_over_time
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
+from common.consolidation_stages import pressures_of
 from common.field_files import FieldFiles
 from common.field_plots import gathered
 from common.figures import Pictures
@@ -51,8 +52,13 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     elements = "P1-P1", tuple(ELEMENTS), "quadratic displacement (P2-P1), or stabilised linear one"
     add_site_file(p, "fill", "soils, water and pressures", elements)
+    p.add_argument(
+        "--pressures", nargs="+", default=None, metavar="NAME=ROWS",
+        help="pressures on boundaries beside those of the site file, or in their place: NAME=PA, or over time "
+        "NAME=DAYS:PA,DAYS:PA,... joined by straight lines, such as footing=0:0,10:20e3,60:20e3,70:40e3",
+    )  # fmt: skip
     add_number(p, "--days", 3000.0, "days", "time that is followed", above=0)
-    add_number(p, "--first-step", 0.5, "days", "first step", above=0)
+    add_number(p, "--first-step", 0.5, "days", "first step, at the beginning and after each change of a load", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
     add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
     add_switch(
@@ -118,10 +124,14 @@ class Files(FieldFiles):
         self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
 
 
-def follow(a: Namespace, model: water.Consolidation, files: Files) -> str | None:
-    """The ground in time. Returns why it ended early, if it did. Collective."""
-    dt = DAY * min(a.first_step, a.days)
-    frames = np.geomspace(min(10 * a.first_step, 0.5 * a.days), a.days, a.frames) if a.frames > 1 else [a.days]
+def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, files: Files) -> str | None:
+    """The ground in time; steps end, and become short again, where loads change. Returns why it ended early, if it did.
+
+    Collective.
+    """
+    first = dt = DAY * min(a.first_step, a.days)
+    days = np.geomspace(min(10 * a.first_step, 0.5 * a.days), a.days, a.frames) if a.frames > 1 else [a.days]
+    frames, changes = ({float(f"{time:.9g}") for time in times} for times in (DAY * np.array(days), site.corners(0.5 * first)))
     with Progress("consolidation", a.days, comm, unit="days") as progress:
 
         def made(report: water.ConsolidationReport) -> None:
@@ -129,15 +139,19 @@ def follow(a: Namespace, model: water.Consolidation, files: Files) -> str | None
                 files.row(report)
                 progress.show(model.time / DAY, len(files.history))
 
-        for frame in frames:
+        site.change(model, 0.0)
+        for time in sorted(frames | {change for change in changes if change < max(frames)}):
             try:
-                reports = model.run(DAY * frame, dt, a.growth, progress=made)
+                reports = model.run(time, dt, a.growth, progress=made)
             except mpm.RunError as error:
                 return f"particles from {model.time / DAY:.4g} days on: {error}"
             if not reports[-1].converged:
                 return f"no step from {model.time / DAY:.4g} days on: {reports[-1].reason}"
-            dt = max(dt, max(report.dt for report in reports))
-            files.frame()
+            dt = first if time in changes else max(dt, max(report.dt for report in reports))
+            if time in frames:
+                files.frame()
+            if time in changes:
+                site.change(model, time)
     return None
 
 
@@ -191,7 +205,7 @@ def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
     folder = open_results(a, comm)
-    site = read_consolidation_site(a.site, comm, a.cell_size)
+    site = read_consolidation_site(a.site, comm, a.cell_size, pressures_of(a.pressures or []))
     model = site.at_rest(ELEMENTS[a.elements], a.nmd and a.elements == "P1-P1")
     with ExitStack() as stack:
         particles = None
@@ -199,7 +213,7 @@ def main(arguments: list[str] | None = None) -> int:
             particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, a.nmd, folder))
         files = stack.enter_context(Files(model, site, folder, particles))
         files.row()
-        stopped = follow(a, model, files)
+        stopped = follow(a, site, model, files)
     history = files.history
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped,

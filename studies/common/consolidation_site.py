@@ -2,13 +2,19 @@
 
 `meshes/fill.toml` is an example. Its keys are those of the sites of seepage, and besides them
 
-    [soils.clay]                       # a physical group: conductivity and porosity, and
+    [soils.clay]                       # a physical group: conductivity and porosity (without them it holds no water), and
     unit_weight = 17e3                 # N/m3, saturated
     material = "mohr-coulomb"          # of effective stresses, and the parameters of the law, named as options of the study slope
 
     [supports]                         # as for sites of stages
     [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]
     [points]                           # name = [x, y]: places whose settlements are followed
+
+    [[stages]]                         # soil that is placed and dug away while the ground consolidates
+    day = 30.0
+    duration = 10.0                    # days in which its weight comes or goes; 0 by default: at once
+    fill = ["layer 1"]                 # soils of the mesh that are there from now on, and excavate = [...] that are not
+    boundaries.ground.reservoir = 0.0  # what the water does from now on, where that changes
 """
 
 from __future__ import annotations
@@ -25,11 +31,12 @@ import mpm_core as mpm
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
+from .consolidation_stages import GroundStage, Table, corners_of, pressure_table, stages_of
 from .site_file import law_at, read_toml, supports_of
 from .slope_case import GRAVITY
 from .water_site import DAY, condition, porous_soil
 
-KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points")
+KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points", "stages")
 BALANCED = 1e-9
 """Out-of-balance ratio of particles at the beginning"""
 POROUS = ("conductivity", "dip", "porosity")
@@ -39,17 +46,36 @@ POROUS = ("conductivity", "dip", "porosity")
 class ConsolidationSite:
     """A site of consolidation as its file describes it, on its mesh.
 
-    mesh: domain, cell tags and facet tags; laws, soils, unit_weight: by name of the soil; pressures: numbers or tables in s
+    mesh: domain, cell tags and facet tags of the soils; laws, soils, unit_weight: by name of the soil, which is None without
+    water; pressures: tables in s; stages: the first is the beginning
     """
 
     mesh: tuple
     laws: dict[str, Any]
-    soils: dict[str, water.PorousSoil]
+    soils: dict[str, water.PorousSoil | None]
     unit_weight: dict[str, float]
     supports: list[bridge.Support]
-    boundary: list
-    pressures: dict[str, Any]
+    pressures: dict[str, Table]
     points: dict[str, np.ndarray]
+    stages: list[GroundStage]
+
+    @property
+    def boundary(self) -> list:
+        """Conditions of the water at the beginning."""
+        return list(self.stages[0].boundary.values())
+
+    def corners(self, apart: float) -> list[float]:
+        """Times [s] at which loads, levels or soils change their rate; those that follow within `apart` [s] make a jump."""
+        return corners_of(self.pressures.values(), self.stages, apart)
+
+    def change(self, model: water.Consolidation, time: float) -> str | None:
+        """Begin the stage of a time [s], if one begins then; returns its name. Collective."""
+        for stage in self.stages[1:]:
+            if np.isclose(stage.start, time, rtol=1e-9, atol=0.0):
+                model.boundary = list(stage.boundary.values())
+                model.reconfigure(off=stage.off, duration=stage.duration)
+                return stage.name
+        return None
 
     def load(self, time: float) -> bridge.Load:
         """Weights and pressures at a time [s]."""
@@ -66,7 +92,12 @@ class ConsolidationSite:
             RunError: it cannot carry them.
         """
         domain, cell_tags, facet_tags = self.mesh
-        flow = water.Seepage(domain, self.soils, facet_tags, self.boundary, cell_tags=cell_tags)
+        off = self.stages[0].off
+        wet = {soil: porous for soil, porous in self.soils.items() if porous is not None and soil not in off}
+        if not wet:
+            raise mpm.InputError("soils: none that is there at the beginning has a conductivity, expected one or more")
+        body = self.mesh if len(wet) == len(self.soils) else bridge.soil_mesh(*self.mesh, tag=list(wet))
+        flow = water.Seepage(body[0], wet, body[2], self.boundary, cell_tags=body[1])
         flow.solve()
         fem = bridge.QuasiStatic(
             domain,
@@ -78,13 +109,14 @@ class ConsolidationSite:
             cell_tags=cell_tags,
             options_prefix="rest_",
         )
-        fem.reconfigure(pore_pressure=flow.pore_pressure())
+        fem.reconfigure(off=off, pore_pressure=flow.pore_pressure())
         fem.solve(self.load(0.0))
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
         model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
                                     element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
-        model.initialise(fem, flow)
+        model.reconfigure(off=off)
+        model.initialise(fem, flow if body is self.mesh else flow.pore_pressure())
         return model
 
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
@@ -94,8 +126,11 @@ class ConsolidationSite:
         those of soil that dilates only (`AveragedKinematics`); an equilibration, which keeps the pore pressures, makes up for it.
 
         Raises:
-            InputError: the water has a boundary condition other than reservoirs.
+            InputError: the water has a boundary condition other than reservoirs, or the site has stages or soil without water.
         """
+        if len(self.stages) > 1 or None in self.soils.values():
+            raise mpm.InputError("particles: the site has stages or soil without conductivity, expected soil with water that is "
+                                 "there all the time; describe a fill by its pressure, in [pressures]")  # fmt: skip
         model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
         for k, (soil, weight) in enumerate(self.unit_weight.items()):
             for tag in model.mesh.tags_of("cell", soil):
@@ -123,12 +158,15 @@ class ConsolidationSite:
             model.press_surface(tag, value_at(given, time))
 
 
-def read_consolidation_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> ConsolidationSite:
+def read_consolidation_site(
+    path: Path, comm: MPI.Comm, cell_size: float | None = None, pressures: dict[str, Table] | None = None
+) -> ConsolidationSite:
     """Read a site of consolidation and make its mesh. Collective.
 
     Args:
         path: of the TOML file.
         cell_size: [m], instead of the one in the file; for meshes with that constant.
+        pressures: by boundary, besides those in the file or instead of them.
 
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
@@ -145,26 +183,17 @@ def read_consolidation_site(path: Path, comm: MPI.Comm, cell_size: float | None 
         if "unit_weight" not in given:
             raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
         weights[name] = float(given["unit_weight"])
-        soils[name] = porous_soil({key: given[key] for key in POROUS if key in given}, where)
+        porous = {key: given[key] for key in POROUS if key in given}
+        soils[name] = porous_soil(porous, where) if porous else None
         laws[name] = law_at({k: v for k, v in given.items() if k not in (*POROUS, "unit_weight")}, 0.0, where)
-    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
-    pressures = {
-        name: _pressure(given, f"{path}: pressures.{name}") for name, given in table.get("pressures", {}).items()
-    }
+    boundary = {name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()}
+    stages = stages_of(table.get("stages", []), list(soils), boundary, f"{path}: stages")
+    if len(stages) > 1:
+        mesh = bridge.soil_mesh(*mesh, tag=list(soils))
+    given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
     supports = supports_of(table, path, mesh[0], mesh[2])
-    return ConsolidationSite(mesh, laws, soils, weights, supports, boundary, pressures, points)
-
-
-def _pressure(given: Any, where: str) -> Any:
-    rows = given if isinstance(given, list) else [[0.0, given]]
-    try:
-        table = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
-        table = np.empty(0)
-    if table.ndim != 2 or table.shape[1] != 2 or not np.all(np.isfinite(table)) or np.any(np.diff(table[:, 0]) <= 0):
-        raise mpm.InputError(f"{where}: is {given!r}, expected a number or rows [days, Pa] of rising days")
-    return tuple((DAY * day, value) for day, value in table)
+    return ConsolidationSite(mesh, laws, soils, weights, supports, given | (pressures or {}), points, stages)
 
 
 def _point(given: Any, where: str) -> np.ndarray:

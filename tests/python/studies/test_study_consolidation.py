@@ -25,7 +25,9 @@ SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
         ("unit_weight = 17e3", "", "soils.soil: has no unit_weight"),
         ("young = 3e6", "youngs = 3e6", "soils.soil: .*youngs"),
         ('axis = "roller"', 'axis = "slides"', "supports.axis is 'slides'"),
-        ("[10.0, 20e3]", "[0.0, 20e3]", "pressures.footing: .*rising days"),
+        ("[10.0, 20e3]", "[0.0, 20e3]", "pressures.footing: day 0 comes after day 0, .*rising days"),
+        ("[10.0, 20e3]", "[10.0, nan]", "pressures.footing: .*expected finite numbers"),
+        ("[10.0, 20e3]", "[10.0]", "pressures.footing: .*expected a number or rows"),
         ("footing = [[0.0, 0.0]", "nowhere = [[0.0, 0.0]", "no facet has the name 'nowhere'"),
         ("middle = [0.0, 0.0]", "middle = [0.0]", r"points.middle: .*expected \[x, y\]"),
         ("[points]", "[places]", "unknown key 'places'"),
@@ -80,16 +82,148 @@ def test_particles_begin_at_rest(dilation, nmd, tmp_path):
     assert np.abs(motion.moved).max() < 1e-10
 
 
+def _write_layer(folder, heights=(2.0,)):
+    """A column of the layers `heights` of clay, first and second; the curve "top" is on the clay."""
+    lines = ["DefineConstant[ cell_size = 0.1 ];", "Point(1) = {0, 0, 0};", "Point(2) = {0.3, 0, 0};", "Line(1) = {1, 2};"]
+    for k, height in enumerate(heights):
+        low, left, right, up = 10 * k + 1, 10 * k + 13, 10 * k + 14, 10 * k + 11
+        lines += [f"Point({up}) = {{0, {height}, 0}};", f"Point({up + 1}) = {{0.3, {height}, 0}};", f"Line({up}) = {{{up}, {up + 1}}};",
+                  f"Line({left}) = {{{low}, {up}}};", f"Line({right}) = {{{low + 1}, {up + 1}}};",
+                  f"Curve Loop({up}) = {{{low}, {right}, -{up}, -{left}}};", f"Plane Surface({up}) = {{{up}}};",
+                  f'Physical Surface("{("clay", "first", "second")[k]}") = {{{up}}};']  # fmt: skip
+    sides = [", ".join(str(10 * k + side) for k in range(len(heights))) for side in (13, 14)]
+    lines += ['Physical Curve("base") = {1};', 'Physical Curve("top") = {11};', f'Physical Curve("left") = {{{sides[0]}}};',
+              f'Physical Curve("right") = {{{sides[1]}}};', "Mesh.MeshSizeMax = cell_size;"]  # fmt: skip
+    (folder / "layer.geo").write_text("\n".join(lines) + "\n")
+
+
+CLAY = """mesh = "layer.geo"
+[soils.clay]
+unit_weight = 18e3
+conductivity = 1e-9
+material = "elastic"
+young = 4e6
+poisson = 0.25
+[boundaries.top]
+reservoir = 2.0
+[points]
+middle = [0.15, 2.0]
+"""
+OEDOMETER = 4.8e6
+DAYS = 2.0**2 * 9810.0 / (1e-9 * OEDOMETER) / 86400
+"""Time factor 1 of CLAY [days]"""
+
+
+def _settled(factors, ramps):
+    """Settlement [m] of CLAY under loads that rise by q [Pa] between two time factors (Olson 1977): each (a, b, q)."""
+    m = np.pi * (2 * np.arange(200) + 1) / 2
+    late = lambda factor: np.maximum(np.subtract.outer(factors, factor), 0.0)
+    rising = lambda f: f - np.sum(2 / m**4 * (1 - np.exp(-np.multiply.outer(f, m**2))), axis=-1)
+    return sum(q * (rising(late(a)) - rising(late(b))) / (b - a) for a, b, q in ramps) * 2.0 / OEDOMETER
+
+
+def _history(folder, *names):
+    with open(folder / "history.csv", newline="") as file:
+        return np.transpose([[float(row[name]) for name in names] for row in csv.DictReader(file)])
+
+
+def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path):
+    """Rise, pause, rise, pause, and a part that is taken away at once; from the command line, by elements and particles."""
+    import consolidation
+
+    _write_layer(tmp_path)
+    (tmp_path / "layer.toml").write_text(CLAY)
+    rows = ((0, 0), (0.1, 20e3), (0.3, 20e3), (0.4, 50e3), (0.6, 50e3), (0.60001, 30e3))
+    words = ["top=" + ",".join(f"{factor * DAYS}:{load}" for factor, load in rows)]
+    arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,
+                 "--frames", 1, "--particles", "--output", tmp_path / "results", "--pressures", *words]  # fmt: skip
+    assert consolidation.main([str(word) for word in arguments]) == 0
+    days, *found = _history(tmp_path / "results", "time_days", "settlement_middle_m", "settlement_middle_particles_m")
+    expected = _settled(days / DAYS, [(0, 0.1, 20e3), (0.3, 0.4, 30e3), (0.6, 0.60001, -20e3)])
+    for one in found:
+        assert np.abs(one - expected).max() < 0.01 * expected.max()
+    assert all(np.abs(days / DAYS - corner).min() < 1e-8 for corner in (0.1, 0.3, 0.4, 0.6))  # where steps end
+
+
+STAGES = """
+[soils.first]
+unit_weight = 20e3
+material = "elastic"
+young = 10e6
+poisson = 0.3
+[soils.second]
+unit_weight = 20e3
+material = "elastic"
+young = 10e6
+poisson = 0.3
+"""
+
+
+def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights_do(tmp_path):
+    import consolidation
+
+    _write_layer(tmp_path, (2.0, 2.2, 2.4))
+    stages = [f"[[stages]]\nday = {start * DAYS}\nduration = {0.1 * DAYS}\nfill = '{soil}'\n"
+              for start, soil in ((0.1, "first"), (0.4, "second"))]  # fmt: skip
+    last = f"[[stages]]\nday = {0.6 * DAYS}\nexcavate = ['second']\nname = 'dug away'\n"
+    (tmp_path / "layer.toml").write_text(CLAY + STAGES + "".join(stages) + last)
+    arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,
+                 "--frames", 2, "--output", tmp_path / "results"]  # fmt: skip
+    assert consolidation.main([str(word) for word in arguments]) == 0
+    days, found = _history(tmp_path / "results", "time_days", "settlement_middle_m")
+    ramps = [(0.1, 0.2, 4e3), (0.4, 0.5, 4e3), (0.6, 0.60001, -4e3)]
+    expected = _settled(days / DAYS, ramps)
+    assert np.abs(found[days < 0.1 * DAYS]).max() < 1e-9 * expected.max()
+    assert np.abs(found - expected).max() < 0.01 * expected.max()
+
+
+@pytest.mark.parametrize(
+    "stages, words",
+    [
+        ("day = 1.0\nfill = 'sand'", r"stages\[0\]: soil 'sand' is not among the soils clay, first, second"),
+        ("day = 1.0", r"stages\[0\]: has neither fill nor excavate"),
+        ("fill = 'first'", r"stages\[0\]: day is None, expected a number of days"),
+        ("day = 1.0\nduration = -1\nfill = 'first'", r"stages\[0\]: duration is -1, expected a number of days from 0 on"),
+        ("day = 1.0\nlayer = 'first'", r"stages\[0\]: unknown key 'layer', expected some of name, day"),
+        ("day = 2.0\nfill = 'first'\n[[stages]]\nday = 1.0\nfill = 'second'", r"stages\[1\]: day 1 comes after day 2"),
+        ("day = 1.0\nfill = 'first'\n[[stages]]\nday = 2.0\nfill = 'first'", r"stages\[1\]: 'first' is there before"),
+        ("day = 1.0\nfill = 'first'\nexcavate = 'second'\n[[stages]]\nday = 2.0\nfill = 'second'", "'second' is not there"),
+        ("day = 1.0\nfill = 'clay'", "soils: none that is there at the beginning has a conductivity"),
+    ],
+)
+def test_wrong_stages_are_named(stages, words, tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    _write_layer(tmp_path, (2.0, 2.2, 2.4))
+    (tmp_path / "layer.toml").write_text(f"{CLAY}{STAGES}[[stages]]\n{stages}\n")
+    with pytest.raises(InputError, match=words):
+        read_consolidation_site(tmp_path / "layer.toml", MPI.COMM_SELF).at_rest(water.Element.STABILISED)
+
+
+@pytest.mark.parametrize(
+    "word, words",
+    [
+        ("footing", "--pressures: is 'footing', expected NAME=PA or NAME=DAYS:PA"),
+        ("footing=1:2:3", "--pressures: is 'footing=1:2:3'"),
+        ("footing=0:0,5", "--pressures: is 'footing=0:0,5'"),
+        ("footing=5:0,5:1e3", "--pressures footing: day 5 comes after day 5, expected .* rising days"),
+        ("footing=0:inf", "--pressures footing: .*expected finite numbers"),
+    ],
+)
+def test_wrong_pressures_on_the_command_line_are_named(word, words):
+    from common.consolidation_stages import pressures_of
+
+    with pytest.raises(InputError, match=words):
+        pressures_of([word])
+
+
 @pytest.mark.parametrize("elements", ["P2-P1", "P1-P1"])
 def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     import consolidation
 
-    lines = ["DefineConstant[ cell_size = 0.1 ];", "Point(1) = {0, 0, 0};", "Point(2) = {0.3, 0, 0};",
-             "Point(3) = {0.3, 2, 0};", "Point(4) = {0, 2, 0};", *(f"Line({k}) = {{{k}, {k % 4 + 1}}};" for k in range(1, 5)),
-             "Curve Loop(1) = {1, 2, 3, 4};", "Plane Surface(1) = {1};", 'Physical Surface("clay") = {1};',
-             'Physical Curve("base") = {1};', 'Physical Curve("right") = {2};', 'Physical Curve("top") = {3};',
-             'Physical Curve("left") = {4};', "Mesh.MeshSizeMax = cell_size;"]  # fmt: skip
-    (tmp_path / "layer.geo").write_text("\n".join(lines) + "\n")
+    _write_layer(tmp_path)
     young, poisson, load, k, height = 4e6, 0.25, 30e3, 1e-9, 2.0
     (tmp_path / "layer.toml").write_text(
         f'mesh = "layer.geo"\n[soils.clay]\nunit_weight = 18e3\nconductivity = {k}\nmaterial = "elastic"\nyoung = {young}\n'

@@ -1,0 +1,156 @@
+"""What changes while ground consolidates: pressures over time, and soil that is placed and dug away in stages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import mpm_core as mpm
+
+from .water_site import DAY, condition
+
+STAGE_KEYS = ("name", "day", "duration", "fill", "excavate", "boundaries")
+Table = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class GroundStage:
+    """A stage of construction.
+
+    start, duration: from when, and for how long, the weight of what is placed or dug away comes or goes [s]
+    off: soils that are not there from then on; boundary: conditions of the water from then on, by boundary
+    """
+
+    name: str
+    start: float
+    duration: float
+    off: tuple[str, ...]
+    boundary: Mapping[str, Any]
+
+
+def pressure_table(given: Any, where: str) -> Table:
+    """A pressure over time, in s and Pa, from a number [Pa] or rows [days, Pa] that are joined by straight lines.
+
+    Args:
+        given: number or rows.
+        where: it stands, for messages.
+
+    Raises:
+        InputError: another form, values that are not finite, or days that do not rise.
+    """
+    rows = given if isinstance(given, list) else [[0.0, given]]
+    try:
+        table = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        table = np.empty(0)
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise mpm.InputError(f"{where}: is {given!r}, expected a number or rows [days, Pa]")
+    if not np.all(np.isfinite(table)):
+        raise mpm.InputError(f"{where}: is {given!r}, expected finite numbers")
+    late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
+    if len(late):
+        first, second = table[late[0] : late[0] + 2, 0]
+        raise mpm.InputError(f"{where}: day {second:g} comes after day {first:g}, expected rows [days, Pa] of rising days")
+    return tuple((DAY * float(day), float(value)) for day, value in table)
+
+
+def pressures_of(words: Iterable[str]) -> dict[str, Table]:
+    """Pressures as the command line has them: NAME=PA, or NAME=DAYS:PA,DAYS:PA,...
+
+    Raises:
+        InputError: as `pressure_table`, or a text of another form.
+    """
+    found = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        try:
+            rows = [[float(number) for number in pair.split(":")] for pair in text.split(",")]
+        except ValueError:
+            rows = []
+        one = len(rows) == 1 and len(rows[0]) == 1
+        if not name or not equals or not rows or (not one and any(len(row) != 2 for row in rows)):
+            raise mpm.InputError(f"--pressures: is {word!r}, expected NAME=PA or NAME=DAYS:PA,DAYS:PA,...")
+        found[name] = pressure_table(rows[0][0] if one else rows, f"--pressures {name}")
+    return found
+
+
+def stages_of(given: Any, soils: Sequence[str], boundary: Mapping[str, Any], where: str) -> list[GroundStage]:
+    """Stages of construction, the first of which is the beginning: soils that no later stage places are there then.
+
+    Args:
+        given: rows of the file.
+        soils: names of all soils.
+        boundary: conditions of the water at the beginning, by boundary.
+        where: they stand, for messages.
+
+    Raises:
+        InputError: an unknown key or soil, days that do not rise, or soil that is placed twice or dug away where there is none.
+    """
+    rows = given if isinstance(given, list) else [given]
+    names = [_names(row, "fill", f"{where}[{k}]") for k, row in enumerate(rows)]
+    off = tuple(soil for soil in soils if any(soil in fill for fill in names))
+    stages = [GroundStage("beginning", 0.0, 0.0, off, dict(boundary))]
+    for k, row in enumerate(rows):
+        stages.append(_stage(row, stages[-1], soils, f"{where}[{k}]", first=k == 0))
+    return stages
+
+
+def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, first: bool) -> GroundStage:
+    for key in row:
+        if key not in STAGE_KEYS:
+            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
+    day, duration = _days(row, "day", where), _days(row, "duration", where, 0.0)
+    if day < before.start / DAY or (day == before.start / DAY and not first):
+        raise mpm.InputError(f"{where}: day {day:g} comes after day {before.start / DAY:g}, expected stages of rising days")
+    fill, gone = _names(row, "fill", where), _names(row, "excavate", where)
+    if not fill and not gone:
+        raise mpm.InputError(f"{where}: has neither fill nor excavate, expected soils to place or to dig away")
+    for soil in (*fill, *gone):
+        if soil not in soils:
+            raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(soils)}")
+        if (soil in fill) != (soil in before.off):
+            raise mpm.InputError(f"{where}: {soil!r} is {'not ' if soil in before.off else ''}there before this stage")
+    off = tuple(soil for soil in soils if (soil in before.off or soil in gone) and soil not in fill)
+    changed = {
+        name: condition(name, one, f"{where}.boundaries.{name}") for name, one in row.get("boundaries", {}).items()
+    }
+    name = str(row.get("name", ", ".join((*fill, *gone))))
+    return GroundStage(name, DAY * day, DAY * duration, off, {**before.boundary, **changed})
+
+
+def _names(row: Any, key: str, where: str) -> list[str]:
+    if not isinstance(row, dict):
+        raise mpm.InputError(f"{where}: is {row!r}, expected tables [[stages]]")
+    names = row.get(key, [])
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise mpm.InputError(f"{where}: {key} is {names!r}, expected names of soils")
+    return names
+
+
+def _days(row: dict, key: str, where: str, default: float | None = None) -> float:
+    value = row.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
+        raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number of days from 0 on")
+    return float(value)
+
+
+def corners_of(pressures: Iterable[Table], stages: Sequence[GroundStage], apart: float) -> list[float]:
+    """Times [s] at which a rate changes, where steps should end: the rows of all tables, beginnings and ends of stages.
+
+    Rows that follow another within `apart` [s] are a jump, which belongs to the step after it; stages begin in any case.
+    """
+    levels = [getattr(one, key, None) for stage in stages for one in stage.boundary.values() for key in ("level", "rate")]
+    tables = [*pressures, *(level for level in levels if isinstance(level, tuple))]
+    starts = {stage.start for stage in stages}
+    times = starts | {time for table in tables for time, _ in table}
+    times |= {stage.start + stage.duration for stage in stages}
+    kept = [0.0]
+    for time in sorted(time for time in times if time > 0):
+        if time in starts or time - kept[-1] > apart:
+            kept.append(time)
+    return kept[1:]
