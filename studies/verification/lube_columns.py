@@ -9,10 +9,11 @@ The sand has an angle of repose of 31°. The experiments hardly depend on this a
 the friction angle of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders
 run less far and end higher than the experiments; with 31° itself they are near. A foot that spreads over a growing ring
 is not in plane strain, and it is an open question which angle is right; both are therefore shown. With 31° the tolerance is a
-tenth, and for the run-out besides the size of a cell, by which the foot is known (8 to 13 % of the radius), together a fifth at
-most; for the height at a = 1, where the laws of low and of high columns differ by 12 %, and for the other angle, it is a
-fifth. With a PIC fraction of 0.1 % instead of 0.6 %, the one number that is calibrated, the columns with 31° run up to a fifth
-farther.
+tenth, as in a channel (the final radius depends on the size of the grains over the first radius, too: Warnett et al. 2014,
+Granular Matter 16, 115-124), and for the run-out besides the size of a cell, by which the foot is known (8 to 13 % of the
+radius), together a fifth at most; for the height at a = 1, where the laws of low and of high columns differ by 12 %, and for the
+other angle, it is a fifth. With a PIC fraction of 0.1 % instead of 0.6 %, the one number that is calibrated, the columns with 31°
+run up to a fifth farther.
 """
 
 import numpy as np

@@ -12,8 +12,10 @@ a rate per second: the run-out is the same for Courant numbers from 0.1 to 0.5, 
 critical step is half as long, and half the fraction. (With the same fraction the column of a = 1.5 runs 1.58 instead of 1.83
 widths.) With 0.3 and 1.2 % the columns of a = 1 run 1.17 and 0.92 widths instead of 1.08, those of a = 1.5 run 2.00 and 1.58.
 Without any, grains that fall apart do not come to rest; with smaller cells, in which such a fraction has less influence,
-columns run somewhat farther (picture). The tolerance is a tenth, about the influence of half or twice the fraction, and the
-size of a cell, to which the foot is known, together a fifth at most. Kumar (2015, Multi-scale multiphase modelling of granular
+columns run somewhat farther (picture). The tolerance is a tenth, and the size of a cell, to which the foot is known, together a
+fifth at most. A tenth is the scatter of experiments: Balmforth and Kerswell (2005, J. Fluid Mech. 538, 399-428) give run-outs
+that grow as a^(0.65 ± 0.05) in narrow channels and as a^(0.9 ± 0.1) in wide ones, with a factor that depends on the material; the
+first of these exponents alone leaves 9 % open at a = 6. It is about the influence of half or twice the fraction, too. Kumar (2015, Multi-scale multiphase modelling of granular
 flows, Cambridge, ch. 4) found particles of Mohr-Coulomb soil to run out farther than discrete elements above a = 1.7: friction
 alone loses less energy than grains that collide where a column first falls freely.
 """
