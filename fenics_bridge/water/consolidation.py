@@ -67,7 +67,8 @@ class Consolidation(ConsolidationResults):
             total stresses.
         element: elements of displacement and pressure.
         nmd: average volumetric strains of the soil over nodes (nodal mixed discretisation), for `Element.STABILISED`; as the
-            pore water, the soil then keeps the volume around each node instead of that of each cell.
+            pore water, the soil then keeps the volume around each node instead of that of each cell. Strains and forces are
+            averaged as those of particles (`QuasiStatic` with ``as_particles=True``), by half in soil that dilates little.
         cell_tags: tags of the cells; needed where laws, soils or unit weights are given by cell tag.
         geometry: as for `QuasiStatic`.
         unit_weight: unit weight of water [N/m3].
@@ -218,7 +219,7 @@ class Consolidation(ConsolidationResults):
         body = self._body
         parts, further = (body.increment, self.points, body.constraints), self._terms.forms(self._applied)
         if self._nmd:
-            body.kinematics = AveragedKinematics(*parts, self._laws, self.geometry, further=further)
+            body.kinematics = AveragedKinematics(*parts, self._laws, self.geometry, as_particles=True, further=further)
         else:
             body.kinematics = Kinematics(*parts, self.geometry, further)
         there = self._there if len(self.off) else None

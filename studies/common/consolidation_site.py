@@ -106,6 +106,7 @@ class ConsolidationSite:
             self.supports,
             element.value,
             nmd,
+            as_particles=nmd,
             cell_tags=cell_tags,
             options_prefix="rest_",
         )
@@ -122,8 +123,8 @@ class ConsolidationSite:
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
 
-        With averaged strains, `nmd`, steps of particles in small displacements average forces of frictional soil too, elements
-        those of soil that dilates only (`AveragedKinematics`); an equilibration, which keeps the pore pressures, makes up for it.
+        Steps in small displacements make forces of stresses as the elements do; where quadratic elements leave something out of
+        balance, it is brought to rest, and pore pressures stay.
 
         Raises:
             InputError: the water has a boundary condition other than reservoirs, or the site has stages or soil without water.

@@ -69,11 +69,11 @@ def body(geometry):
 @pytest.mark.parametrize("geometry", [mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC, mpm.Geometry.SOLID])
 @pytest.mark.parametrize("dilation_angle, pressure", [(0.0, 6.2e3), (25.0, 6.5e3)])
 def test_drained_soil_is_that_of_linear_elements_without_water(geometry, dilation_angle, pressure):
-    """Without dilation forces are not averaged, so that the tangent is that of another operator on either side."""
+    """Without dilation strains and forces are averaged by half, as those of particles."""
     domain, facets, supports, top = body(geometry)
     soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=2e3, friction_angle=25.0, dilation_angle=dilation_angle)
     given = {} if geometry == mpm.Geometry.SOLID else {"geometry": geometry}
-    dry = bridge.QuasiStatic(domain, soil, facets, supports, degree=1, nmd=True, **given)
+    dry = bridge.QuasiStatic(domain, soil, facets, supports, degree=1, nmd=True, as_particles=True, **given)
     wet = water.Consolidation(
         domain, soil, water.PorousSoil(1e-3, porosity=0.4), facets, supports, [water.Head(top, 1.0)],
         unit_weight=1e-6, **LINEAR, **given,
