@@ -27,8 +27,6 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 BEYOND = 2.0
 """Unit weight at the end of the ramp over that of limit analysis"""
-FIRST_STEP = 0.05
-"""Longest step of the unit weight over that of limit analysis"""
 MAX_ITERATIONS = 15
 """of Newton's method, above which a step counts as failed"""
 
@@ -75,12 +73,12 @@ def slope_particles(a: Namespace, cell_size: float, unit_weight: float) -> mpm.M
     return model
 
 
-def particle_curve(a: Namespace, cell_size: float, nmd: bool, first_step: float, end: float) -> np.ndarray:
+def particle_curve(a: Namespace, cell_size: float, nmd: bool, longest_step: float, end: float) -> np.ndarray:
     """Unit weight [N/m3] and largest displacement of a node [m] at each equilibrium on the way to collapse: (k, 2)."""
     model = slope_particles(a, cell_size, end)
     displacement, curve = np.zeros(model.mesh.points.shape), [(0.0, 0.0)]
     run = model.implicit(
-        1.0, dt=first_step / end, quasi_static=True, small_displacements=True, nmd=nmd,
+        1.0, dt=longest_step / end, quasi_static=True, small_displacements=True, nmd=nmd,
         solver=mpm.Newton(max_iterations=MAX_ITERATIONS), watch=lambda: model.report().dt < a.tolerance * model.time,
     )  # fmt: skip
     try:
@@ -92,18 +90,18 @@ def particle_curve(a: Namespace, cell_size: float, nmd: bool, first_step: float,
     return np.array(curve)
 
 
-def runs(a: Namespace, cell_size: float, first_step: float, end: float) -> dict[str, dict[str, object]]:
+def runs(a: Namespace, cell_size: float, longest_step: float, end: float) -> dict[str, dict[str, object]]:
     """Collapse load by each method on one mesh: by name, with its curve and processor time [s]."""
     found: dict[str, dict[str, object]] = {}
     for name, nmd in (("particles", False), ("particles, NMD", True)):
         start = process_time()
-        curve = particle_curve(a, cell_size, nmd, first_step, end)
+        curve = particle_curve(a, cell_size, nmd, longest_step, end)
         found[name] = {"curve": curve, "collapse": curve[-1, 0], "cpu_seconds": process_time() - start}
         print(f"{name:20} h {cell_size:<7g} {curve[-1, 0] / 1e3:7.3f} kN/m3", flush=True)
     name, start = f"finite elements, {a.elements}", process_time()
     progress = step_line(f"cells of {cell_size:g} m")
     fem = bridge.collapse_load(
-        slope_fem(a, comm, cell_size), weight, first_step, tolerance=a.tolerance, progress=progress
+        slope_fem(a, comm, cell_size), weight, longest_step, tolerance=a.tolerance, progress=progress
     )
     found[name] = {"curve": fem.curve, "collapse": fem.value, "cpu_seconds": process_time() - start}
     print(f"{name:20} h {cell_size:<7g} {fem.value / 1e3:7.3f} kN/m3", flush=True)
@@ -119,7 +117,8 @@ def main(arguments: list[str] | None = None) -> int:
         raise mpm.InputError(f"the study collapse_schemes runs on one rank, but was started on {comm.size}")
     folder = open_results(a, comm)
     expected = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest).unit_weight
-    by_size = {size: runs(a, size, FIRST_STEP * expected, BEYOND * expected) for size in mesh_sizes(a)}
+    longest_step = a.cohesion / a.height  # from the strength alone, so that no step ends at the expected value
+    by_size = {size: runs(a, size, longest_step, BEYOND * expected) for size in mesh_sizes(a)}
     rows = [
         {"method": name, "cell_size_m": size, "collapse_unit_weight": run["collapse"], "cpu_seconds": run["cpu_seconds"],
          "relative_difference_to_limit_analysis": run["collapse"] / expected - 1}
