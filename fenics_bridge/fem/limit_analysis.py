@@ -91,6 +91,8 @@ def log_spiral_safety(
     Raises:
         InputError: angles or lengths out of range.
     """
+    if not 0 < unit_weight < math.inf:
+        raise InputError(f"unit_weight: got {unit_weight!r} N/m3, expected a positive number")
     low, high = 1e-2, 1e2
     for _ in range(24):
         factor = math.sqrt(low * high)
@@ -134,7 +136,7 @@ def _checked(height: float, angle: float, cohesion: float, friction_angle: float
         )
     if not (height > 0 and cohesion > 0):
         raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
-    if depth is not None and not depth >= 0:
+    if depth is not None and not 0 <= depth < math.inf:
         raise InputError(f"depth: got {depth!r} m, expected a number of at least 0, or None")
     return _Slope(
         math.radians(angle), math.tan(math.radians(friction_angle)), None if depth is None else depth / height
