@@ -24,7 +24,7 @@ TITLES = {
     "section_crest": "Force across the vertical section under the crest",
 }  # fmt: skip
 """Titles of curves by the names of their files"""
-NOT_FACTS = ("steps", "cells", "soil_cells", "failed")
+NOT_FACTS = ("steps", "cells", "soil_cells", "failed", "wall_seconds")
 
 
 @dataclass

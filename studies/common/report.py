@@ -28,7 +28,7 @@ _ONE = "(?:mm|m|m2|m3|s|s2|Ns|N.s|Nm|N.m|N|kN|kPa|Pa|J|kg|rad|seconds|hours|days
 UNIT = re.compile(rf"_({_ONE}(?:(?:_per_|/){_ONE})?)$")
 """Unit of a quantity by the end of its name, such as Pa, m_per_s or m/s"""
 SPECIAL = {
-    "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time", "s"),
+    "dt_s": ("Time step", "s"), "wall_seconds": ("Computing time without pictures", "s"),
     "pic": ("PIC", "-"), "nmd": ("Nodal mixed discretisation", "-"),
     "runout_m": ("Run-out", "m"), "kinetic_energy_J_per_m": ("Kinetic energy of the particles", "J/m"),
     "nodal_kinetic_energy_J_per_m": ("Kinetic energy of the nodes", "J/m"),

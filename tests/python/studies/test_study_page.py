@@ -9,7 +9,7 @@ from PIL import Image
 
 from particle_player import Movie
 from studies.common import movie
-from studies.common.page import TITLES
+from studies.common.page import TITLES, _facts
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, Scene
 from studies.common.report import Report, name_and_unit, save_report
@@ -100,3 +100,8 @@ def test_names_of_columns_are_words_with_units():
     assert name_and_unit("momentum_x_N.s") == ("Momentum x", "N s") == name_and_unit("momentum_x_Ns")
     assert name_and_unit("force_normal_N") == ("Force normal", "N") and name_and_unit("mass_kg") == ("Mass", "kg")
     assert name_and_unit("computing_seconds") == ("Computing", "s") and name_and_unit("bearing_factor_Nc")[1] == "-"
+
+
+def test_the_computing_time_of_a_part_is_not_taken_for_that_of_the_run():
+    assert _facts({"factor_of_safety": 1.25, "wall_seconds": 3.0, "steps": 7}) == {"Factor of safety": "1.25"}
+    assert name_and_unit("wall_seconds") == ("Computing time without pictures", "s")
