@@ -7,8 +7,12 @@ ground below and before the toe is of the same soil; else it is rigid. Quadratic
 last equilibrium, in steps that begin with c/H and are bisected to 0.5 % of the weight. Both are upper bounds: finite
 elements converge from above and may end below the spiral where another mechanism is more critical. A slope of 30° with
 a friction angle of 30° carries any weight.
+
+Flat slopes of clay, which has no friction, fail deep below the toe: spirals are circles that end before it and reach down to the
+rigid base of the ground. Their factors are the inverse of Taylor's stability numbers (1937, Stability of earth slopes).
 """
 
+import numpy as np
 from _case import Check, Result, run_alone
 from common.figures import curve_figure
 from common.plots import CURVES
@@ -21,14 +25,23 @@ import mpm_core as mpm
 HEIGHT, COHESION = 1.0, 1e3  # m, Pa
 ANGLES, FRICTION = (30.0, 45.0, 60.0, 75.0, 90.0), (10.0, 20.0, 30.0)  # degrees
 QUICK = ((90.0, 30.0), (45.0, 20.0), (30.0, 10.0))
+DEEP = {(30.0, 0.5): 0.164, (30.0, 1.0): 0.172}
+"""Taylor's stability number by the angle of a slope of clay and the depth of the ground below its toe over its height"""
 KNOWN = {(90.0, 30.0): (6.69, "Chen 1975, vertical cut"), (45.0, 25.0): (22.9, "limit analysis of the paper's slope")}
 
 
-def soil_body(angle, spiral, cell):
-    """(mesh, facet tags, supports): with as much soil behind the shoulder as the spiral needs, and below the toe."""
+def soil_body(angle, spiral, cell, depth=None):
+    """(mesh, facet tags, supports): with as much soil behind the shoulder as the spiral needs, and below the toe.
+
+    depth: of the ground below the toe over the height, where it is given
+    """
     behind = -spiral.curve[0, 0]
     shape = {"height": HEIGHT, "angle": angle, "crest": cell * max(4, round((1.5 * behind + 0.5 * HEIGHT) / cell))}
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    if depth is not None:
+        toe = HEIGHT / np.tan(np.radians(angle))
+        before = spiral.curve[-1, 0] - toe + 0.5 * HEIGHT
+        return slope_on_ground(MPI.COMM_WORLD, **shape, cell_size=cell, depth=depth * HEIGHT, runout=before)
     if spiral.curve[:, 1].min() > -0.01 * HEIGHT:
         background = bridge.slope_mesh(MPI.COMM_WORLD, **shape, cell_size=cell, kind="fitted", runout=cell)
         domain, _, facet_tags = bridge.soil_mesh(*background)
@@ -36,10 +49,10 @@ def soil_body(angle, spiral, cell):
     return slope_on_ground(MPI.COMM_WORLD, **shape, cell_size=cell, depth=0.5 * HEIGHT, runout=HEIGHT)
 
 
-def by_finite_elements(angle, friction, spiral, cell):
+def by_finite_elements(angle, friction, spiral, cell, depth=None):
     """Stability factor of the last equilibrium."""
     # --- 1. The slope ------------------------------------------------------------------------------------------------
-    domain, facet_tags, supports = soil_body(angle, spiral, cell)
+    domain, facet_tags, supports = soil_body(angle, spiral, cell, depth)
     soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=COHESION, friction_angle=friction, dilation_angle=friction)
     model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2)
 
@@ -66,7 +79,17 @@ def run(quick: bool, folder) -> Result:
         checks.append(Check(f"stability factor, slope {angle:g}°, φ {friction:g}°", expected, "log-spiral, minimised here",
                             found[angle, friction][0], 0.1 if quick else 0.05))  # fmt: skip
 
-    # --- 5. Picture -------------------------------------------------------------------------------------------------
+    # --- 5. Slopes of clay on ground of the same clay ----------------------------------------------------------------
+    for (angle, depth), number in DEEP.items():
+        spiral = bridge.log_spiral(HEIGHT, angle, COHESION, 0.0, depth=depth * HEIGHT)
+        name = f"slope {angle:g}°, φ 0°, ground {depth:g} H deep"
+        factor = spiral.unit_weight * HEIGHT / COHESION
+        checks.append(Check(f"circle, {name}", 1 / number, f"Taylor 1937, 1 / {number}", factor, 0.004))
+        if not quick:
+            computed = by_finite_elements(angle, 0.0, spiral, cell, depth)
+            checks.append(Check(f"stability factor, {name}", factor, "circle, minimised here", computed, 0.02))
+
+    # --- 6. Picture -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
         save_factors(folder / "factors.png", found)
     return Result(checks, {"factors.png": "Stability factors γH/c: finite elements (marks) and limit analysis (lines)"})
