@@ -22,10 +22,6 @@ from fenics_bridge.mesh.background import global_numbers
 from fenics_bridge.types import Law
 from mpm_core import _core
 
-LITTLE_DILATION = 0.17
-"""tan(psi) / tan(phi) of the reduced strength below which forces are not averaged: soil with little dilation carries too little
-with averaged forces, soil with more of it without them. Measured: up to 0.16 and from 0.19 on (docs/fem.md)"""
-
 
 class AveragedKinematics:
     """Strain of linear simplices whose volumetric part is averaged over nodes (paper, section 5; Detournay, Dzik).
@@ -36,10 +32,11 @@ class AveragedKinematics:
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
     transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is.
 
-    Soil with friction whose flow hardly dilates is an exception. Forces that are averaged do not feel pressures that alternate
-    from cell to cell, and where flow does not change the volume a mechanism would pass through the cells of low pressure. So in
-    cells of such soil the forces are those of the stress itself, by the transpose of the plain strains. Particles average strains
-    and forces of soil that dilates less than associated flow by half instead, and so do elements that are handed over to them.
+    Soil with friction whose flow dilates less than associated flow is an exception. Forces that are averaged in full do not feel
+    pressures that alternate from cell to cell, and where flow does not change the volume a mechanism would pass through the cells
+    of low pressure; forces that are not averaged at all let tension alternate instead (docs/fem.md). So in cells of such soil the
+    forces are averaged by the fraction (1 + tan(psi) / tan(phi)) / 2. Particles average strains and forces of such soil by half,
+    and so do elements that are handed over to them.
 
     Args:
         increment: displacement function of degree 1 whose strain is taken.
@@ -88,7 +85,7 @@ class AveragedKinematics:
         self.follow(laws)
 
     def follow(self, laws: Sequence[Law]) -> None:
-        """Average as the laws ask for: forces in all cells but those of frictional soil with little dilation. Collective.
+        """Average as the laws ask for: forces of soil that dilates less than associated flow by less. Collective.
 
         Args:
             laws: the laws, by number.
@@ -98,8 +95,8 @@ class AveragedKinematics:
             fractions = np.array([_core.fraction_of_averages(law) for law in laws])[number]
             self._strain.of_strains = self._strain.of_forces = fractions
         else:
-            little = np.array([_core.associated_fraction(law) < LITTLE_DILATION for law in laws])
-            self._strain.of_forces = 1.0 - little[number]
+            associated = np.nan_to_num([_core.associated_fraction(law) for law in laws], nan=1.0)
+            self._strain.of_forces = 0.5 * (1.0 + associated)[number]
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""
