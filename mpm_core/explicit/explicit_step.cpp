@@ -189,7 +189,6 @@ void choose_forces(Model<G>& model, Integration kind, bool averaged)
   {
     field.integration.kind = kind;
     field.integration.averaged_by_law.clear();
-    field.integration.averaged_everywhere = 1;
     field.integration.averaged_of_cell.clear();
     for (std::size_t k = 0; averaged && k < model.laws.size(); ++k)
       field.integration.averaged_by_law.push_back(filled ? 1 : fraction_of_averages(model.laws[k]));

@@ -40,7 +40,8 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
     for (int k = 0; k <= D; ++k)
     {
       const Index node = mesh.cells[c][k];
-      const double weight = averaged_volume(mesh, field, c) / field.volumetric_strain[node].volume;
+      const double volume = averaged_volume(mesh, field, c);
+      const double weight = volume == 0 ? 0 : volume / field.volumetric_strain[node].volume;
       for (int l = 0; l <= D; ++l)
       {
         const Index other = mesh.cells[c][l];

@@ -14,6 +14,10 @@ inline constexpr double full_fraction = 0.9;
 /// cells around each of its nodes are filled by this fraction on the average; at a free surface it is about a half.
 inline constexpr double full_fraction_around = 0.75;
 
+/// A node has little mass when it has less than this fraction of what particles that fill the cells around it evenly
+/// would give it: all of them are far from it, in the corners of its cells, as where a rigid surface cuts off the rest.
+inline constexpr double little_mass = 0.3;
+
 /// The volume that a cell integrates its stress over. Cells that are not full, at the free surface, are left to their
 /// particles in all modes: there stresses are small and nodes are light, so that forces from a mean with the cells
 /// below would throw them off.
@@ -28,7 +32,7 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
 template <int D>
 inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)
 {
-  return integration.averaged_of_cell.empty() ? integration.averaged_everywhere : integration.averaged_of_cell[cell];
+  return integration.averaged_of_cell.empty() ? 1 : integration.averaged_of_cell[cell];
 }
 
 /// The volume by which a cell takes part in the means over nodes: means that are weighted by it leave a uniform strain

@@ -51,7 +51,11 @@ void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, Veloc
   field.mean_stress.resize(mesh.points.size());
   auto& own = field.integration.mean_stress_of_cell; // kept for what follows, since moments are far apart in memory
   own.resize(static_cast<std::size_t>(mesh.owned_cells));
-  const auto volume_of = [&](Index c) { return own[c].volume = averaged_volume(mesh, field, c); };
+  const auto volume_of = [&](Index c)
+  {
+    own[c] = {0, averaged_volume(mesh, field, c)}; // cells that take no part have no integral
+    return own[c].volume;
+  };
   const auto keep_integral = [&](Index c, double)
   { return own[c].value = averaged_fraction(field.integration, c) * integral_of(c); };
   average_over_nodes(mesh, field.part, volume_of, keep_integral, exchange, field.mean_stress);
@@ -65,20 +69,49 @@ double change_by_averaging(const Mesh<D>& mesh, const VelocityField<G>& field, I
   return volume * mean_of_nodes<D>(mesh.cells[cell], field.mean_stress) - integral;
 }
 
-/// The fraction of averaging in each cell, the least of its soils; one for all cells where all laws have the same.
+/// Masses of the nodes, over all ranks, as they are and as they would be if the particles filled their cells evenly.
 template <class G, int D = G::dim>
-void find_averaged_fractions(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field)
+void find_masses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field)
+{
+  auto& masses = field.integration.masses;
+  masses.assign(mesh.points.size(), {});
+  const auto each_term = [&](auto&& add)
+  {
+    for (Index c : field.part.cells)
+    {
+      const CellMoments<G>& moments = field.moments[c];
+      const auto own = at_vertices<D>(moments.mass, moments.mass_xi, gradients_by_vertex<D>(mesh.shapes[c]));
+      const double even = moments.mass * (1.0 / (D + 1));
+      for (int k = 0; k <= D; ++k)
+        add(mesh.cells[c][k], NodeMass{own[k], even});
+    }
+  };
+  sum_at_nodes<NodeMass>(
+      exchange, [&masses](Index node) -> NodeMass& { return masses[node]; }, each_term);
+  sum_shared(exchange, masses);
+}
+
+/// The fraction of averaging in each cell: the least of its soils, and none where a node has little mass. Averages push
+/// such a node by stresses around it, which do not fall when its cells expand: without resistance, particles that are
+/// at the apex of their strength would expand without bounds there.
+template <class G, int D = G::dim>
+void find_averaged_fractions(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
+                             VelocityField<G>& field)
 {
   CellIntegration<D>& integration = field.integration;
   const auto& by_law = integration.averaged_by_law;
-  integration.averaged_of_cell.clear();
-  integration.averaged_everywhere = by_law.front();
-  if (std::ranges::all_of(by_law, [&](double fraction) { return fraction == by_law.front(); }))
-    return;
-  integration.averaged_of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), 1.0);
-  for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
-    for (const Run& run : each)
-      integration.averaged_of_cell[run.cell] = std::min(integration.averaged_of_cell[run.cell], by_law[run.material]);
+  const bool same = std::ranges::all_of(by_law, [&](double fraction) { return fraction == by_law.front(); });
+  integration.averaged_of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), same ? by_law.front() : 1.0);
+  if (!same)
+    for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
+      for (const Run& run : each)
+        integration.averaged_of_cell[run.cell] = std::min(integration.averaged_of_cell[run.cell], by_law[run.material]);
+  find_masses(mesh, exchange, field);
+  const auto has_little = [&masses = integration.masses](Index node)
+  { return masses[node].own < little_mass * masses[node].even; };
+  for (Index c : field.part.cells)
+    if (std::ranges::any_of(mesh.cells[c], has_little))
+      integration.averaged_of_cell[c] = 0;
 }
 
 /// Averages the mean stresses of the cells over nodes, in each cell by the fraction that its soils have in
@@ -88,7 +121,7 @@ template <class G, int D = G::dim>
 void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
                              VelocityField<G>& field)
 {
-  find_averaged_fractions(mesh, runs, field);
+  find_averaged_fractions(mesh, exchange, runs, field);
   average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
 }
 } // namespace

@@ -28,6 +28,13 @@ struct MeanGradient
   Matrix<D> gradient;
 };
 
+/// Mass of a node; plain doubles.
+struct NodeMass
+{
+  double own;  ///< (11) [kg]
+  double even; ///< if the particles filled their cells evenly [kg]
+};
+
 /// Integration over cells, and what it needs where it is not the sum over particles.
 template <int D>
 struct CellIntegration
@@ -36,8 +43,8 @@ struct CellIntegration
   /// By law: fraction of nodal mixed discretisation in a cell with its soil alone, of its strains and, by their
   /// transpose, of its forces. Empty where strains are averaged in full, and forces not.
   std::vector<double> averaged_by_law;
-  double averaged_everywhere = 1;              ///< the fraction in all cells, where all laws have the same
-  std::vector<double> averaged_of_cell;        ///< per owned cell: the least of its soils; empty where as above
+  std::vector<double> averaged_of_cell; ///< per owned cell: the fraction of averaging; empty where it is one everywhere
+  std::vector<NodeMass> masses;         ///< scratch, per node
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
   std::vector<std::array<double, 2>> fills;    ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles

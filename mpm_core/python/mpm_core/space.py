@@ -52,9 +52,9 @@ def space(model: Model) -> Space:
 def swollen(model: Model) -> str:
     """Text on the particle that is largest relative to its cell, where that is more than twice the cell's volume, else none.
 
-    Where a surface cuts off a sliver of a cell, a node beyond it has hardly any mass. Averaged mean stresses push it away, while the
-    few particles there are at the apex of their strength and expand without resistance. Pressed together again they resist with
-    the volume that they have reached, which generates energy.
+    Where a surface cuts off a corner of a cell, a node beyond it has hardly any mass, and the few particles there, at the apex of
+    their strength, expand without resistance. Pressed together again they resist with the volume that they have reached, which
+    generates energy.
 
     Note:
         Collective.
@@ -65,9 +65,9 @@ def swollen(model: Model) -> str:
     if largest <= SWOLLEN:
         return ""
     return (
-        f"a particle has {largest:.3g} times the volume of its cell: soil in a sliver of a cell has expanded without resistance, and "
-        "resists with that volume when it is pressed together. Use nmd=False, or let rigid surfaces follow the sides of cells "
-        "(docs/howto/limits.md)"
+        f"a particle has {largest:.3g} times the volume of its cell: soil in a corner of a cell has expanded without resistance, and "
+        "resists with that volume when it is pressed together. Take a stiffer contact (penalty=0.5 with courant=0.3), or let rigid "
+        "surfaces follow the sides of cells (docs/howto/limits.md)"
     )
 
 

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from core_cases import DIMS, averaged_over_nodes, box, by_id, run, strain_energy
+from mpm_core.space import swollen
 
 import mpm_core as mpm
 
@@ -187,6 +188,43 @@ def test_softening_clay_with_averaged_strains_and_mixed_integration_keeps_its_en
     assert np.mean(strain > 0.1) > 0.2  # of the soil has lost two thirds of what it can lose, and more
     assert report.plastic_work > 0.3 * report.external_work
     assert abs(report.unexplained_fraction) < 0.01
+
+
+def test_averages_do_not_act_on_a_node_with_little_mass():
+    """One triangle under pressure, one without stress, whose particle is in its middle, and then near their common side."""
+    mesh = mpm.Mesh(
+        np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]), np.array([(0, 1, 2), (1, 3, 2)], np.int32)
+    )
+    model = mpm.Model(mesh, ELASTIC)
+    model.seed_points(np.array([(1 / 3, 1 / 3), (2 / 3, 2 / 3)]), np.full(2, 0.5), density=DENSITY)
+
+    def force_on_the_node_beyond(until, place):
+        model.place([(1 / 3, 1 / 3), (place, place)])
+        model.particles.set("stress", [(-3e3, -3e3, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)])
+        run(model, until, dt=1e-9, **NMD)
+        return model.nodal("internal_force")[3]
+
+    # The mean of the cell beyond is two thirds of that of the two cells.
+    assert force_on_the_node_beyond(1e-9, 2 / 3) == pytest.approx(0.5 * 2 / 3 * -1.5e3 * np.ones(2), rel=1e-9)
+    assert force_on_the_node_beyond(2e-9, 0.525) == pytest.approx(np.zeros(2), abs=1e-9)
+
+
+def test_averaged_frictional_soil_on_a_plane_that_cuts_cells_keeps_its_energy():
+    # Nodes beyond the plane have hardly any mass. If averages pushed them, particles in the corners of their cells would expand to 30
+    # times the volume of a cell, and 22 % of the energy would come from nothing.
+    cell, d, level = 0.1, 0.025, 0.13
+    law = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0, dilation_angle=0.0)
+    model = mpm.Model(box([36, 14], [3.6, 1.4], diagonals="alternating"), law)
+    points = (np.indices((84, 40)).reshape(2, -1).T + 0.5) * d
+    points = points[points.sum(axis=1) < 2.1] + (0.0, level)  # a slope of 45 degrees, 1 m high
+    model.seed_points(points, np.full(len(points), d * d), density=60e3 / 9.81)
+    model.roller(1, normal=(1, 0))
+    model.set_gravity((0.0, -9.81))
+    foot = level + model.gap(mpm.Plane((0.0, level), (0.0, 1.0)))
+    model.add_contact(mpm.Plane((0.0, foot - 1e-9 * cell), (0.0, 1.0)), friction=np.tan(np.radians(25.0)), adhesion=1e3)
+    report = run(model, 1.0, **NMD, **MIXED, energy_limit=None)
+    assert report.plastic_work > 0.3 * report.external_work  # it has slid
+    assert abs(report.unexplained_fraction) < 0.02 and not swollen(model)
 
 
 def test_alternating_pressures_of_frictional_soil_stay_bounded():
