@@ -73,7 +73,7 @@ def parser() -> ArgumentParser:
         above=0,
         at_most=0.5,
     )
-    body_runs.add_body_run_options(p, damping=0.0, pic=0.05, nmd=False, frames=48)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.05, nmd=True, integration="particles", frames=48)
     return p
 
 

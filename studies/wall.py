@@ -75,7 +75,7 @@ def parser() -> ArgumentParser:
         above=0,
     )
     add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height of the wall", above=0, at_most=0.25)
-    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=40)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, integration="particles", frames=40)
     return p
 
 

@@ -23,29 +23,39 @@ from .history import History
 from .interrupt import Interrupt
 from .movie import Movie, gathered, own_frame
 from .notes import notes_of
-from .options import Options, add_count, add_number, add_switch
+from .options import Options, add_choice, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
 from .page import Page
 from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from .progress import Progress
-from .schemes import add_particles_per_cell, add_pic
+from .schemes import INTEGRATIONS, add_particles_per_cell, add_pic
 from .summary import write_summary
 
 MAY_CHANGE = {
-    "damping", "pic", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film", "rebalance"
+    "damping", "pic", "integration", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
+    "rebalance",
 }  # fmt: skip
 """Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
 CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displacement": "Displacement in the end"}
 """Captions of the pictures of `body_pictures`"""
 
 
-def add_body_run_options(p: ArgumentParser, *, damping: float, pic: float, nmd: bool, frames: int = 60) -> None:
+def add_body_run_options(
+    p: ArgumentParser, *, damping: float, pic: float, nmd: bool, integration: str = "mixed", frames: int = 60
+) -> None:
     """Options of the particles, of their explicit run, of its files and of its checkpoints."""
     run = p.add_argument_group("particles and run")
     add_particles_per_cell(run, 6)
     add_number(run, "--damping", damping, "-", "local damping", at_least=0, below=1)
     add_pic(run, pic)
     add_switch(run, "--nmd", nmd, "average volumetric strains over nodes, against locking")
+    add_choice(
+        run,
+        "--integration",
+        integration,
+        tuple(INTEGRATIONS),
+        "how stresses are integrated over a cell to nodal forces",
+    )
     add_number(run, "--rebalance", 1.2, "-",
                "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
     files = p.add_argument_group("frames and pictures")
@@ -207,7 +217,7 @@ def write_results(
 
 def scheme(a: Namespace) -> dict[str, Any]:
     """Options of the explicit scheme as arguments of ``Model.explicit``."""
-    return {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": mpm.Integration.MIXED}
+    return {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": INTEGRATIONS[a.integration]}
 
 
 def mean_force(history: History, body: mpm.RigidContact, time: float, axis: int, column: str = "impulse_Ns") -> float:
