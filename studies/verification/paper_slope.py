@@ -7,8 +7,9 @@ slope slides farther.
 
 The slow creep comes from local damping, which holds back elastic oscillations too. Its speed depends on what excites these,
 that is on locking, on the size of cells and on the noise of cell crossing (see the case on integration): with the standard
-method it does not converge on finer meshes. Mixed integration removes most of that noise, and the final displacement hardly
-depends on the mesh.
+method it does not converge on finer meshes. Mixed integration removes most of that noise: the crest comes to the same place on
+cells of 0.1 and 0.05 m. On cells of 0.025 m it creeps less far, to 0.332 m (docs/integration.md): the slope creeps along bands
+inside the soil, which become thinner with the cells and have no limit where the soil does not dilate.
 """
 
 import numpy as np
@@ -44,7 +45,7 @@ READING = 0.005  # m: half of the last digit of the expected numbers
 SOURCE = "an independent explicit code, which agrees with the paper's Figure 6"
 CREEP = (
     "creep under local damping depends on the mesh with the standard method, and the paper's curve is that of its mesh; "
-    "mixed integration removes most of this dependence."
+    "mixed integration removes this dependence between cells of 0.1 and 0.05 m."
 )
 FIGURES = {"displacement": DISPLACEMENT, "shear_strain": SHEAR_STRAIN, "vertical_stress": VERTICAL_STRESS}
 MIXED = mpm.Integration.MIXED
