@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from .model import Model
     from .report import Report
 
-UNIT_WEIGHTS = (1e3, 200e3)
-"""Bounds of the unit weight of a soil [N/m3]; peat has 10 kN/m3, published slopes have up to 80"""
+UNIT_WEIGHTS = (1e3, 150e3)
+"""Bounds of the unit weight of a soil [N/m3]: peat has 10 kN/m3, published slopes have up to 80, and 16 kN/m3 taken for a density
+gives 157"""
 
 YIELDS_ABOVE = 0.2
 """Plastic work over the energy at work above which a body counts as one that fails"""

@@ -44,6 +44,7 @@ def test_a_surface_that_moves_acts_on_the_particles():
         ({"held": False}, "nothing holds the particles"),
         ({"density": 80 / 9.81}, "unit weight of particles is 80 N/m3"),
         ({"density": 80e6 / 9.81}, "unit weight of particles is 8e.07 N/m3"),
+        ({"density": 18e3}, "unit weight of particles is 1.766e.05 N/m3"),  # a unit weight in place of the density
         ({"gravity": 0.0}, "nothing acts on the particles"),
     ],
 )
