@@ -129,9 +129,10 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
     slope = numbers_in(model, cells_near(model, np.array(middle), 0.4 * a.height, [bridge.SOIL]))
     level = numbers_in(model, cells_near(model, np.array((0.0, 0.0)), 1.5 * a.cell_size, [bridge.SOIL]))
     frames, samples = [frame_at(model, 0.0)], max(a.frames, round(until / (2 * STEP)))
+    run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True)
     with History(folder / "history.csv", COLUMNS, comm) as history, Progress("earthquake", until, comm) as progress:
         history.add(**dict.fromkeys(COLUMNS, 0.0))
-        for k, report in enumerate(model.explicit(until, every=until / samples, rayleigh=damping_of(a)), 1):
+        for k, report in enumerate(run, 1):
             velocity = nodes.velocity()[:, 0]
             moved = [mean_displacement(model, numbers)[0] for numbers in (slope, level)]
             history.add(**dict(zip(COLUMNS, (report.time, *velocity, *moved))))

@@ -61,7 +61,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--height", 60.0, "m", "height of the valley's side where it is given by formulas", above=0)
     add_number(p, "--thickness", 8.0, "m", "largest thickness of the slide in that valley", above=0)
     add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
-    add_number(p, "--spacing", 2.0, "m", "distance between particles", above=0)
+    add_number(p, "--spacing", 1.33, "m", "distance between particles", above=0)
     add_number(p, "--headroom", 20.0, "m", "height of the background mesh above the ground", above=0)
     add_number(
         p, "--ground-friction-angle", 15.0, "degrees", "friction angle between slide and ground", at_least=0, below=90
@@ -188,7 +188,7 @@ def run(
     ):
         history.add(**look(model, ground, start, model.report()))
         try:
-            for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, rebalance=1.3):
+            for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, nmd=True, rebalance=1.3):
                 maps.record()
                 history.add(**look(model, ground, start, report))
                 output.write()
