@@ -131,7 +131,9 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
     """
     first = dt = DAY * min(a.first_step, a.days)
     days = np.geomspace(min(10 * a.first_step, 0.5 * a.days), a.days, a.frames) if a.frames > 1 else [a.days]
-    frames, changes = ({float(f"{time:.9g}") for time in times} for times in (DAY * np.array(days), site.corners(0.5 * first)))
+    frames, changes = (
+        {float(f"{time:.9g}") for time in times} for times in (DAY * np.array(days), site.corners(0.5 * first))
+    )
     with Progress("consolidation", a.days, comm, unit="days") as progress:
 
         def made(report: water.ConsolidationReport) -> None:

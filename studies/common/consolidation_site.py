@@ -187,7 +187,9 @@ def read_consolidation_site(
         porous = {key: given[key] for key in POROUS if key in given}
         soils[name] = porous_soil(porous, where) if porous else None
         laws[name] = law_at({k: v for k, v in given.items() if k not in (*POROUS, "unit_weight")}, 0.0, where)
-    boundary = {name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()}
+    boundary = {
+        name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()
+    }
     stages = stages_of(table.get("stages", []), list(soils), boundary, f"{path}: stages")
     if len(stages) > 1:
         mesh = bridge.soil_mesh(*mesh, tag=list(soils))

@@ -54,7 +54,9 @@ def pressure_table(given: Any, where: str) -> Table:
     late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
     if len(late):
         first, second = table[late[0] : late[0] + 2, 0]
-        raise mpm.InputError(f"{where}: day {second:g} comes after day {first:g}, expected rows [days, Pa] of rising days")
+        raise mpm.InputError(
+            f"{where}: day {second:g} comes after day {first:g}, expected rows [days, Pa] of rising days"
+        )
     return tuple((DAY * float(day), float(value)) for day, value in table)
 
 
@@ -105,7 +107,9 @@ def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, fir
             raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
     day, duration = _days(row, "day", where), _days(row, "duration", where, 0.0)
     if day < before.start / DAY or (day == before.start / DAY and not first):
-        raise mpm.InputError(f"{where}: day {day:g} comes after day {before.start / DAY:g}, expected stages of rising days")
+        raise mpm.InputError(
+            f"{where}: day {day:g} comes after day {before.start / DAY:g}, expected stages of rising days"
+        )
     fill, gone = _names(row, "fill", where), _names(row, "excavate", where)
     if not fill and not gone:
         raise mpm.InputError(f"{where}: has neither fill nor excavate, expected soils to place or to dig away")
@@ -144,7 +148,9 @@ def corners_of(pressures: Iterable[Table], stages: Sequence[GroundStage], apart:
 
     Rows that follow another within `apart` [s] are a jump, which belongs to the step after it; stages begin in any case.
     """
-    levels = [getattr(one, key, None) for stage in stages for one in stage.boundary.values() for key in ("level", "rate")]
+    levels = [
+        getattr(one, key, None) for stage in stages for one in stage.boundary.values() for key in ("level", "rate")
+    ]
     tables = [*pressures, *(level for level in levels if isinstance(level, tuple))]
     starts = {stage.start for stage in stages}
     times = starts | {time for table in tables for time, _ in table}

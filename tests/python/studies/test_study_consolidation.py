@@ -84,7 +84,12 @@ def test_particles_begin_at_rest(dilation, nmd, tmp_path):
 
 def _write_layer(folder, heights=(2.0,)):
     """A column of the layers `heights` of clay, first and second; the curve "top" is on the clay."""
-    lines = ["DefineConstant[ cell_size = 0.1 ];", "Point(1) = {0, 0, 0};", "Point(2) = {0.3, 0, 0};", "Line(1) = {1, 2};"]
+    lines = [
+        "DefineConstant[ cell_size = 0.1 ];",
+        "Point(1) = {0, 0, 0};",
+        "Point(2) = {0.3, 0, 0};",
+        "Line(1) = {1, 2};",
+    ]
     for k, height in enumerate(heights):
         low, left, right, up = 10 * k + 1, 10 * k + 13, 10 * k + 14, 10 * k + 11
         lines += [f"Point({up}) = {{0, {height}, 0}};", f"Point({up + 1}) = {{0.3, {height}, 0}};", f"Line({up}) = {{{up}, {up + 1}}};",
@@ -183,11 +188,17 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
         ("day = 1.0\nfill = 'sand'", r"stages\[0\]: soil 'sand' is not among the soils clay, first, second"),
         ("day = 1.0", r"stages\[0\]: has neither fill nor excavate"),
         ("fill = 'first'", r"stages\[0\]: day is None, expected a number of days"),
-        ("day = 1.0\nduration = -1\nfill = 'first'", r"stages\[0\]: duration is -1, expected a number of days from 0 on"),
+        (
+            "day = 1.0\nduration = -1\nfill = 'first'",
+            r"stages\[0\]: duration is -1, expected a number of days from 0 on",
+        ),
         ("day = 1.0\nlayer = 'first'", r"stages\[0\]: unknown key 'layer', expected some of name, day"),
         ("day = 2.0\nfill = 'first'\n[[stages]]\nday = 1.0\nfill = 'second'", r"stages\[1\]: day 1 comes after day 2"),
         ("day = 1.0\nfill = 'first'\n[[stages]]\nday = 2.0\nfill = 'first'", r"stages\[1\]: 'first' is there before"),
-        ("day = 1.0\nfill = 'first'\nexcavate = 'second'\n[[stages]]\nday = 2.0\nfill = 'second'", "'second' is not there"),
+        (
+            "day = 1.0\nfill = 'first'\nexcavate = 'second'\n[[stages]]\nday = 2.0\nfill = 'second'",
+            "'second' is not there",
+        ),
         ("day = 1.0\nfill = 'clay'", "soils: none that is there at the beginning has a conductivity"),
     ],
 )
