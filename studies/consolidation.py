@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -20,7 +21,7 @@ from common.consolidation_plots import EXCESS, ExcessPicture, save_excess, save_
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
 from common.consolidation_stages import pressures_of
 from common.field_files import FieldFiles
-from common.field_plots import gathered
+from common.field_plots import Field, gathered
 from common.figures import Pictures
 from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, add_switch, study_parser
@@ -60,7 +61,9 @@ def parser() -> ArgumentParser:
     add_number(p, "--days", 3000.0, "days", "time that is followed", above=0)
     add_number(p, "--first-step", 0.5, "days", "first step, at the beginning and after each change of a load", above=0)
     add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
-    add_count(p, "--frames", 5, "pictures in time, evenly over its logarithm")
+    add_count(
+        p, "--frames", 5, "pictures in time, evenly over its logarithm; sites with stages have one at the end of each"
+    )
     add_switch(
         p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking"
     )
@@ -116,12 +119,18 @@ class Files(FieldFiles):
         fields = {"displacement": there["u"], "pore_pressure": there["p"][:, 0], "excess_pore_pressure": there["excess"][:, 0],
                   "effective_stress": there["stress"]}  # fmt: skip
         self.output.write(model.time, fields, {})
-        excess, moved = gathered(self._excess), gathered(model.displacement)
+        excess, moved = self._that_is_there(gathered(self._excess)), gathered(model.displacement)
         days = model.time / DAY
         if self.particles is not None:
             self.particles.frame(days)
         name = f"After {in_days(model.time)}"
         self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
+
+    def _that_is_there(self, field: Field | None) -> Field | None:
+        """A field on the first rank without the cells of soil that is not there now. Collective."""
+        centres = np.empty((0, 2)) if field is None else field.points[field.cells].mean(axis=1)
+        number = bridge.evaluate_at(centres, number=self._model.material_function())["number"][:, 0]
+        return None if field is None else replace(field, cells=field.cells[number > -0.5])
 
 
 def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, files: Files) -> str | None:
@@ -130,10 +139,10 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
     Collective.
     """
     first = dt = DAY * min(a.first_step, a.days)
+    ends = [stage.start + stage.duration for stage in site.stages[1:]]
     days = np.geomspace(min(10 * a.first_step, 0.5 * a.days), a.days, a.frames) if a.frames > 1 else [a.days]
-    frames, changes = (
-        {float(f"{time:.9g}") for time in times} for times in (DAY * np.array(days), site.corners(0.5 * first))
-    )
+    shown = [*(time for time in ends if 0 < time < DAY * a.days), DAY * a.days] if ends else DAY * np.array(days)
+    frames, changes = ({float(f"{time:.9g}") for time in times} for times in (shown, site.corners(0.5 * first)))
     with Progress("consolidation", a.days, comm, unit="days") as progress:
 
         def made(report: water.ConsolidationReport) -> None:
