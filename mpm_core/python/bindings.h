@@ -14,6 +14,8 @@ void bind_laws(pybind11::module_& m);
 void bind_python_law(pybind11::module_& m);
 /// Meshes, and what ranks find of each other's
 void bind_meshes(pybind11::module_& m);
+/// What models are made with: geometries, pore water, options of explicit runs
+void bind_options(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_contacts(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);

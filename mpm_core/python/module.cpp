@@ -11,6 +11,7 @@ PYBIND11_MODULE(_core, m)
   pybind11::register_exception<mpm::base::RunError>(m, "RunError", PyExc_RuntimeError);
   mpm::python::bind_laws(m);
   mpm::python::bind_meshes(m);
+  mpm::python::bind_options(m);
   mpm::python::bind_models(m);
   mpm::python::bind_contacts(m);
   mpm::python::bind_implicit(m);
