@@ -53,8 +53,10 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--depth", 0.5, "m", "depth of the flow", above=0)
-    add_number(p, "--length", 14.0, "-", "length of the flow over its depth", at_least=4)
-    add_number(p, "--froude", 2.0, "-", "velocity over that of shallow waves", at_least=1)
+    add_number(p, "--length", 14.0, "-", "ratio of the flow's length to its depth", at_least=4)
+    add_number(
+        p, "--froude", 2.0, "-", "Froude number, the ratio of the flow's velocity to that of shallow waves", at_least=1
+    )
     add_number(p, "--slope", 20.0, "degrees", "inclination of the plane", at_least=0, below=45)
     add_number(p, "--base-friction-angle", None, "degrees", "friction angle of the plane (default: its inclination)", at_least=0,
                below=60)  # fmt: skip
@@ -63,13 +65,13 @@ def parser() -> ArgumentParser:
     add_number(p, "--friction-angle", 30.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--young", 5e6, "Pa", "Young's modulus of the sand", above=0)
     add_number(p, "--density", 1600.0, "kg/m3", "density of the sand", above=0)
-    add_number(p, "--duration", 8.0, "-", "duration of the run over the time depth/velocity", above=0)
+    add_number(p, "--duration", 8.0, "-", "duration of the run, in multiples of depth/velocity", above=0)
     add_number(
         p,
         "--cell-size",
         0.125,
         "-",
-        "side of the squares (two triangles each) over the depth of the flow",
+        "ratio of the side of the squares (two triangles each) to the depth of the flow",
         above=0,
         at_most=0.5,
     )

@@ -68,8 +68,8 @@ def parser() -> ArgumentParser:
         "how particles come to rest: by damped motion, or by quasi-static steps",
     )
     add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
-    add_number(p, "--ramp", 30.0, "-", "time over which the weight rises in the explicit scheme, over the time that a pressure "
-               "wave takes to cross the height", above=0)  # fmt: skip
+    add_number(p, "--ramp", 30.0, "-", "duration of the rise of the weight in the explicit scheme, in multiples of the time "
+               "that a pressure wave takes to cross the height", above=0)  # fmt: skip
     p.set_defaults(young=20e6)
     return p
 

@@ -49,7 +49,7 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--radius", 0.018, "m", "radius of the cone and of its shaft", above=0)
-    add_number(p, "--penetration", 0.18, "m", "depth of the cone's shoulder in the end", above=0)
+    add_number(p, "--penetration", 0.18, "m", "final depth of the cone's shoulder", above=0)
     add_choice(
         p, "--face", "smooth", ("smooth", "rough"), "no shear stress on the cone, or up to the strength of the soil"
     )
@@ -58,14 +58,16 @@ def parser() -> ArgumentParser:
         p, "--friction-angle", 0.0, "degrees", "friction angle of the soil; 0 is undrained clay", at_least=0, below=90
     )
     add_number(p, "--dilation-angle", 0.0, "degrees", "dilation angle of the soil", at_least=0, below=90)
-    add_number(p, "--rigidity", 100.0, "-", "rigidity index: shear modulus over the strength", above=0)
+    add_number(p, "--rigidity", 100.0, "-", "rigidity index, the ratio of shear modulus to strength", above=0)
     add_number(p, "--poisson", 0.49, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--density", 1800.0, "kg/m3", "density of the soil", above=0)
-    add_number(p, "--speed", 3e-3, "-", "speed of the cone over that of elastic waves", above=0, at_most=0.1)
-    add_number(p, "--cell-size", 0.0015, "m", "cells along the way of the cone's shoulder", above=0)
-    add_number(p, "--width", 20.0, "-", "radius of the ground over that of the cone", at_least=5)
-    add_number(p, "--coarsening", 2.0, "-", "size of the cells beside that way over that", at_least=1)
-    add_number(p, "--growth", 0.15, "-", "growth of the cells' size with the distance from there, per length", above=0)
+    add_number(p, "--speed", 3e-3, "-", "ratio of the cone's speed to that of elastic waves", above=0, at_most=0.1)
+    add_number(p, "--cell-size", 0.0015, "m", "size of the cells along the path of the cone's shoulder", above=0)
+    add_number(p, "--width", 20.0, "-", "ratio of the ground's radius to that of the cone", at_least=5)
+    add_number(
+        p, "--coarsening", 2.0, "-", "ratio of the size of the cells beside this path to --cell-size", at_least=1
+    )
+    add_number(p, "--growth", 0.15, "-", "increase of the cell size per length of distance from the path", above=0)
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
 

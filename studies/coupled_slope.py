@@ -50,8 +50,10 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_number(p, "--height", 1.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 45.0, "degrees", "inclination of the slope", above=11, at_most=90)
-    add_number(p, "--width", 10.0, "-", "width of the ground, over the height of the slope", above=3)
-    add_number(p, "--depth", 5.0, "-", "depth of the ground below the crest, over the height of the slope", above=1)
+    add_number(p, "--width", 10.0, "-", "ratio of the ground's width to the height of the slope", above=3)
+    add_number(
+        p, "--depth", 5.0, "-", "ratio of the ground's depth below the crest to the height of the slope", above=1
+    )
     add_number(p, "--cell-size", 0.1, "m", "side of the squares", above=0)
     add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
     add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that the initial stresses carry", above=0)
@@ -64,7 +66,9 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
     )
-    add_number(p, "--displacement", 0.015, "-", "displacement over the cell size above which it does", above=0)
+    add_number(
+        p, "--displacement", 0.015, "-", "ratio of its displacement to the cell size above which it does, too", above=0
+    )
     return p
 
 

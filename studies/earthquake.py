@@ -91,7 +91,7 @@ def parser() -> ArgumentParser:
     )
     add_number(p, "--highest-frequency", 6.0, "Hz", "highest frequency of the noise", above=0)
     add_number(p, "--duration", 8.0, "s", "duration of a synthetic motion", above=0)
-    add_count(p, "--seed", 1, "of the noise")
+    add_count(p, "--seed", 1, "seed of the random numbers of the noise")
     add_number(p, "--rest", 3.0, "s", "time that is computed after the motion", at_least=0)
     add_number(p, "--damping-ratio", 0.02, "-", "damping ratio of the soil at small strains", at_least=0, below=0.5)
     add_count(p, "--frames", 40, "times at which particles are drawn")

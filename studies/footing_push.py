@@ -60,13 +60,13 @@ def parser() -> ArgumentParser:
     add_number(p, "--half-width", 0.5, "m", "half of the footing's width, or its radius", above=0)
     add_number(p, "--penetration", 0.3, "m", "final settlement", above=0)
     add_number(p, "--strength", 20e3, "Pa", "undrained shear strength of the clay", above=0)
-    add_number(p, "--rigidity", 200.0, "-", "Young's modulus over the shear strength", above=0)
+    add_number(p, "--rigidity", 200.0, "-", "ratio of Young's modulus to the shear strength", above=0)
     add_number(p, "--poisson", 0.45, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--density", 1800.0, "kg/m3", "density of the clay", above=0)
-    add_number(p, "--speed", 1e-3, "-", "speed of the footing over that of elastic waves", above=0, at_most=0.1)
+    add_number(p, "--speed", 1e-3, "-", "ratio of the footing's speed to that of elastic waves", above=0, at_most=0.1)
     add_number(p, "--cell-size", 0.02, "m", "size of the cells along the path of the footing's edge", above=0)
-    add_number(p, "--coarsening", 2.5, "-", "size of the cells under the footing over that along the path; those far away are "
-               "four times as large", at_least=1)  # fmt: skip
+    add_number(p, "--coarsening", 2.5, "-", "ratio of the size of the cells under the footing to --cell-size; cells far away "
+               "are four times as large", at_least=1)  # fmt: skip
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
 

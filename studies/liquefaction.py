@@ -54,7 +54,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
     add_number(p, "--runout", 8.0, "m", "length of the mesh past the toe", above=0)
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
-    add_number(p, "--pressure-ratio", 0.9, "-", "rise of the pore pressures over the effective vertical stresses",
+    add_number(p, "--pressure-ratio", 0.9, "-", "ratio of the rise of the pore pressures to the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip
     add_number(p, "--conductivity", 1e-5, "m/s", "hydraulic conductivity", above=0)
     add_number(p, "--porosity", 0.45, "-", "porosity of the loose sand", above=0, below=1)

@@ -68,7 +68,7 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--rest", 1e-3, "-", "out-of-balance ratio and fraction of kinetic energy at which a slide ends", above=0
     )
-    add_number(p, "--step", 20.0, "-", "shortest step of the implicit runs over the critical one", above=0)
+    add_number(p, "--step", 20.0, "-", "ratio of the shortest step of the implicit runs to the critical one", above=0)
     add_count(
         p,
         "--longer-steps",

@@ -62,19 +62,21 @@ def parser() -> ArgumentParser:
     add_number(p, "--cohesion", 50.0, "Pa", "cohesion of the sand", at_least=0)
     add_number(p, "--young", 1e7, "Pa", "Young's modulus", above=0)
     add_number(p, "--density", 1800.0, "kg/m3", "density of the sand", above=0)
-    add_number(p, "--movement", None, "-", "displacement of the wall over its height (default: 0.008 active, 0.03 passive)",
+    add_number(p, "--movement", None, "-", "ratio of the wall's displacement to its height (default: 0.008 active, 0.03 passive)",
                above=0)  # fmt: skip
-    add_number(p, "--speed", 0.01, "1/s", "speed of the wall over its height", above=0)
-    add_number(p, "--support", 0.5, "-", "final force on a free wall, over the active force", at_least=0)
+    add_number(p, "--speed", 0.01, "1/s", "ratio of the wall's speed to its height", above=0)
+    add_number(p, "--support", 0.5, "-", "ratio of the final force on a free wall to the active force", at_least=0)
     add_number(
         p,
         "--wall-mass",
         0.2,
         "-",
-        "mass of a free wall, over that of a square of sand of the same height",
+        "ratio of the mass of a free wall to that of a square of sand of the same height",
         above=0,
     )
-    add_number(p, "--cell-size", 0.05, "-", "side of the squares over the height of the wall", above=0, at_most=0.25)
+    add_number(
+        p, "--cell-size", 0.05, "-", "ratio of the side of the squares to the height of the wall", above=0, at_most=0.25
+    )
     body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, integration="particles", frames=40)
     return p
 
