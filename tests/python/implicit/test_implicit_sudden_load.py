@@ -1,0 +1,55 @@
+"""Why damped explicit and implicit runs end apart after a sudden load: the overshoot that long steps do not resolve."""
+
+import numpy as np
+import pytest
+from core_cases import box
+
+import mpm_core as mpm
+
+YOUNG, STRENGTH, DENSITY, HEIGHT, DAMPING = 1e6, 1e3, 2000.0, 0.1, 0.75
+YIELD = 2 * STRENGTH  # axial stress at which soil without Poisson's ratio yields under uniaxial strain [Pa]
+LOAD = 0.9  # static axial stress over that
+PERIOD = 2 * np.pi * HEIGHT * np.sqrt(DENSITY / 2 / YOUNG)  # half of the mass on a spring of the modulus E [s]
+
+
+def strain_at_rest(scheme, ramp):
+    """Axial strain in the middle of a wide layer, one cell high, over the strain at which it yields, when it is at rest."""
+    law = mpm.tresca(young=YOUNG, poisson=0.0, shear_strength=STRENGTH)
+    model = mpm.Model(box((21, 2), (2.1, 2 * HEIGHT), body=([0, 0], [2.1, HEIGHT])), law)
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    for side in (1, 2):
+        model.roller(side, normal=(1, 0))
+    model.fix(3)
+    model.set_gravity((0.0, -LOAD * YIELD / (DENSITY * HEIGHT / 2)), ramp=ramp)
+    if scheme == "explicit":
+        report = model.explicit(60 * PERIOD, damping=DAMPING, courant=0.2).last()
+    else:
+        report = model.implicit(60 * PERIOD, dt=20 * model.critical_time_step(), damping=DAMPING).last()
+    assert report.kinetic_energy < 1e-6 * report.external_work
+    p = model.particles
+    start = p.initial_position
+    middle = abs(start[:, 0] - 1.05) < 0.3
+    return -np.mean(p.displacement[middle, 1] / start[middle, 1]) * YOUNG / YIELD
+
+
+def strain_after_overshoot():
+    """The same of a spring that yields, after a sudden load with local damping.
+
+    Stresses and strains are over those at which it yields; beyond, its modulus falls from 1 to K/E = 1/3. Up to the static load the
+    mass gains (1 - alpha) of the work of R, beyond it loses (1 + alpha) of it, and comes to a stop at the plastic strain x:
+    (1 + alpha) ((1 - F)^2 / 2 + (1 - F) x + x^2 / 6) = (1 - alpha) F^2 / 2. Then it swings elastically.
+    """
+    energy = (1 - DAMPING) / (1 + DAMPING) * LOAD**2 / 2 - (1 - LOAD) ** 2 / 2
+    beyond = 3 * (np.sqrt((1 - LOAD) ** 2 + 2 / 3 * energy) - (1 - LOAD))
+    return LOAD + beyond * (1 - 1 / 3)
+
+
+def test_explicit_steps_overshoot_a_sudden_load_as_in_closed_form_and_long_implicit_steps_do_not():
+    assert strain_after_overshoot() > 1.2 * LOAD
+    assert strain_at_rest("explicit", 0.0) == pytest.approx(strain_after_overshoot(), rel=0.01)
+    assert strain_at_rest("implicit", 0.0) == pytest.approx(LOAD, rel=0.01)
+
+
+def test_both_end_in_the_same_place_when_the_load_rises_slowly():
+    ends = [strain_at_rest(scheme, 20 * PERIOD) for scheme in ("explicit", "implicit")]
+    assert ends == pytest.approx([LOAD, LOAD], rel=0.01)
