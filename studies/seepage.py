@@ -21,7 +21,7 @@ from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.seepage_plots import FlowPicture, flow_picture, save_flow
+from common.seepage_plots import SATURATION, FlowPicture, dries, flow_picture, save_flow
 from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, in_days, read_water_site
@@ -66,11 +66,16 @@ class Files(FieldFiles):
     def frame(self) -> None:
         """Add pressure, head and velocity to the files for ParaView. Collective."""
         flow = self._flow
-        head = bridge.evaluate_at(self.points, p=flow.pressure_head)["p"][:, 0]
+        there = bridge.evaluate_at(self.points, p=flow.pressure_head, s=flow.saturation())
+        head, saturation = there["p"][:, 0], there["s"][:, 0]
         velocity = flow.velocity()
         dofs = cell_dofs(velocity.function_space)[: self.n_cells]
         means = velocity.x.array.reshape(-1, flow.domain.geometry.dim)[dofs].mean(axis=1)
-        fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self.points[:, -1]}
+        fields = {
+            "pore_pressure": flow.unit_weight * head,
+            "total_head": head + self.points[:, -1],
+            "saturation": saturation,
+        }
         self.output.write(flow.time, fields, {"velocity": means})
 
 
@@ -99,14 +104,18 @@ def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowP
 def drawn(site: WaterSite, files: Files, pictures: list[FlowPicture | None], folder: Path) -> Pictures:
     """Head, flow lines and water table of each frame, and the inflows over time."""
     shown = [picture for picture in pictures if picture is not None]
+    saturation: Pictures = {}
+    if shown and dries(shown):
+        saturation = {"saturation.png": lambda: save_flow(folder / "saturation.png", shown, SATURATION)}
     if len(pictures) == 1:
-        return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown)}
+        return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown), **saturation}
     history = files.history
     curves = {c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary}
     axes, limits = ("Time [days]", "Inflow [m$^2$/day]"), ((0, None), (None, None))
     return {
         "seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown[:1]),
         "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", shown),
+        **saturation,
         "inflow.png": lambda: save_curves(folder / "inflow.png", curves, axes, limits=limits),
     }
 
@@ -114,6 +123,7 @@ def drawn(site: WaterSite, files: Files, pictures: list[FlowPicture | None], fol
 CAPTIONS = {
     "seepage_steady": "Steady flow: total head, flow lines, and the water table (blue)",
     "seepage_in_time": "The flow in time: total head, flow lines, and the water table (blue)",
+    "saturation": "Degree of saturation, flow lines, and the water table (blue)",
     "inflow": "Water that enters at each boundary, per metre; negative where it leaves",
 }
 

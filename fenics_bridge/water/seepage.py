@@ -302,6 +302,17 @@ class Seepage:
             result.interpolate(fem.Expression(flow, compat.interpolation_points(space)), own)
         return result
 
+    def saturation(self) -> fem.Function:
+        """Degree of saturation [-] at the nodes; where soils meet, that of the last of them."""
+        psi = self.pressure_head
+        result = fem.Function(psi.function_space, name="saturation")
+        points = compat.interpolation_points(psi.function_space)
+        for soil, own in zip(self._soils, self._cells):
+            degree = fem.Constant(self.domain, 1.0) * soil.retention.saturation(-self.unit_weight * psi)
+            result.interpolate(fem.Expression(degree, points), own)
+        result.x.scatter_forward()
+        return result
+
     def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
         """The pore pressure as a function of positions, for stages and particles.
 

@@ -23,6 +23,7 @@ from .plots import ROUND_TICKS, Quantity, paper_style
 
 HEAD = Quantity("Total head", "m", colours="viridis")
 PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
+SATURATION = Quantity("Degree of saturation", "-", colours="viridis")
 TABLE = "#1f6fd0"
 
 
@@ -30,13 +31,14 @@ TABLE = "#1f6fd0"
 class FlowPicture:
     """A flow for pictures, on the first rank.
 
-    head: pressure head at the corners of all cells [m]; velocity: at the corners too, averaged over cells [m/s]
+    head: pressure head at the corners of all cells [m]; velocity: at the corners too, averaged over cells [m/s]; saturation [-]
     unit_weight: of water [N/m3]; levels: standing water, lines (k, 2) from point to point [m]
     """
 
     name: str
     head: Field
     velocity: np.ndarray
+    saturation: np.ndarray
     unit_weight: float
     levels: list[np.ndarray] = field(default_factory=list)
 
@@ -46,7 +48,9 @@ class FlowPicture:
         return self.head.values[:, 0] + self.head.points[:, 1]
 
     def values(self, quantity: Quantity) -> np.ndarray:
-        """HEAD or PRESSURE at the corners, as shown."""
+        """HEAD, PRESSURE or SATURATION at the corners, as shown."""
+        if quantity is SATURATION:
+            return np.minimum(self.saturation, 1 - 1e-9)  # full soil has one colour, whatever rounding adds
         return self.total if quantity is HEAD else quantity.scale * self.unit_weight * self.head.values[:, 0]
 
 
@@ -57,10 +61,11 @@ def flow_picture(flow: water.Seepage, name: str, reservoirs: Sequence[tuple] = (
         reservoirs: to be shown: (condition, x, y), with the line of the ground below each.
     """
     head, velocity = gathered(flow.pressure_head), gathered(bridge.nodal_average(flow.velocity()))
-    if head is None or velocity is None:
+    saturation = gathered(flow.saturation())
+    if head is None or velocity is None or saturation is None:
         return None
     levels = [_level(value_at(condition.level, flow.time), x, y) for condition, x, y in reservoirs]
-    return FlowPicture(name, head, velocity.values, flow.unit_weight, levels)
+    return FlowPicture(name, head, velocity.values, saturation.values[:, 0], flow.unit_weight, levels)
 
 
 def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -69,8 +74,13 @@ def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.column_stack([along, np.where(np.interp(along, x, y) < level, level, np.nan)])
 
 
+def dries(pictures: Sequence[FlowPicture]) -> bool:
+    """Whether soil is anywhere so dry that a picture of its saturation shows something."""
+    return min(picture.saturation.min() for picture in pictures) < 0.99
+
+
 def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> None:
-    """Draw a panel for each flow, above one another, with one scale of the head, or of the pore pressure."""
+    """Draw a panel for each flow, above one another, with one scale of the quantity."""
     points = pictures[0].head.points
     low, high = points.min(axis=0), points.max(axis=0)
     every = np.concatenate([picture.values(quantity) for picture in pictures])
@@ -83,7 +93,7 @@ def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = 
                                       squeeze=False, layout="constrained")  # fmt: skip
         for axes, picture in zip(panels[:, 0], pictures):
             triangles = Triangulation(*picture.head.points.T, picture.head.cells)
-            axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours)
+            axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
             axes.tricontour(
                 triangles, picture.values(quantity), levels[1:-1], colors="black", linewidths=0.35, alpha=0.6
             )

@@ -11,12 +11,13 @@ import numpy as np
 from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, save_figure
 from .plots import CURVES, paper_style
-from .seepage_plots import PRESSURE, save_flow
+from .seepage_plots import PRESSURE, SATURATION, dries, save_flow
 from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
 CAPTIONS = {
     "pore_pressure": "Pore pressure, negative where it is suction, with flow lines, the water table and standing water (blue)",
+    "saturation": "Degree of saturation, with flow lines, the water table and standing water (blue)",
     "factor_of_safety": "Factor of safety over time",
     "mechanism": "Mechanism in which the slope fails at the time of the lowest factor, its strength divided by the factor",
 }
@@ -31,7 +32,9 @@ def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[st
         return {}
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
     title = f"{in_days(worst.time)}: factor of safety {worst.safety.value:.2f}"
+    saturation = {"saturation": lambda: save_flow(folder / "saturation.png", shown, SATURATION)} if dries(shown) else {}
     return {
+        **saturation,
         "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
         "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),
         "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),

@@ -99,10 +99,11 @@ class Files(FieldFiles):
         flow, found = self._flow, instant.safety
         self.history.add(time_days=instant.time / DAY, factor_of_safety=found.value, failed_at_factor=found.failed_at,
                          stored_water_m2=flow.stored_water())  # fmt: skip
-        there = bridge.evaluate_at(self.points, p=flow.pressure_head, u=found.mechanism)
+        there = bridge.evaluate_at(self.points, p=flow.pressure_head, u=found.mechanism, s=flow.saturation())
         head = there["p"][:, 0]
         fields = {"pore_pressure": flow.unit_weight * head, "total_head": head + self.points[:, -1],
-                  "acting_pore_pressure": instant.pore_pressure(self.points), "mechanism": there["u"]}  # fmt: skip
+                  "acting_pore_pressure": instant.pore_pressure(self.points), "mechanism": there["u"],
+                  "saturation": there["s"][:, 0]}  # fmt: skip
         self.output.write(instant.time, fields, {})
 
 

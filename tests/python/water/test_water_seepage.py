@@ -322,3 +322,19 @@ def test_a_step_needs_a_length(dt):
     flow = water.Seepage(domain, water.PorousSoil(1e-6), facet_tags, [water.Head(LEFT, 1.0)])
     with pytest.raises(InputError, match=f"dt: got {dt}.*expected a positive number"):
         flow.advance(dt)
+
+
+def test_the_saturation_is_that_of_each_soils_curve():
+    """Hydrostatic suction above a water table in the middle of a block; soil that is always full beside it."""
+    domain, _, facets = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 2.0), (4, 8))
+    cells = np.arange(len(bridge.mesh.tagged.tag_values(domain, None, 2)), dtype=np.int32)
+    left = mesh.compute_midpoints(domain, 2, cells)[:, 0] < 0.5
+    tags = mesh.meshtags(domain, 2, cells, np.where(left, 1, 2).astype(np.int32))
+    curve = water.VanGenuchten(2e-4, 1.8, 0.1)
+    soils = {1: water.PorousSoil(1e-6, retention=curve), 2: water.PorousSoil(1e-6)}
+    flow = water.Seepage(domain, soils, facets, [water.Head(3, 1.0)], cell_tags=tags)
+    flow.solve()
+    points = np.array([[0.25, 0.5], [0.25, 1.5], [0.25, 2.0], [0.75, 1.5]])
+    found = bridge.evaluate_at(points, s=flow.saturation())["s"][:, 0]
+    expected = [1.0, *(float(curve.saturation(WEIGHT * height)) for height in (0.5, 1.0)), 1.0]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
