@@ -23,15 +23,18 @@ def mesh_text(mesh: Mesh) -> str:
     """A mesh in words: cells and nodes of this rank, size, tags by name."""
     dim, points = mesh.dim, mesh.points
     size = " x ".join(f"{length:.4g} m" for length in np.ptp(points, axis=0)) if len(points) else "nothing"
-    names = {kind: {tag: name for name, tags in of.items() for tag in tags} for kind, of in mesh.names.items()}
     tags = "; ".join(
-        f"{kind} tags "
-        + (", ".join(f"{tag} ({names[kind][tag]})" if tag in names[kind] else str(tag) for tag in sorted(known)))
+        f"{kind} tags " + ", ".join(_tag(mesh, kind, tag) for tag in sorted(known))
         for kind, known in mesh.tags.items()
         if known
     )
     where = f" on rank {mesh.comm.rank} of {mesh.comm.size}" if mesh.comm.size > 1 else ""
     return f"<Mesh: {mesh.owned_cells} {_KINDS[dim]} and {len(points)} nodes{where}, {size}; {tags}>"
+
+
+def _tag(mesh: Mesh, kind: str, tag: int) -> str:
+    """A tag with its name, if it has one."""
+    return next((f"{tag} ({name})" for name, tags in mesh.names[kind].items() if tag in tags), str(tag))
 
 
 def particles_text(particles: Particles) -> str:
@@ -42,13 +45,23 @@ def particles_text(particles: Particles) -> str:
 
 
 def model_text(model: Any) -> str:
-    """A model in words: geometry, time, particles of this rank, laws."""
+    """A model in words: geometry, time, particles of this rank, laws, gravity, boundary conditions."""
     geometry = model.geometry.name.lower().replace("_", " ")
-    laws = "".join(f"\n  law {number}: {law!r}" for number, law in enumerate(model.laws))
+    rows = [f"law {number}: {law!r}" for number, law in enumerate(model.laws)]
+    rows.append(f"gravity {_vector(model.gravity)} m/s2")
+    for tag, whole, values in model._conditions:
+        moves = f"velocity {_vector(values)} m/s" if any(value != 0 for value in values) else "fixed"
+        condition = moves if whole else f"roller, normal {_vector(values)}"
+        rows.append(f"facet tag {_tag(model.mesh, 'facet', tag)}: {condition}")
     return (
         f"<{type(model).__name__}: {geometry}, t = {model.time:g} s; {len(model.particles)} particles on this rank, "
-        f"{model.mesh.owned_cells} cells{laws}>"
+        + "\n  ".join([f"{model.mesh.owned_cells} cells", *rows])
+        + ">"
     )
+
+
+def _vector(values: Sequence[float | None] | np.ndarray) -> str:
+    return f"({', '.join('free' if value is None else f'{value:g}' for value in values)})"
 
 
 def report_text(report: Report) -> str:

@@ -31,6 +31,16 @@ def test_texts_have_sizes_units_and_laws(model):
     assert f"{report.mass:.6g} kg" in repr(report) and f"kinetic energy {report.kinetic_energy:.4g} J" in repr(report)
 
 
+def test_the_text_of_a_model_has_its_gravity_and_boundary_conditions(model):
+    assert "gravity (0, -9.81) m/s2" in repr(model) and "facet tag 3: fixed" in repr(model)
+    model.roller(1, normal=(1, 0))
+    assert "facet tag 1: roller, normal (1, 0)" in repr(model)
+    model.prescribe(4, (None, -0.1))
+    assert "facet tag 4: velocity (free, -0.1) m/s" in repr(model)
+    model.release(3)
+    assert "facet tag 3" not in repr(model)
+
+
 def test_texts_of_volumes_and_runs(model):
     assert "volume [m2]" in repr(model.particles)
     solid = mpm.Model(box((1, 1, 1)), model.laws[0])
