@@ -65,7 +65,7 @@ def save_motions(path: Path, accelerations: Mapping[str, Curve], displacements: 
                 panel.plot(time, values, color=CURVES[k], linewidth=0.9, label=name)
             _panel(panel, label)
             low, high = panel.get_ylim()
-            panel.set_ylim(low, high + 0.4 * (high - low))  # room for the names above the curves
+            panel.set_ylim(low, high + 0.4 * (high - low))  # space for the names above the curves
             panel.legend(fontsize=8, loc="upper left")
         axes[-1].set_xlabel("Time [s]")
         figure.align_ylabels(axes)

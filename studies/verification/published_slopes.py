@@ -32,7 +32,7 @@ UNDRAINED = {1.0: 1.448, 1.5: 2.032, 4.0: 2.032}
 
 
 def slope_on_rock(cell, runout):
-    """The mesh of the first example with room to move [m], its soil and supports."""
+    """The mesh of the first example with space to move [m], its soil and supports."""
     background = bridge.slope_mesh(
         MPI.COMM_WORLD, height=HEIGHT, angle=ANGLE, crest=1.2 * HEIGHT, cell_size=cell, kind="fitted", runout=runout
     )
