@@ -2,6 +2,7 @@
 
 #include "model/cell_change.h"
 #include "model/law_update.h"
+#include "model/pic_loss.h"
 #include "model/resting_pass.h"
 #include "model/strain_kind.h"
 #include "transfer/affine_field.h"
@@ -15,28 +16,6 @@ namespace
 {
 /// Steps after which the moments of all cells are summed over the particles again, so that round-off does not add up.
 constexpr std::int64_t summation_interval = 64;
-
-/// Kinetic energy that PIC takes out of the particles of a run: their own velocities v go towards those of the nodes,
-/// v + s (w - v), which costs m s d . (v - s d / 2) with d = v - w.
-template <class G, int D = G::dim>
-double pic_loss(const Mesh<D>& mesh, const Particles<D>& particles, const VelocityField<G>& field, const Run& run,
-                double pic_fraction)
-{
-  const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
-  const AffineField<D> nodal = affine_field<D>(mesh, run.cell, start);
-  const Vector<D>& centre = mesh.shapes[run.cell].centre;
-  double sum = 0;
-  for (Index p = run.first; p < run.last; ++p)
-    for (int a = 0; a < D; ++a)
-    {
-      double w = nodal.value[a];
-      for (int b = 0; b < D; ++b)
-        w += nodal.gradient[a][b] * (particles.position[b][p] - centre[b]);
-      const double v = particles.velocity[a][p], change = pic_fraction * (v - w);
-      sum += particles.mass[p] * change * (v - 0.5 * change);
-    }
-  return sum;
-}
 
 template <class Kind, class G, int D = G::dim>
 void update_stress(Model<G>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
@@ -113,7 +92,8 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
   Particles<D>& particles = model.particles;
   const bool affine = options.transfer == Transfer::affine;
   for (std::size_t r = batch.first_run; options.pic_fraction > 0 && !affine && r < batch.last_run; ++r)
-    model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction);
+    model.energy.pic_loss += pic_loss(model.mesh, particles, field, runs[r], options.pic_fraction,
+                                      particles.mass.data(), [&](Index p, int a) { return particles.velocity[a][p]; });
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const CellMotion<D>& motion = scratch.motion[r - batch.first_run];

@@ -1,6 +1,7 @@
 #include "model/water_pass.h"
 
 #include "model/mapping.h"
+#include "model/pic_loss.h"
 #include "model/water_mapping.h"
 #include "transfer/affine_field.h"
 #include "transfer/lanes.h"
@@ -137,6 +138,10 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
     work[0] -= half_strain * pressure_sum(particles, run);
     if (run.resting)
       change_gradient<D>(particles, run.first, flip_fraction, change);
+    else if (flip_fraction < 1)
+      model.energy.pic_loss += pic_loss(
+          model.mesh, particles, model.water_field.motion, run, 1 - flip_fraction, particles.water_mass[0].data(),
+          [&](Index p, int a) { return particles.water_velocity[a][p] + change.exchange[a]; });
     if (!change_water<D>(particles, *model.water, run, model.mesh.shapes[run.cell].centre, flip_fraction, change))
       note_closed_pores(model, run);
     work[1] -= half_strain * (1 + change.growth) * pressure_sum(particles, run); // volumes grow later in the step

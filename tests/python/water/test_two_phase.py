@@ -241,6 +241,19 @@ def test_saturated_soil_in_free_fall_stays_as_it_is():
     assert abs(report.unexplained_fraction) < 1e-10
 
 
+def test_energy_that_pic_takes_out_of_soil_and_water_is_booked():
+    """Random velocities of both phases, which the nodes hardly see, die out by PIC; a fifth of their energy is the water's."""
+    model = column(10, conductivity=1e-2)
+    list(model.explicit(1e-9, dt=1e-9))  # from now on water has a velocity of its own
+    random = np.random.default_rng(1)
+    for name in ("velocity", "water_velocity"):
+        model.particles.set(name, random.normal(0.0, 0.1, model.particles.velocity.shape))
+    energy = model.report().kinetic_energy
+    *_, report = model.explicit(20 * model.critical_time_step(), pic=0.2, energy_limit=None)
+    assert report.kinetic_energy < 0.01 * energy and report.pic_loss > 0.9 * energy
+    assert abs(report.unexplained_energy) < 0.01 * energy
+
+
 # --- limits -----------------------------------------------------------------------------------------------------------
 
 
