@@ -173,9 +173,15 @@ class Particles:
             values: one row per particle, in the present order; shape as the attribute of that name gives it.
 
         Raises:
-            InputError: unknown field, wrong shape or dtype, a value that is not finite, or only some particles.
+            InputError: unknown field, wrong shape or dtype, a value that is not finite, only some particles, or a velocity of the
+                water before an explicit step has given it one of its own.
         """
         self._require_all("set")
+        if name == "water_velocity" and not self._core.has_two_phases:
+            raise InputError(
+                "water_velocity cannot be set yet: water moves with the soil up to the first explicit step with pore water, "
+                "such as model.explicit(until=1e-9, dt=1e-9).last()"
+            )
         shape: tuple[int | None, ...] = tuple(None for _ in np.shape(values))
         self._core.set_column(name, floats(name, values, shape))
 

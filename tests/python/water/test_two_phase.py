@@ -254,6 +254,12 @@ def test_energy_that_pic_takes_out_of_soil_and_water_is_booked():
     assert abs(report.unexplained_energy) < 0.01 * energy
 
 
+def test_water_without_a_velocity_of_its_own_is_given_none():
+    model = column(4)
+    with pytest.raises(mpm.InputError, match="water_velocity cannot be set yet"):
+        model.particles.set("water_velocity", np.zeros(model.particles.velocity.shape))
+
+
 # --- limits -----------------------------------------------------------------------------------------------------------
 
 
