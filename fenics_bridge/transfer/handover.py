@@ -94,7 +94,7 @@ def initialise(
         resting: let all cells rest (`Model.rest`) as the finite elements that they were; only what fails turns into particles.
             They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are.
         nmd: whether the run that follows averages strains, in explicit steps: equilibrium is then one of forces of averaged mean
-            stresses. By default as in the finite elements. False for implicit steps that move particles, which average strains only.
+            stresses. By default as in the finite elements. False for implicit steps that move particles: these average strains.
         integration: how the run that follows makes forces of stresses; see `mpm_core.Integration`.
 
     Returns:

@@ -92,8 +92,9 @@ def _write_layer(folder, heights=(2.0,)):
     ]
     for k, height in enumerate(heights):
         low, left, right, up = 10 * k + 1, 10 * k + 13, 10 * k + 14, 10 * k + 11
-        lines += [f"Point({up}) = {{0, {height}, 0}};", f"Point({up + 1}) = {{0.3, {height}, 0}};", f"Line({up}) = {{{up}, {up + 1}}};",
-                  f"Line({left}) = {{{low}, {up}}};", f"Line({right}) = {{{low + 1}, {up + 1}}};",
+        lines += [f"Point({up}) = {{0, {height}, 0}};", f"Point({up + 1}) = {{0.3, {height}, 0}};",
+                  f"Line({up}) = {{{up}, {up + 1}}};", f"Line({left}) = {{{low}, {up}}};",
+                  f"Line({right}) = {{{low + 1}, {up + 1}}};",
                   f"Curve Loop({up}) = {{{low}, {right}, -{up}, -{left}}};", f"Plane Surface({up}) = {{{up}}};",
                   f'Physical Surface("{("clay", "first", "second")[k]}") = {{{up}}};']  # fmt: skip
     sides = [", ".join(str(10 * k + side) for k in range(len(heights))) for side in (13, 14)]
