@@ -65,7 +65,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--cell-size", 0.0015, "m", "size of the cells along the path of the cone's shoulder", above=0)
     add_number(p, "--width", 20.0, "-", "ratio of the ground's radius to that of the cone", at_least=5)
     add_number(
-        p, "--coarsening", 2.0, "-", "ratio of the size of the cells beside this path to --cell-size", at_least=1
+        p, "--coarsening", 2.0, "-", "ratio of the size of the cells beside this path to that along it", at_least=1
     )
     add_number(p, "--growth", 0.15, "-", "increase of the cell size per length of distance from the path", above=0)
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)

@@ -86,4 +86,4 @@ def test_a_unit_weight_that_no_soil_has_is_said(weight, is_odd):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         warn_of_weight(MPI.COMM_WORLD, bridge.Load(unit_weight=weight))
-    assert [("expected from 1000 to 200000 N/m3" in str(one.message)) for one in caught] == [True] * is_odd
+    assert [("expected from 1000 to 150000 N/m3" in str(one.message)) for one in caught] == [True] * is_odd
