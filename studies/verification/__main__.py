@@ -48,6 +48,7 @@ GROUPS = {
         "weak_plane",
     ),
     "Experiments": ("bui_collapse", "lube_runout"),
+    "Large deformation": ("cantilever",),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),
     "Slides": ("slide_convergence", "extruded_slope", "hand_over"),
