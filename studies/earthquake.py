@@ -159,13 +159,23 @@ def newmark(a: Namespace, history: History) -> tuple[float, dict[str, np.ndarray
     """
     soil = laws_of(a)[bridge.SOIL]
     strength = bridge.davis_strength(soil)
-    begins = yield_acceleration(a.height, a.angle, strength.cohesion, strength.friction_angle, a.unit_weight, GRAVITY)
+    begins = yield_acceleration(
+        a.height, a.angle, strength.cohesion, strength.friction_angle, a.unit_weight, GRAVITY, a.soil_depth
+    )
     if begins <= 0:
         raise mpm.InputError(f"--height is {a.height:g} m, expected a slope that is stable without an earthquake")
     motions = {"toe": "foot_velocity_m_per_s", "crest": "crest_level_velocity_m_per_s"}
     return begins, {
         level: sliding_block(history["time_s"], history[column], begins)[1] for level, column in motions.items()
     }
+
+
+def static_safety(a: Namespace) -> float:
+    """Factor of safety without an earthquake, by spirals that reach no deeper than the stiffer layer, which stays elastic."""
+    soil = bridge.davis_strength(laws_of(a)[bridge.SOIL])
+    return bridge.log_spiral_safety(
+        a.height, a.angle, soil.cohesion, soil.friction_angle, a.unit_weight, depth=a.soil_depth
+    )
 
 
 # --- 3. What comes out -----------------------------------------------------------------------------------------------
@@ -240,10 +250,9 @@ def main(arguments: list[str] | None = None) -> int:
     begins, slips = newmark(a, history)
     exact, found = ratios = amplified(a, record[2], history)
     linear = found["linear column of resting cells"][1]
-    soil = bridge.davis_strength(laws_of(a)[bridge.SOIL])
     summary = {
         "yield_acceleration_m_per_s2": begins,
-        "factor_of_safety": bridge.log_spiral_safety(a.height, a.angle, soil.cohesion, soil.friction_angle, a.unit_weight),
+        "factor_of_safety": static_safety(a),
         "slope_displacement_m": slope_slip(history)[-1],
         **{f"newmark_displacement_m_{level}": slip[-1] for level, slip in slips.items()},
         "largest_acceleration_of_outcrop_m_per_s2": np.abs(np.gradient(record[2].velocity, record[2].time)).max(),

@@ -57,7 +57,13 @@ def pulse_slip(speed: float, acceleration: float, yield_acceleration: float) -> 
 
 
 def yield_acceleration(
-    height: float, angle: float, cohesion: float, friction_angle: float, unit_weight: float, gravity: float = 9.81
+    height: float,
+    angle: float,
+    cohesion: float,
+    friction_angle: float,
+    unit_weight: float,
+    gravity: float = 9.81,
+    depth: float = np.inf,
 ) -> float:
     """Horizontal acceleration at which a uniform slope fails, by limit analysis [m/s2]; below 0 where it does not stand.
 
@@ -69,6 +75,7 @@ def yield_acceleration(
         cohesion: [Pa]; friction_angle: above 0 [degrees].
         unit_weight: [N/m3].
         gravity: [m/s2].
+        depth: of the soil below the toe [m], which spirals do not leave; under inertia those in weak soil reach deep.
     """
     slope, friction = np.radians(angle), np.radians(friction_angle)
 
@@ -76,7 +83,7 @@ def yield_acceleration(
         start, end = ends
         if not 0.0 < start < end - 0.05 < np.pi - 0.1:
             return 1e3
-        return _coefficient(start, end, height, slope, cohesion, friction, unit_weight)
+        return _coefficient(start, end, height, slope, cohesion, friction, unit_weight, depth)
 
     trials = [(start, end) for start in np.radians(np.arange(5, 90, 5)) for end in np.radians(np.arange(40, 170, 5))]
     first = min(trials, key=lambda ends: coefficient(np.array(ends)))
@@ -86,7 +93,14 @@ def yield_acceleration(
 
 
 def _coefficient(
-    start: float, end: float, height: float, slope: float, cohesion: float, friction: float, unit_weight: float
+    start: float,
+    end: float,
+    height: float,
+    slope: float,
+    cohesion: float,
+    friction: float,
+    unit_weight: float,
+    depth: float,
 ) -> float:
     """Horizontal over vertical acceleration by the spiral from an angle to another, below the horizontal of its centre."""
     turn = np.linspace(start, end, SAMPLES)
@@ -99,6 +113,8 @@ def _coefficient(
     crest = np.array([x[-1] + height / np.tan(slope), y[0]])
     if crest[0] > x[0] or np.any(y[1:-1] > np.minimum(y[0], y[-1] + np.tan(slope) * (x[1:-1] - x[-1])) + 1e-9 * height):
         return 1e3  # the spiral begins before the crest, or leaves the soil
+    if y.min() < y[-1] - depth:
+        return 1e3
     area, centroid = _polygon(np.append(x, crest[0]), np.append(y, crest[1]))
     dissipation = cohesion * size**2 * (spiral[-1] ** 2 - 1) / (2 * np.tan(friction))
     # the mass turns to the left and downwards: its weight acts on the arm x, horizontal inertia to the left on the arm -y

@@ -40,6 +40,26 @@ def test_a_slope_with_its_strength_over_its_factor_of_safety_yields_at_once(angl
     assert yield_acceleration(10.0, angle, 0.8 * cohesion / factor, reduced, 19e3) < 0
 
 
+def test_a_stiff_layer_below_the_toe_keeps_weak_soil_from_yielding_deep():
+    # A layer of thickness D on a rigid base slides as a whole at tan(phi) + c / (gamma D) of gravity, so that without a stiff layer
+    # the worst spirals are hundreds of metres deep. A layer in the way stops these, the more the higher it is.
+    slope = 10.0, 35.0, 30e3, 3.0, 19e3
+    yields = [yield_acceleration(*slope, 9.81, depth) for depth in (1.0, 10.0, np.inf)]
+    assert yields[0] > 1.02 * yields[1] > 1.1 * yields[2] > 1.1 * 9.81 * np.tan(np.radians(3.0))
+    # Where the spiral stays above the layer, the layer changes nothing.
+    steep = 10.0, 45.0, 20e3, 25.0, 19e3
+    assert yield_acceleration(*steep, 9.81, 5.0) == pytest.approx(yield_acceleration(*steep), abs=1e-6)
+
+
+@pytest.mark.parametrize("depth", [2.0, 10.0])
+def test_a_slope_at_its_factor_of_safety_above_a_stiff_layer_does_not_hold_any_acceleration(depth):
+    # The factor of safety has the spirals through the toe and those that end before it, so that the former alone yield later.
+    height, angle, cohesion, friction, weight = 10.0, 20.0, 15e3, 10.0, 19e3
+    factor = bridge.log_spiral_safety(height, angle, cohesion, friction, weight, depth=depth)
+    reduced = np.degrees(np.arctan(np.tan(np.radians(friction)) / factor))
+    assert 0 <= yield_acceleration(height, angle, cohesion / factor, reduced, weight, 9.81, depth) < 0.1
+
+
 def test_layers_amplify_as_one_layer_where_they_are_of_one_soil():
     # 1 / sqrt(cos^2 kH + (a sin kH)^2) without damping; with it the peak at kH = pi/2 of a rigid half-space is 2 / (pi xi).
     height, modulus, density, rock = 20.0, 80e6, 2000.0, 3e6
