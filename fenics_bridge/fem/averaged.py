@@ -35,8 +35,8 @@ class AveragedKinematics:
     Soil with friction whose flow dilates less than associated flow is an exception. Forces that are averaged in full do not feel
     pressures that alternate from cell to cell, and where flow does not change the volume a mechanism would pass through the cells
     of low pressure; forces that are not averaged at all let tension alternate instead (docs/fem.md). So in cells of such soil the
-    forces are averaged by the fraction (1 + tan(psi) / tan(phi)) / 2. Particles average strains and forces of such soil by half,
-    and so do elements that are handed over to them.
+    forces are averaged by the fraction (1 + tan(psi) / tan(phi)) / 2, as those of particles in small displacements. Explicit steps
+    average strains and forces of such soil by half, and so do elements that are handed over to them.
 
     Args:
         increment: displacement function of degree 1 whose strain is taken.
@@ -95,8 +95,7 @@ class AveragedKinematics:
             fractions = np.array([_core.fraction_of_averages(law) for law in laws])[number]
             self._strain.of_strains = self._strain.of_forces = fractions
         else:
-            associated = np.nan_to_num([_core.associated_fraction(law) for law in laws], nan=1.0)
-            self._strain.of_forces = 0.5 * (1.0 + associated)[number]
+            self._strain.of_forces = np.array([_core.fraction_of_averaged_forces(law) for law in laws])[number]
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""

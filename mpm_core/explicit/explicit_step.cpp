@@ -182,23 +182,33 @@ void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 } // namespace
 
 template <class G>
-void choose_forces(Model<G>& model, Integration kind, bool averaged)
+void choose_forces(Model<G>& model, Integration kind, Averages averages)
 {
-  const bool filled = model.water.has_value(); // its pressure is most of what averages change
+  const bool filled = model.water.has_value();                           // its pressure is most of what averages change
+  const bool as_elements = averages == Averages::as_elements && !filled; // elements with water average as steps do
+  const auto fraction = [&](const Law& law)
+  {
+    if (as_elements)
+      return fraction_of_averaged_forces(law);
+    return filled ? 1 : fraction_of_averages(law);
+  };
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = kind;
     field.integration.averaged_by_law.clear();
     field.integration.averaged_of_cell.clear();
-    for (std::size_t k = 0; averaged && k < model.laws.size(); ++k)
-      field.integration.averaged_by_law.push_back(filled ? 1 : fraction_of_averages(model.laws[k]));
+    field.integration.strains_in_full = as_elements;
+    if (averages == Averages::none)
+      continue;
+    for (const Law& law : model.laws)
+      field.integration.averaged_by_law.push_back(fraction(law));
   }
 }
 
 template <class G>
 void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
-  choose_forces(model, options.integration, options.nmd);
+  choose_forces(model, options.integration, options.nmd ? Averages::of_steps : Averages::none);
   model.exchange.reproducible = options.reproducible;
   if (options.reproducible)
     sum_rounded_moments(model);
@@ -331,7 +341,7 @@ double pic_fraction_of_step(double fraction, double dt, double critical)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template void choose_forces(Model<G>&, Integration, bool);                                                           \
+  template void choose_forces(Model<G>&, Integration, Averages);                                                       \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
   template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
   template CriticalParticle critical_particle(const Model<G>&);                                                        \

@@ -28,11 +28,19 @@ struct ExplicitOptions
   bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
 };
 
+/// Whether the mean stresses of nodal forces are averaged over nodes (nodal mixed discretisation), and by what
+/// fraction.
+enum class Averages
+{
+  none,
+  of_steps,   ///< in each soil by the fraction by which its strains are: forces and strains are conjugate
+  as_elements ///< as finite elements: strains in full, forces by less in soil that dilates less than associated flow;
+              ///< with water as `of_steps`
+};
+
 /// Chooses how steps make nodal forces of the particles' stresses, and find strains, from here on.
-/// @param averaged  whether mean stresses are averaged over nodes (nodal mixed discretisation), in each soil by the
-///                  fraction by which its strains are
 template <class G>
-void choose_forces(Model<G>& model, Integration kind, bool averaged);
+void choose_forces(Model<G>& model, Integration kind, Averages averages);
 
 /// One explicit step (16)-(20) of length dt [s]. Moves particles, updates their stresses, adds to the model's totals.
 /// @pre prepare(model) has been called

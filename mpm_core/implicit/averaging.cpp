@@ -40,7 +40,7 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
     for (int k = 0; k <= D; ++k)
     {
       const Index node = mesh.cells[c][k];
-      const double volume = averaged_volume(mesh, field, c);
+      const double volume = averaged_strain_volume(mesh, field, c);
       const double weight = volume == 0 ? 0 : volume / field.volumetric_strain[node].volume;
       for (int l = 0; l <= D; ++l)
       {

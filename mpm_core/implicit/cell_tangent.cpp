@@ -137,7 +137,8 @@ void split_mean_stress(double averaged, CellTangent<G>& tangent)
 
 template <class G, int D>
 CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const Working<G>& stress,
-                            const CellStrain<D>& strain, const ImplicitOptions& options, double averaged)
+                            const CellStrain<D>& strain, const ImplicitOptions& options, double averaged_strain,
+                            double averaged_force)
 {
   CellTangent<G> tangent{};
   for (int k = 0; k < G::n_working; ++k)
@@ -151,15 +152,15 @@ CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>& c, const
   if (!options.hold_positions)
     add_spin(c, stress, strain, tangent);
   if (options.nmd)
-    split_volumetric(c, averaged, tangent);
+    split_volumetric(c, averaged_strain, tangent);
   if (options.average_stress)
-    split_mean_stress(averaged, tangent);
+    split_mean_stress(averaged_force, tangent);
   return tangent;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template CellTangent<G> cell_tangent(const std::array<Working<G>, G::n_working>&, const Working<G>&,                 \
-                                       const CellStrain<G::dim>&, const ImplicitOptions&, double);
+                                       const CellStrain<G::dim>&, const ImplicitOptions&, double, double);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

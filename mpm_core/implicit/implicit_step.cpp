@@ -30,6 +30,17 @@
 
 namespace mpm::implicit
 {
+namespace
+{
+explicit_scheme::Averages averages_of(const ImplicitOptions& options)
+{
+  using enum explicit_scheme::Averages;
+  if (!options.average_stress)
+    return none;
+  return options.as_elements ? as_elements : of_steps;
+}
+} // namespace
+
 // --- Start: v0, and the first iterate (I1)
 
 template <class G>
@@ -51,7 +62,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   if (model.water)
     model.water->time = model.time + dt;
   step.has_contacts = !model.contacts.empty();
-  explicit_scheme::choose_forces(model, options.integration, options.average_stress);
+  explicit_scheme::choose_forces(model, options.integration, averages_of(options));
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   field.has_light_nodes = false; // the equations give them velocities, too

@@ -18,6 +18,7 @@ struct ImplicitOptions
   double pic = 0;              ///< PIC fraction of a critical time step, in [0, 1]
   bool nmd = false;            ///< nodal mixed discretisation
   bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
+  bool as_elements = false;    ///< of these: averages of strains and forces as those of finite elements
   Integration integration = Integration::particles; ///< by particles or mixed
   GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass
   bool second_order = false;                        ///< two stages instead of backward Euler; with inertia only

@@ -247,8 +247,9 @@ TrialCount<D> try_stresses(const Mesh<D>& mesh, const MaterialPoints<D>& materia
     return count;
   step.tangents.resize(cells);
   for (Index c : step.cells)
-    step.tangents[c] = cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options,
-                                       averaged_fraction(field.integration, c));
+    step.tangents[c] =
+        cell_tangent<G>(step.stiffness[c], step.stress[c], step.strains[c], step.options,
+                        averaged_strain_fraction(field.integration, c), averaged_fraction(field.integration, c));
   return count;
 }
 

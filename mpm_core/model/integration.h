@@ -28,7 +28,7 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
-/// The fraction of nodal mixed discretisation in a cell.
+/// The fraction of nodal mixed discretisation in a cell, that of its forces.
 template <int D>
 inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)
 {
@@ -41,6 +41,20 @@ template <class G, int D = G::dim>
 inline double averaged_volume(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
   return averaged_fraction(field.integration, cell) * integrated_volume(mesh, field, cell);
+}
+
+/// The fraction of nodal mixed discretisation of the strains of a cell.
+template <int D>
+inline double averaged_strain_fraction(const CellIntegration<D>& integration, Index cell)
+{
+  return integration.strains_in_full ? 1 : averaged_fraction(integration, cell);
+}
+
+/// The volume by which a cell takes part in the means of strains.
+template <class G, int D = G::dim>
+inline double averaged_strain_volume(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  return averaged_strain_fraction(field.integration, cell) * integrated_volume(mesh, field, cell);
 }
 
 /// Finds what the cells integrate in this step, where it is not the sum over their particles: a full cell integrates

@@ -240,9 +240,9 @@ template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
 {
   // Averages of stress have found the volumes, and left them side by side.
-  const bool known = !field.integration.averaged_by_law.empty();
+  const bool known = !field.integration.averaged_by_law.empty() && !field.integration.strains_in_full;
   const auto volume_of = [&](Index c)
-  { return known ? field.integration.mean_stress_of_cell[c].volume : averaged_volume(mesh, field, c); };
+  { return known ? field.integration.mean_stress_of_cell[c].volume : averaged_strain_volume(mesh, field, c); };
   with_velocity_of_vertices(mesh, field,
                             [&](auto&& velocity_of)
                             {

@@ -244,6 +244,8 @@ void bind_laws(py::module_& m)
       "associated_fraction", [](const Law& law) { return associated_fraction(law); }, py::arg("law"));
   m.def(
       "fraction_of_averages", [](const Law& law) { return fraction_of_averages(law); }, py::arg("law"));
+  m.def(
+      "fraction_of_averaged_forces", [](const Law& law) { return fraction_of_averaged_forces(law); }, py::arg("law"));
   m.def("cell_sizes",
         py::vectorize([](double volume, int dim) { return dim == 2 ? cell_size<2>(volume) : cell_size<3>(volume); }),
         py::arg("volumes"), py::arg("dim"));

@@ -213,7 +213,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            [](M& model, const Vector<D>& gravity, Integration integration, bool nmd)
            {
              prepare(model);
-             choose_forces(model, integration, nmd);
+             choose_forces(model, integration, nmd ? Averages::of_steps : Averages::none);
              map_to_nodes(model);
              return out_of_balance(model, gravity);
            })

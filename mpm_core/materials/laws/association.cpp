@@ -49,4 +49,10 @@ double associated_fraction(const Law& law) { return fraction(law); }
 bool is_non_associated(const Law& law) { return !(fraction(law) >= 1); }
 
 double fraction_of_averages(const Law& law) { return is_non_associated(law) ? 0.5 : 1; }
+
+double fraction_of_averaged_forces(const Law& law)
+{
+  const double associated = fraction(law);
+  return std::isnan(associated) ? 1 : 0.5 * (1 + associated);
+}
 } // namespace mpm::materials

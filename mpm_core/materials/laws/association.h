@@ -20,4 +20,8 @@ bool is_non_associated(const Law& law);
 /// that are averaged in full do not feel pressures that alternate from cell to cell: there these would cost the soil
 /// strength.
 double fraction_of_averages(const Law& law);
+
+/// Fraction by which finite elements and steps in small displacements average the forces of a soil whose strains they
+/// average in full: a half without dilation, and all in associated flow. Averaged by less, tension alternates.
+double fraction_of_averaged_forces(const Law& law);
 } // namespace mpm::materials

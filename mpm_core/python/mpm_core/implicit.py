@@ -64,6 +64,7 @@ def implicit_options(
         raise InputError("small_displacements is True, expected False unless quasi_static is True")
     options.hold_positions = bool(small_displacements)
     options.average_stress = bool(nmd and (small_displacements or averaged_forces))
+    options.as_elements = bool(nmd and small_displacements)
     return options
 
 

@@ -133,7 +133,7 @@ class Model(ContactMethods, Body):
 
         Args:
             gravity: [m/s2], shape (D,), to weigh the particles with; by default the model's own, without its ramp.
-            nmd: take forces of averaged mean stresses, as explicit steps with ``nmd`` and small displacements do.
+            nmd: take forces of averaged mean stresses, as explicit steps with ``nmd`` do.
             integration: how stresses become forces in the steps that are meant; see `Integration`.
         """
         g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
@@ -280,9 +280,8 @@ class Model(ContactMethods, Body):
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs. With
-                ``nmd``, nodal forces are those of averaged mean stresses, as in the finite elements, so that the tangent is
-                symmetric for associated flow; strains and forces of soil that dilates less are averaged by half, as in explicit
-                steps. Pressures of nearly incompressible soil may then alternate from cell to cell.
+                ``nmd``, strains and nodal forces are averaged as in the finite elements, so that the tangent is symmetric for
+                associated flow. Pressures of nearly incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; checked before each step.
             energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
             second_order: use a method of second order in time with two stages per step (Alexander 1977) instead of backward
@@ -353,7 +352,7 @@ class Model(ContactMethods, Body):
         Args:
             solver: solver of each step; Newton's method by default.
             nmd: average volumetric strains over nodes, and mean stresses for the nodal forces (nodal mixed discretisation), as
-                explicit steps with ``nmd`` do.
+                explicit steps with ``nmd`` do; with ``small_displacements`` and without water as finite elements do.
             integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: out-of-balance ratio |f_ext - f_int| / |f_ext| to reach, in the state after a step.
