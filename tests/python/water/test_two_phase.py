@@ -184,6 +184,44 @@ def test_soil_rests_below_the_critical_gradient_and_lifts_off_above(fraction):
         assert rise > 5e-3
 
 
+@pytest.mark.parametrize("fraction", [0.9, 1.1])
+def test_fine_sand_on_coarse_sand_lifts_off_above_its_own_critical_gradient(fraction):
+    """Gradients are q / k, so that the fine sand becomes critical first. Below that heads are linear in each layer."""
+    conductivity, critical = (1e-3, 1e-2), (GRAINS / WATER - 1) * (1 - POROSITY)
+    size, gradient = 0.1, fraction * critical
+    mesh = box((2, 14), (2 * size, 1.4), diagonals="alternating", body=((0, 0), (2 * size, 1.0)))
+    model = mpm.Model(mesh, mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=0.0, friction_angle=30.0))
+    model.seed(density=DENSITY, per_cell=3, cell_tag=1)
+    model.roller(LEFT, (1, 0))
+    model.roller(RIGHT, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=POROSITY, conductivity=lambda x: np.where(x[:, 1] > 0.5, *conductivity), modulus=2.2e7)
+
+    def excess(z):
+        below = conductivity[0] / conductivity[1] * np.maximum(0.5 - z, 0)
+        return GAMMA * gradient * (np.minimum(1 - z, 0.5) + below)
+
+    model.hold_pore_pressure(BASE, GAMMA + excess(0.0))
+    p, z = model.particles, model.particles.position[:, 1]
+    effective = np.maximum(0, critical * GAMMA * (1 - z) - excess(z))
+    p.set("stress", -effective[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
+    model.set_pore_pressure(lambda x: GAMMA * (1 - x[:, 1]) + 0.9 * excess(x[:, 1]))  # the flow brings it up
+    list(model.explicit(2.0, nmd=True, damping=0.5))
+    rise = p.displacement[:, 1]
+    if fraction > 1:
+        lifted = rise[z > 0.6].min()  # the cells at the interface are stretched
+        assert lifted > 5e-4 and abs(rise[z < 0.4]).max() < 0.05 * lifted
+        return
+    row = np.floor(z / size).astype(int)
+    found, expected = (
+        np.bincount(row, values) / np.bincount(row)
+        for values in (model.averaged_pore_pressure() - GAMMA * (1 - z), excess(z))
+    )
+    assert found == pytest.approx(expected, abs=2e-3 * excess(0.0))
+    assert abs(rise).max() < 1e-5
+
+
 # --- conservation -----------------------------------------------------------------------------------------------------
 
 
