@@ -38,6 +38,10 @@ QUADRATURE = {1: 3, 2: 5}
 MOST_CONTINUATION_STEPS = 60
 """Steps of the continuation to a steady flow."""
 
+_SHORTER = (
+    "take steps shorter than {:.3g} s, and let heads that jump change over some time, as a table of times and values"
+)
+
 
 class Seepage:
     """Flow of water through a body of soil.
@@ -108,6 +112,8 @@ class Seepage:
         self._set_load()
         self.iterations = 0
         """Iterations of Newton's method in the last solution"""
+        self.reason = ""
+        """Why the last step was not made, and what helps; empty where it was"""
         self._reaction = np.zeros(len(self._applied.height))
 
     def __repr__(self) -> str:
@@ -179,7 +185,7 @@ class Seepage:
             dt: length of the step [s].
 
         Returns:
-            Whether it converged; where not, the state is as before.
+            Whether it converged; where not, the state is as before, and `reason` says why.
 
         Raises:
             InputError: dt is not positive, or a boundary condition is not possible. Raised on all ranks alike.
@@ -199,6 +205,7 @@ class Seepage:
         if failure:
             self.time -= dt
             self._load.x.array[:] = self._old_load.x.array
+        self.reason = f"{failure}; {_SHORTER.format(dt)}" if failure else ""
         return not failure
 
     def _solve(self, problem: Any) -> Any:

@@ -30,7 +30,7 @@ class FlowSteps:
             if not flow.advance(step):
                 self._dt = 0.4 * step
                 if self._dt < SHORTEST * self._end:
-                    return f"steps of {step:.3g} s do not converge at {flow.time / DAY:.3g} days"
+                    return f"steps of {step:.3g} s do not converge at {flow.time / DAY:.3g} days: {flow.reason}"
                 continue
             after()
             if flow.iterations <= FEW_ITERATIONS:
