@@ -30,12 +30,15 @@ class Quantity:
         unit: as shown; "-" for none.
         scale: shown value = value in SI units times this.
         colours: a perceptually uniform colour map of Matplotlib.
+        least_range: narrowest colour scale, in the shown unit, of a quantity that varies little about a value far from zero;
+            if not given, scales of positive values begin at zero.
     """
 
     name: str
     unit: str
     scale: float = 1.0
     colours: str = "viridis"
+    least_range: float | None = None
 
     @property
     def label(self) -> str:
@@ -108,7 +111,10 @@ def colour_limits(quantity: Quantity, values: Iterable[NDArray]) -> tuple[float,
         return 0.0, 1.0
     low = min(np.percentile(frame, 1) for frame in shown)
     high = max(np.percentile(frame, 99) for frame in shown)
-    if all(frame.min() >= 0 for frame in shown):
+    if quantity.least_range is not None:
+        missing = max(0.0, quantity.least_range - (high - low))
+        low, high = low - 0.5 * missing, high + 0.5 * missing
+    elif all(frame.min() >= 0 for frame in shown):
         low = 0.0
     if not high > low:
         low, high = low - 0.5, high + 0.5

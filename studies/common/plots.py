@@ -37,7 +37,7 @@ SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="infern
 VERTICAL_STRESS = Quantity("Vertical stress", "kPa", scale=1e-3, colours="viridis")
 PORE_PRESSURE = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
 WATER_PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
-POROSITY = Quantity("Porosity", "-", colours="cividis")
+POROSITY = Quantity("Porosity", "-", colours="cividis", least_range=0.02)
 SPEED = Quantity("Speed", "m/s", colours="plasma")
 
 

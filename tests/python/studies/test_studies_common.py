@@ -222,6 +222,9 @@ def test_colour_limits_hold_over_time_and_are_round():
         plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[0]
         < plots.colour_limits(plots.DISPLACEMENT, [np.zeros(5)])[1]
     )
+    low, high = plots.colour_limits(plots.POROSITY, [np.full(100, 0.45), np.linspace(0.449, 0.452, 100)])
+    assert 0.43 <= low <= 0.44 and 0.46 <= high <= 0.47  # not from zero, where no change would show
+    assert plots.colour_limits(plots.POROSITY, [np.linspace(0.4, 0.5, 1000)]) == (0.4, 0.5)
 
 
 def has_colour(path):
