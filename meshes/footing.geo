@@ -4,7 +4,8 @@ DefineConstant[
   half_width = 0.5,  // of the footing
   width = 6.0, depth = 3.0,
   edge_size = 0.02,  // of the cells at the edge of the footing, where the stress jumps
-  near_size = 0.1,   // of the cells under and beside the footing
+  cell_size = 0.1,
+  near_size = cell_size,  // of the cells under and beside the footing
   far_size = 0.6
 ];
 

@@ -69,7 +69,7 @@ def test_particles_begin_at_rest(dilation, nmd, tmp_path):
 
     path = tmp_path / "site.toml"
     site = SITE.replace("friction_angle = 25.0", f"friction_angle = 25.0\ndilation_angle = {dilation}")
-    site = site.replace("[[0.0, 0.0], [10.0, 20e3]]", "0.0").replace("near_size = 0.25", "near_size = 1.0")
+    site = site.replace("[[0.0, 0.0], [10.0, 20e3]]", "0.0").replace("cell_size = 0.25", "cell_size = 1.0")
     path.write_text(site.replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
     ground = read_consolidation_site(path, MPI.COMM_SELF)
     fem = ground.at_rest(water.Element.STABILISED, nmd)
