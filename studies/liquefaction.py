@@ -25,7 +25,7 @@ from common.figures import Pictures, save_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
-from common.plots import CURVES, Scene, paper_style, save_particles
+from common.plots import CURVES, Scene, colour_limits, paper_style, save_particles
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -184,15 +184,17 @@ def draw_course(path: Path, history: History) -> None:
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The course of the slide, the particles at three times, and a film."""
-    pictures = body_runs.body_pictures(a, scene, result, folder, f"after {result.history['time_s'][-1]:.3g} s")
+    pictures = body_runs.body_pictures(a, scene, result, folder, f"$t$ = {result.history['time_s'][-1]:.3g} s")
     if scene is None or not pictures:
         return pictures
     frames = result.frames
-    for name, frame in {"start": frames[0], "slide": frames[len(frames) // 4], "end": frames[-1]}.items():
-        for key, quantity in WET_QUANTITIES.items():
+    shown = {"start": frames[0], "slide": frames[len(frames) // 4], "end": frames[-1]}
+    for key, quantity in WET_QUANTITIES.items():
+        limits = colour_limits(quantity, [frame[key] for frame in shown.values()])
+        for name, frame in shown.items():
             pictures[f"{key}_{name}"] = partial(
                 save_particles, folder / f"{key}_{name}.png", scene, frame["position"], frame["volume"], frame[key], quantity,
-                title=f"after {float(frame['time']):.3g} s",
+                limits=limits, title=f"$t$ = {float(frame['time']):.3g} s",
             )  # fmt: skip
     return {"course": lambda: draw_course(folder / "course.png", result.history), **pictures}
 
