@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
@@ -89,8 +90,16 @@ def draw_bar(
     colours = ScalarMappable(Normalize(*limits), quantity.colours)
     extend = "both" if has_less else "max"
     bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend, ticks=copy(ROUND_TICKS))
+    _shorten(bar)
     bar.set_label(quantity.label, labelpad=2)
     bar.outline.set_linewidth(0.5)
+
+
+def _shorten(bar: Colorbar) -> None:
+    """Take the power of ten out of small numbers, which would overlap: it is written at the end of the bar."""
+    bar.formatter.set_powerlimits((-3, 5))
+    bar.formatter.set_useMathText(True)
+    bar.update_ticks()
 
 
 def save_particles(
