@@ -16,12 +16,12 @@ from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
 from common.flow_steps import FlowSteps
-from common.options import add_count, add_number, study_parser
+from common.options import add_count, add_number, add_switch, study_parser
 from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.seepage_plots import SATURATION, FlowPicture, dries, flow_picture, save_flow
+from common.seepage_plots import SATURATION, FlowPicture, dries, flow_picture, save_flow, save_flow_film
 from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, in_days, read_water_site
@@ -33,6 +33,9 @@ from fenics_bridge.compat import cell_dofs
 
 comm = MPI.COMM_WORLD
 
+FILM_FRAMES = 60
+"""Frames of the film, evenly over time as far as steps are not longer"""
+
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
 
@@ -43,6 +46,7 @@ def parser() -> ArgumentParser:
     add_site_file(p, "dam", "soils and boundaries", ("P1", ("P1", "P2"), "linear or quadratic triangles"))
     add_number(p, "--days", 60.0, "days", "duration of transient flow, if boundary values change", above=0)
     add_count(p, "--frames", 6, "number of pictures of the flow over time")
+    add_switch(p, "--film", True, "draw a film of the flow over time")
     return p
 
 
@@ -79,7 +83,9 @@ class Files(FieldFiles):
         self.output.write(flow.time, fields, {"velocity": means})
 
 
-def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None]) -> str | None:
+def follow(
+    a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None], film: list[FlowPicture | None]
+) -> str | None:
     """The flow in time, with steps as long as Newton's method takes well. Returns why it ended early, if it did. Collective."""
     end = DAY * a.days
     steps = FlowSteps(flow, end)
@@ -87,6 +93,8 @@ def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowP
 
         def made() -> None:
             files.row()
+            if a.film and flow.time >= end * len(film) / FILM_FRAMES:
+                film.append(flow_picture(flow, f"After {in_days(flow.time)}"))
             progress.show(flow.time / DAY, len(files.history))
 
         for frame in np.linspace(0.0, end, a.frames + 1)[1:]:
@@ -101,8 +109,10 @@ def follow(a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowP
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
-def drawn(site: WaterSite, files: Files, pictures: list[FlowPicture | None], folder: Path) -> Pictures:
-    """Head, flow lines and water table of each frame, and the inflows over time."""
+def drawn(
+    site: WaterSite, files: Files, pictures: list[FlowPicture | None], film: list[FlowPicture | None], folder: Path
+) -> Pictures:
+    """Head, flow lines and water table of each frame and in a film, and the inflows over time."""
     shown = [picture for picture in pictures if picture is not None]
     saturation: Pictures = {}
     if shown and dries(shown):
@@ -111,12 +121,14 @@ def drawn(site: WaterSite, files: Files, pictures: list[FlowPicture | None], fol
         return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown), **saturation}
     history = files.history
     curves = {c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary}
+    moving = [picture for picture in film if picture is not None]
     axes, limits = ("Time [days]", "Inflow [m$^2$/day]"), ((0, None), (None, None))
     return {
         "seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown[:1]),
         "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", shown),
         **saturation,
         "inflow.png": lambda: save_curves(folder / "inflow.png", curves, axes, limits=limits),
+        **({"film": lambda: save_flow_film(folder / "film", moving)} if len(moving) > 1 else {}),
     }
 
 
@@ -141,11 +153,12 @@ def main(arguments: list[str] | None = None) -> int:
     flow.solve()
     steady = {name: DAY * flow.inflow(name) for name in names}
     pictures, stopped = [flow_picture(flow, "Steady flow at the beginning")], None
+    film = pictures[:1]
     with Files(flow, names, folder) as files:
         files.row()
         files.frame()
         if site.varies:
-            stopped = follow(a, flow, files, pictures)
+            stopped = follow(a, flow, files, pictures, film)
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped,
         **{f"steady_inflow_{name}_m2_per_day": value for name, value in steady.items()},
@@ -154,7 +167,9 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     lines = [f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day" for name, value in steady.items()]
     page = Page(captions=CAPTIONS)
-    return write_summary(folder, a, summary, comm, page, drawn(site, files, pictures, folder), said="\n".join(lines))
+    return write_summary(
+        folder, a, summary, comm, page, drawn(site, files, pictures, film, folder), said="\n".join(lines)
+    )
 
 
 if __name__ == "__main__":

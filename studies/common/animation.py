@@ -7,9 +7,10 @@ import errno
 import itertools
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -33,6 +34,8 @@ from .plots import (
     paper_style,
 )
 from .progress import counted
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -96,14 +99,28 @@ def save_animation(
     if not frames:
         raise ValueError("frames is empty, expected at least one")
     limits = limits or colour_limits(quantity, [frame.values for frame in frames])
+    corners = scene.limits([frame.position for frame in frames], [frame.bodies for frame in frames])
+    return save_film(path, frames, lambda shown: _pictures(scene, shown, quantity, limits, corners), seconds)
+
+
+def save_film(
+    path: Path,
+    frames: Sequence[T],
+    pictures_of: Callable[[Iterable[T]], Iterator[np.ndarray]],
+    seconds: float = 10.0,
+) -> Path:
+    """Write a film of any frames; see `save_animation` for path, seconds and what is returned.
+
+    Args:
+        frames: in the order shown, at least one.
+        pictures_of: draws frames as pixels (height, width, 4), even numbers of them, all of one size.
+    """
     shown = frames[:: max(1, -(-len(frames) // int(FASTEST * seconds)))]
     rate = min(FASTEST, max(1, round(len(shown) / min(SHORTEST, seconds))))
     has_ffmpeg = shutil.which("ffmpeg") is not None
     path = path.with_suffix(".mp4" if has_ffmpeg else ".gif")
     with expendable(path) as aside:
-        corners = scene.limits([frame.position for frame in frames], [frame.bodies for frame in frames])
-        pictures = _pictures(scene, counted("film, frames", shown), quantity, limits, corners)
-        (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures, rate)
+        (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures_of(counted("film, frames", shown)), rate)
     return path
 
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
+from .animation import save_film
 from .field_plots import Field, gathered
 from .figures import save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
@@ -81,37 +84,63 @@ def dries(pictures: Sequence[FlowPicture]) -> bool:
 
 def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> None:
     """Draw a panel for each flow, above one another, with one scale of the quantity."""
-    points = pictures[0].head.points
-    low, high = points.min(axis=0), points.max(axis=0)
+    with paper_style():
+        figure = _figure(pictures, quantity, _scales(pictures, quantity))
+        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+
+
+def save_flow_film(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> Path:
+    """Draw a film of flows in time, with one scale of the quantity; the suffix is that of `save_film`."""
+    scales = _scales(pictures, quantity)
+
+    def pixels(shown: Iterable[FlowPicture]) -> Iterator[np.ndarray]:
+        with paper_style():
+            for picture in shown:
+                figure = _figure([picture], quantity, scales)
+                canvas = FigureCanvasAgg(figure)
+                figure.set_dpi(150)
+                canvas.draw()
+                drawn = np.asarray(canvas.buffer_rgba())
+                yield drawn[: len(drawn) // 2 * 2, : drawn.shape[1] // 2 * 2].copy()
+                plt.close(figure)
+
+    return save_film(path, pictures, pixels)
+
+
+def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[tuple[float, float], float]:
+    """Limits of the quantity as shown, and the largest velocity [m/s], of all pictures."""
     every = np.concatenate([picture.values(quantity) for picture in pictures])
     ticks = ROUND_TICKS.tick_values(every.min(), every.max())
-    fastest = max(float(np.linalg.norm(picture.velocity, axis=1).max()) for picture in pictures)
-    limits, aspect = (ticks[0], ticks[-1]), (high[1] - low[1]) / (high[0] - low[0])
-    levels = np.linspace(*limits, 21)
-    with paper_style():
-        figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.6 * aspect + 0.35) + 0.4), sharex=True,
-                                      squeeze=False, layout="constrained")  # fmt: skip
-        for axes, picture in zip(panels[:, 0], pictures):
-            triangles = Triangulation(*picture.head.points.T, picture.head.cells)
-            axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
-            axes.tricontour(
-                triangles, picture.values(quantity), levels[1:-1], colors="black", linewidths=0.35, alpha=0.6
-            )
-            _flow_lines(axes, triangles, picture, (low, high), fastest)
-            pressure_head = picture.head.values[:, 0]
-            if pressure_head.min() < 0 < pressure_head.max():
-                axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
-            for line in picture.levels:
-                axes.plot(*line.T, color=TABLE, linewidth=1.8)
-            axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
-            axes.set_title(picture.name, loc="left", pad=3)
-            axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
-        panels[-1, 0].set_xlabel("$x$ [m]")
-        bar = figure.colorbar(
-            ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
-        )
-        bar.set_label(quantity.label)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+    return (ticks[0], ticks[-1]), max(float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures)
+
+
+def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[tuple[float, float], float]) -> Figure:
+    """A panel for each flow, above one another."""
+    points = pictures[0].head.points
+    low, high = points.min(axis=0), points.max(axis=0)
+    limits, fastest = scales
+    aspect, levels = (high[1] - low[1]) / (high[0] - low[0]), np.linspace(*limits, 21)
+    figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.6 * aspect + 0.35) + 0.4), sharex=True,
+                                  squeeze=False, layout="constrained")  # fmt: skip
+    for axes, picture in zip(panels[:, 0], pictures):
+        triangles = Triangulation(*picture.head.points.T, picture.head.cells)
+        axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
+        axes.tricontour(triangles, picture.values(quantity), levels[1:-1], colors="black", linewidths=0.35, alpha=0.6)
+        _flow_lines(axes, triangles, picture, (low, high), fastest)
+        pressure_head = picture.head.values[:, 0]
+        if pressure_head.min() < 0 < pressure_head.max():
+            axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
+        for line in picture.levels:
+            axes.plot(*line.T, color=TABLE, linewidth=1.8)
+        axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
+        axes.set_title(picture.name, loc="left", pad=3)
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
+    panels[-1, 0].set_xlabel("$x$ [m]")
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
+    )
+    bar.set_label(quantity.label)
+    return figure
 
 
 def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, box: tuple, fastest: float) -> None:

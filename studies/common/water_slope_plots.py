@@ -11,7 +11,7 @@ import numpy as np
 from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, save_figure
 from .plots import CURVES, paper_style
-from .seepage_plots import PRESSURE, SATURATION, dries, save_flow
+from .seepage_plots import PRESSURE, SATURATION, dries, save_flow, save_flow_film
 from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
@@ -31,10 +31,12 @@ def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[st
     if field is None:
         return {}
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
+    moving = [one.picture for one in instants if one.picture is not None]
     title = f"{in_days(worst.time)}: factor of safety {worst.safety.value:.2f}"
     saturation = {"saturation": lambda: save_flow(folder / "saturation.png", shown, SATURATION)} if dries(shown) else {}
     return {
         **saturation,
+        "flow": lambda: save_flow_film(folder / "flow", moving, PRESSURE),
         "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
         "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),
         "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
