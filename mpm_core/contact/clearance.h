@@ -11,12 +11,15 @@ namespace mpm::contact
 template <int D>
 void keep_clearance(const Mesh<D>& mesh, Contact<D>& contact);
 
-/// Whether a particle of a cell may touch the surface before that has travelled so far. It is no farther from the
-/// centre of its cell than the vertices are; twice as much again is for its radius and for its motion in a step.
+/// Distance from the centre of a cell, over that of its vertices, within which its particles may touch a surface: 1 for
+/// their places, 2 for their radius and their motion in a step.
+inline constexpr double near_reaches = 3;
+
+/// Whether a particle of a cell may touch the surface before that has travelled so far.
 template <int D>
 inline bool may_be_near(const CellBound<D>& bound, double travel)
 {
-  return bound.distance - 3 * bound.reach <= travel;
+  return bound.distance - near_reaches * bound.reach <= travel;
 }
 
 /// A point as it lies to the surface at its start.

@@ -1,5 +1,6 @@
 #include "python/bindings.h"
 
+#include "contact/clearance.h"
 #include "contact/collisions.h"
 #include "model/contacts.h"
 #include "python/arrays.h"
@@ -199,6 +200,7 @@ void bind_contacts_of(py::module_& m)
 
 void bind_contacts(py::module_& m)
 {
+  m.attr("near_reaches") = contact::near_reaches;
   bind_surfaces<2>(m, "2");
   bind_surfaces<3>(m, "3");
   bind_distances<2>(m);

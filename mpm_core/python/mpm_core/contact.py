@@ -293,7 +293,7 @@ def convert_beside(model: Model, surface: Surface) -> None:
     corners = model.mesh.points[model.mesh.cells[: model.mesh.owned_cells]]
     centres = corners.mean(axis=1)
     reach = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1, initial=0.0)
-    model.convert(where=distances(surface, centres) < 3 * reach)
+    model.convert(where=distances(surface, centres) <= _core.near_reaches * reach)
 
 
 def bonds_of(model: Model, surface: Surface) -> NDArray[np.float64]:
