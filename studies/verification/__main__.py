@@ -1,7 +1,7 @@
 """Verification and validation: every case is repeated, and one report compares the results with the expected values.
 
-Writes report.html, verification.json and pictures. Exits with 1 when a check fails; known limits of the method are
-shown and count as none.
+Writes report.html, verification.json and pictures. Exits with 1 when a check fails; known limits of the method are shown, but
+do not count as failures.
 """
 
 from __future__ import annotations

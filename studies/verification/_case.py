@@ -39,6 +39,7 @@ class Check:
         unit: as shown; "-" for none.
         kind: AT_LEAST and AT_MOST count only what is missing to the expected number as error.
         scale: what errors are divided by, in ``unit``; by default the expected number's size.
+        over: name of the scale, which the table adds to the source; required with a scale.
         limit: the reason, where the method is known not to reach the expected number. Such a check is shown with its
             error and counts as no failure.
         method: where several methods find the same quantity, the one of this check; they stand in one row of the table.
@@ -52,8 +53,15 @@ class Check:
     unit: str = "-"
     kind: Kind = Kind.EQUAL
     scale: float | None = None
+    over: str = ""
     limit: str = ""
     method: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.scale is None) != (self.over == ""):
+            raise ValueError(
+                f"over is {self.over!r} with scale={self.scale}, expected the name of the scale, where there is one"
+            )
 
     @property
     def error(self) -> float:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
-from _case import Result
+from _case import Check, Result
 from common.parameters import Parameter
 from common.report import Report, Section, save_report
 from common.versions import versions
@@ -135,13 +135,18 @@ def case_row(name: str, group: str, docstring: str, result: Result, error: str, 
     title, _, text = docstring.strip().partition("\n")
     paragraphs = [" ".join(part.split()) for part in text.strip().split("\n\n")]
     checks = [
-        CheckRow(c.quantity, float(c.expected), c.source, _finite(c.computed), _finite(c.error), float(c.tolerance),
+        CheckRow(c.quantity, float(c.expected), _with_scale(c), _finite(c.computed), _finite(c.error), float(c.tolerance),
                  c.unit, c.kind.value, c.limit, bool(c.passed), c.method)
         for c in result.checks
     ]  # fmt: skip
     return CaseRow(
         name, group, title.rstrip("."), "\n\n".join(paragraphs), checks, result.figures, error, round(seconds, 1)
     )
+
+
+def _with_scale(check: Check) -> str:
+    """The source of the expected value, and the scale of the error where that is another number."""
+    return f"{check.source}; error over {check.over}" if check.over else check.source
 
 
 def _finite(value: float) -> float | None:

@@ -129,21 +129,38 @@ def run(quick: bool, folder) -> Result:
     orders = {name: expected for name, (_, expected) in ELEMENTS.items()}
     orders |= {"particles, wall moved": 2, "particles, wall pressed": 1}
     for name, expected in orders.items():
-        source = "Lamé; rms over the nodes, over the wall's displacement"
+        source = "Lamé, root mean square over the nodes"
         checks.append(Check(f"error of the displacement, {sizes[-1]} cells, {name}", 0.0, source, errors[name][-1],
-                            0.02 if expected == 1 else 2e-3, scale=1.0))  # fmt: skip
-        source = "approximation by linear or quadratic functions" if expected > 1 else "load a third of a cell inside"
+                            0.02 if expected == 1 else 2e-3, scale=1.0, over="the wall's displacement"))  # fmt: skip
+        source = (
+            "approximation by linear or quadratic functions"
+            if expected > 1
+            else "the load acts a third of a cell inside the wall"
+        )
         checks.append(
             Check(f"order of the displacement, {name}", expected, source, order(errors[name]), 0.15, kind=Kind.AT_LEAST)
         )
     for name, values in stress_errors.items():
-        source = "Lamé, mean of each ring; over the pressure"
+        source = "Lamé, mean of each ring"
         checks.append(
-            Check(f"error of the {name} stress, {sizes[-1]} cells, particles", 0.0, source, values[-1], 2e-3, scale=1.0)
+            Check(
+                f"error of the {name} stress, {sizes[-1]} cells, particles",
+                0.0,
+                source,
+                values[-1],
+                2e-3,
+                scale=1.0,
+                over="the pressure",
+            )
         )
         checks.append(
             Check(
-                f"order of the {name} stress, particles", 2, "means of rings", order(values), 0.15, kind=Kind.AT_LEAST
+                f"order of the {name} stress, particles",
+                2,
+                "approximation by means over rings",
+                order(values),
+                0.15,
+                kind=Kind.AT_LEAST,
             )
         )
 

@@ -1,8 +1,8 @@
-"""Motion of bodies of revolution by the explicit scheme: free fall, a ring that breathes, an elastic impact and its energy.
+"""Motion of bodies of revolution by the explicit scheme: free fall, a vibrating ring, and the energy of a vibrating cylinder.
 
-A cylinder on the axis falls through a mesh of uneven cells: it must fall without strain, stress or radial motion. A
-thin ring that widens has hoop stresses only and oscillates with the angular frequency √(E/ρ) / R. A cylinder that is
-released on rough ground vibrates: the sum of kinetic and stored energy equals the work of its weight at all times.
+A cylinder on the axis falls freely through an irregular mesh: it must fall without strain, stress or radial motion. A thin
+ring that widens has hoop stresses only and oscillates with the angular frequency √(E/ρ) / R. A cylinder that is released on
+rough ground vibrates: the sum of kinetic and stored energy equals the work of its weight at all times.
 """
 
 import numpy as np
@@ -49,12 +49,13 @@ def fallen(quick, nmd, integration):
     p, depth = model.particles, GRAVITY * time**2 / 2
     name = "mixed integration" if integration is mpm.Integration.MIXED else "averaged strains" if nmd else "particles"
     return [
-        Check(f"motion along the radius over the depth of fall, {name}", 0.0, "nothing acts along the radius",
-              largest(model, p.displacement[:, 0]) / depth, 1e-9, scale=1.0),
-        Check(f"stress over the weight of the body, {name}", 0.0, "free fall", largest(model, p.stress) / (DENSITY * GRAVITY),
-              1e-6, scale=1.0),
+        Check(f"radial motion over the depth of fall, {name}", 0.0, "no radial force acts",
+              largest(model, p.displacement[:, 0]) / depth, 1e-9, scale=1.0, over="the depth of fall"),
+        Check(f"stress over the unit weight times 1 m, {name}", 0.0, "free fall", largest(model, p.stress) / (DENSITY * GRAVITY),
+              1e-6, scale=1.0, over="the unit weight times 1 m"),
         Check(f"velocity, {name}", GRAVITY * time, "g t", largest(model, p.velocity[:, 1]), 1e-9, "m/s"),
-        Check(f"change of volume, {name}", 0.0, "no strain", model.comm.allreduce(p.volume.sum()) / start - 1, 1e-9, scale=1.0),
+        Check(f"change of volume, {name}", 0.0, "free fall without strain", model.comm.allreduce(p.volume.sum()) / start - 1,
+              1e-9, scale=1.0, over="the volume"),
     ]  # fmt: skip
 
 
@@ -101,9 +102,10 @@ def run(quick: bool, folder) -> Result:
     energy, unexplained = vibrating(cells)
     gap = np.abs(energy[:, 1] + energy[:, 2] - energy[:, 3]).max() / energy[:, 2].max()
     source = "kinetic + stored energy = work of the weight"
-    checks.append(Check("energy that is missing at the nodes, over that stored", 0.0, source, gap, 1e-9, scale=1.0))
-    checks.append(Check("energy that is not explained at the particles, of that at work", 0.0, "conservation of energy",
-                        unexplained, 0.01, scale=1.0))  # fmt: skip
+    checks.append(Check("energy that is missing at the nodes, over the stored energy", 0.0, source, gap, 1e-9, scale=1.0,
+                        over="the stored energy"))  # fmt: skip
+    checks.append(Check("unexplained energy at the particles, over the energy at work", 0.0, "conservation of energy",
+                        unexplained, 0.01, scale=1.0, over="the energy at work"))  # fmt: skip
 
     # --- 4. Pictures -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
@@ -115,7 +117,7 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "energy.png", curves, {"work of the weight": (t, work)},
                         ("Time [s]", "Energy per radian [J]"), limits=((None, None), (0.0, 4.6)), joined=True)  # fmt: skip
     return Result(checks, {
-        "ring.png": "Radial momentum of a thin ring that breathes",
+        "ring.png": "Radial momentum of a thin ring that vibrates",
         "energy.png": "Energies of an elastic cylinder that is released on rough ground",
     })  # fmt: skip
 

@@ -1,18 +1,18 @@
 """Expansion of a cylindrical cavity in undrained clay: the limit pressure s_u (1 + ln I_r).
 
-The inner wall of a ring of Tresca soil between smooth plates is pushed outwards; the ring is computed as a half section. The
-motion of soil that keeps its volume is known: r² - r0² = a² - a0². With the rigidity index I_r = G / s_u it yields up to the
-radius c, c² = I_r (a² - a0²), and in ground of the outer radius b, which is free there,
+The inner wall of a ring of Tresca soil between smooth plates is pushed outwards; the ring is computed as a half section. Since
+the soil keeps its volume, its motion is known: r² - r0² = a² - a0². With the rigidity index I_r = G / s_u the soil yields up
+to the radius c, where c² = I_r (a² - a0²). In ground with a free boundary at the radius b the pressure on the wall is
 
 p = s_u (1 + ln(I_r (1 - (a0/a)²)) - c²/b²)
 
-(Gibson and Anderson 1961; the last term is what the finite ground takes away). Particles expand the cavity to four times its
-radius in quasi-static steps, on a mesh that moves with them, because background nodes at a wall that moves away have no soil.
-At this expansion the exact pressure is 0.065 s_u below its limit, and the outer radius of 500 a0 reduces it by 0.003 to 0.03
-s_u. The pressure is that of the nodes at the wall, and for comparison that of the stresses in the ground, by equilibrium the
-integral of (σ_θ - σ_r) / r.
+(Gibson and Anderson 1961; the last term is the influence of the finite radius of the ground). Particles expand the cavity to
+four times its radius in quasi-static steps, on a mesh that moves with them, because background nodes at a wall that moves away
+have no soil. At this expansion the exact pressure is 0.065 s_u below its limit, and the outer radius of 500 a0 reduces it by
+0.003 to 0.03 s_u. The pressure is computed from the nodal forces at the wall and, for comparison, from the stresses in the
+ground, of which equilibrium requires that the pressure is the integral of (σ_θ - σ_r) / r.
 
-Finite elements of small strains have p = s_u (1 + ln(2 I_r u / a) - c²/b²), which is the limit pressure where 2 u = a.
+For finite elements with small strains p = s_u (1 + ln(2 I_r u / a) - c²/b²), which is the limit pressure at 2 u = a.
 """
 
 import numpy as np
@@ -122,18 +122,18 @@ def run(quick: bool, folder) -> Result:
         name = f"I_r = {rigidity:g}"
         curve = curves[f"$I_r$ = {rigidity:g}"] = expanded(rigidity, cells, end)
         theory = pressure(rigidity, end)
-        source = f"Gibson and Anderson 1961, at a = {end:g} a0; over s_u"
-        checks.append(Check(f"pressure of the wall, {name}, particles", theory, source, curve[-1, 1], 0.01))
+        source = f"Gibson and Anderson 1961, at a = {end:g} a0"
+        checks.append(Check(f"pressure of the wall over s_u, {name}, particles", theory, source, curve[-1, 1], 0.01))
         checks.append(
-            Check(f"pressure by the ground's stresses, {name}, particles", theory, source, curve[-1, 2], 0.005)
+            Check(f"pressure by the ground's stresses over s_u, {name}, particles", theory, source, curve[-1, 2], 0.005)
         )
         if not quick:
             checks.append(
-                Check(f"limit pressure, {name}, particles", limit(rigidity), "1 + ln I_r; over s_u", curve[-1, 1], 0.02)
+                Check(f"limit pressure over s_u, {name}, particles", limit(rigidity), "1 + ln I_r", curve[-1, 1], 0.02)
             )
         found = by_finite_elements(rigidity, cells // 2)
         checks.append(
-            Check(f"limit pressure, {name}, finite elements", limit(rigidity), "1 + ln I_r; over s_u", found, 0.02)
+            Check(f"limit pressure over s_u, {name}, finite elements", limit(rigidity), "1 + ln I_r", found, 0.02)
         )
         radii = np.linspace(1.02, end, 100)
         exact["exact" if rigidity == rigidities[0] else f"_{name}"] = (radii, pressure(rigidity, radii))

@@ -74,8 +74,8 @@ def run(quick: bool, folder) -> Result:
                 Check(f"N_c, {name}: convergence from above", exact, source, min(values), 0.0, kind=Kind.AT_LEAST)
             )
             ratio = (values[-1] - exact) / (values[-2] - exact)
-            checks.append(Check(f"error of N_c over that on cells twice as large, {name}", 0.6, "convergence", ratio,
-                                0.0, kind=Kind.AT_MOST))  # fmt: skip
+            checks.append(Check(f"error of N_c over that on cells twice as large, {name}", 0.6,
+                                "convergence with the cell size", ratio, 0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Pictures -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

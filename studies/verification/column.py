@@ -49,7 +49,8 @@ def run(quick: bool, folder) -> Result:
         top = WEIGHT * HEIGHT**2 / (2 * OEDOMETER)
         worst = np.argmax(np.abs(u - expected))
         checks.append(Check(f"settlement, worst particle, {name}", 1e6 * expected[worst],
-                            "oedometer, u = -w (H y - y²/2) / E_oed", 1e6 * u[worst], 0.01, "µm", scale=1e6 * top))  # fmt: skip
+                            "oedometer, u = -w (H y - y²/2) / E_oed", 1e6 * u[worst], 0.01, "µm", scale=1e6 * top,
+                            over="the settlement of the top"))  # fmt: skip
 
         # --- 4. Stresses of each row: vertical w (H - y), horizontal nu / (1 - nu) of it ----------------------------
         row = np.floor(y / HEIGHT * rows).astype(int)
@@ -61,7 +62,7 @@ def run(quick: bool, folder) -> Result:
             k = 1 + np.argmax(np.abs(mean[inner, column] - ratio * vertical[inner]))
             source = "equilibrium, w (H - y)" + ("" if ratio == 1 else " ν / (1 - ν)")
             checks.append(Check(f"{label} stress, worst row, {name}", ratio * vertical[k], source, mean[k, column], 0.01,
-                                "Pa", scale=WEIGHT * HEIGHT))  # fmt: skip
+                                "Pa", scale=WEIGHT * HEIGHT, over="w H"))  # fmt: skip
         curves[name] = (mean[:, dim - 1] / (WEIGHT * HEIGHT), middle / HEIGHT)
 
     # --- 5. Picture -------------------------------------------------------------------------------------------------

@@ -1,11 +1,12 @@
 """Bodies on a slope: a block of soil that slides or sticks on a rigid plane, and cylinders and spheres that roll on soil.
 
-The slope is modelled by the direction of gravity, which rises over 0.1 s so that bodies do not bounce. A rigid body with the
-acceleration a, which rises during the time T, has travelled the distance a (T²/6 + T u/2 + u²/2) at the time T + u, to which
-the leap-frog scheme adds half a step of the last velocity. The block slides with a = g (sin θ - μ cos θ) on a plane that lies
-along the cells, is inclined to them, or runs through irregular ones; below the angle of friction it stays. A cylinder rolls
-with 2/3 g sin θ where μ ≥ tan θ / 3, a sphere with 5/7 g sin θ where μ ≥ 2/7 tan θ; else they slide and spin up by 2 μ g cos
-θ and 5/2 μ g cos θ over their radius. The plane must not act on a falling block before they touch.
+The slope is modelled by the direction of gravity, which is raised from zero over 0.1 s so that bodies do not bounce. A rigid
+body whose acceleration rises linearly to a during the time T has travelled the distance a (T²/6 + T u/2 + u²/2) at the time T
++ u; the leap-frog scheme adds half a step with the last velocity to it. The block slides with a = g (sin θ - μ cos θ) on a
+plane that lies along the cells, is inclined to them, or runs through irregular ones; on slopes flatter than the friction angle
+it does not move. A cylinder rolls with 2/3 g sin θ where μ ≥ tan θ / 3, a sphere with 5/7 g sin θ where μ ≥ 2/7 tan θ; with
+less friction they slide, with angular accelerations of 2 μ g cos θ and 5/2 μ g cos θ over their radius. The plane must not act
+on a falling block before the block touches it.
 """
 
 import numpy as np
@@ -157,9 +158,10 @@ def run(quick: bool, folder) -> Result:
         computed[f"plane {mesh}"] = tuple(np.array(steep).T)
     for slope, friction in () if quick else STICKS:
         checks.append(Check(f"creep of a block, θ = {slope}°, μ = {friction:g}, over the displacement without friction", 0.0,
-                            "it sticks", crept(slope, friction), TOLERANCE, scale=1.0))  # fmt: skip
-    checks.append(Check("fall of a block before the plane acts on it", 0.2, "the gap; the error is a fraction of a cell",
-                        fallen(), 0.05, "m", scale=CELL))  # fmt: skip
+                            "it sticks", crept(slope, friction), TOLERANCE, scale=1.0,
+                            over="the displacement without friction"))  # fmt: skip
+    checks.append(Check("fall of a block before the plane acts on it", 0.2, "the gap at the start",
+                        fallen(), 0.05, "m", scale=CELL, over="the cell size"))  # fmt: skip
     bodies = [
         ("cylinder", 30, 0.3),
         ("cylinder", 30, 0.1),
@@ -177,8 +179,9 @@ def run(quick: bool, folder) -> Result:
     if comm.rank == 0:
         friction = np.linspace(0.0, 0.55, 60)
         save_comparison(folder / "way.png", computed, {"g (sin θ - μ cos θ)": (friction, way(sliding(30, friction), 1.0))},
-                        ("Friction μ [-]", "Way after 1 s on a slope of 30° [m]"), limits=((0.0, None), (0.0, None)))  # fmt: skip
-    return Result(checks, {"way.png": "Way of a block that slides on a rigid plane"})
+                        ("Friction μ [-]", "Displacement after 1 s on a slope of 30° [m]"),
+                        limits=((0.0, None), (0.0, None)))  # fmt: skip
+    return Result(checks, {"way.png": "Displacement of a block on a rigid plane over the coefficient of friction"})
 
 
 if __name__ == "__main__":

@@ -6,10 +6,10 @@ because the soil at the drained surface consolidates and becomes softer: uncoupl
 of Mandel's plates is prescribed, and the force on them is compared. The ball is axisymmetric. A strip load acts on a layer
 that is so deep and wide that it represents a half-plane.
 
-Three methods are compared: finite elements with quadratic displacement and linear pressure (Taylor-Hood), finite elements
-with linear displacement and pressure and the polynomial pressure projection, and implicit particles, three per cell, on the
-nodes of the latter. The pressure below a strip at once is also computed with averaged volumetric strains (NMD). Time is integrated
-by backward Euler with steps that grow with the time.
+Three methods are compared: finite elements with quadratic displacement and linear pressure (Taylor-Hood), finite elements with
+linear displacement and pressure and the polynomial pressure projection, and implicit particles, three per cell, on the nodes
+of the latter. The pressure below the strip immediately after loading is also computed with averaged volumetric strains (NMD).
+Time is integrated by backward Euler with steps that grow with the time.
 """
 
 from __future__ import annotations
@@ -147,11 +147,12 @@ def layer_checks(element, n, tolerance):
         body.follow(factor)
         moved, _ = body.at((0.1, 1.0))
         settled = -moved[0, 1] * body.law.p_wave_modulus / LOAD
-        checks.append(Check(f"layer, settlement at T = {factor:g}", layer_settlement(factor), "Terzaghi (1923)",
-                            settled, tolerance, scale=1.0, method=name))  # fmt: skip
+        checks.append(Check(f"layer, settlement over the final one at T = {factor:g}", layer_settlement(factor),
+                            "Terzaghi (1923)",
+                            settled, tolerance, scale=1.0, over="the final settlement", method=name))  # fmt: skip
     _, p = body.at((0.1, 0.0))
-    checks.append(Check("layer, pressure at the base at T = 1", layer_pressure([0.0], 1.0)[0], "Terzaghi (1923)",
-                        p[0] / LOAD, tolerance, scale=1.0, method=name))  # fmt: skip
+    checks.append(Check("layer, pressure at the base over the load at T = 1", layer_pressure([0.0], 1.0)[0], "Terzaghi (1923)",
+                        p[0] / LOAD, tolerance, scale=1.0, over="the load", method=name))  # fmt: skip
     return checks
 
 
@@ -165,10 +166,10 @@ def slab_checks(element, n, poisson, tolerance):
         if factor in (0.05, 0.1, 0.5):
             expected = mandel_pressure([0.0], factor, poisson)[0]
             checks.append(Check(f"slab, pressure in the middle over F / 2a at T = {factor:g}, ν = {poisson:g}", expected,
-                                "Mandel (1953)", curve[-1][1], tolerance, scale=1.0, method=name))  # fmt: skip
+                                "Mandel (1953)", curve[-1][1], tolerance, scale=1.0, over="F / 2a", method=name))  # fmt: skip
     force = body.plate_force
-    checks.append(Check(f"slab, force on the plate at T = 1, ν = {poisson:g}", LOAD / 1e3, "the one of Mandel's problem",
-                        force / 1e3, tolerance, "kN/m", method=name))  # fmt: skip
+    checks.append(Check(f"slab, force on the plate at T = 1, ν = {poisson:g}", LOAD / 1e3,
+                        "the constant force of Mandel's problem", force / 1e3, tolerance, "kN/m", method=name))  # fmt: skip
     return checks, np.array(curve).T
 
 
@@ -180,7 +181,7 @@ def ball_checks(element, n, tolerance):
         curve.append((factor, p[0] / LOAD))
         if factor in (0.05, 0.2):
             checks.append(Check(f"ball, pressure at the centre over the load at T = {factor:g}, ν = 0.2",
-                                ball_pressure(factor, 0.2), "Cryer (1963)", curve[-1][1], tolerance, scale=1,
+                                ball_pressure(factor, 0.2), "Cryer (1963)", curve[-1][1], tolerance, scale=1, over="the load",
                                 method=name))  # fmt: skip
     return checks, np.array(curve).T
 
@@ -192,12 +193,13 @@ def strip_checks(element, size, tolerance):
         _, p = body.at((0.0, -depth))
         checks.append(Check(f"strip, initial pressure {depth:g} m below its middle over the load",
                             strip_pressure(depth, 1.0), "q α / π on a half-plane", p[0] / LOAD, tolerance,
-                            scale=1.0, method=name))  # fmt: skip
+                            scale=1.0, over="the load", method=name))  # fmt: skip
     at_once = dip(body)
     body.drain(("surface", "footing"))
     body.advance(1e8 * body.period)
     checks.append(Check("strip, immediate settlement over the final one, ν = 0.2", 1 / (2 * (1 - poisson)),
-                        "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0, method=name))  # fmt: skip
+                        "1 / (2 (1 - ν)) on a half-plane", at_once / dip(body), tolerance, scale=1.0, over="the final settlement",
+                        method=name))  # fmt: skip
     return checks
 
 
@@ -227,8 +229,8 @@ def alternation_checks(cells_high):
     for element in (water.Element.STABILISED, PARTICLES):
         found[f"{NAMES[element]}, NMD"] = alternation(element, cells_high, nmd=True)
     return [
-        Check("strip, alternation of the initial pressure from node to node", found["P2-P1"], "the field of P2-P1", value, 0.1,
-              kind=Kind.AT_MOST, method=name)
+        Check("strip, alternation of the initial pressure from node to node", found["P2-P1"],
+              "alternation in the P2-P1 elements", value, 0.1, kind=Kind.AT_MOST, method=name)
         for name, value in found.items() if name != "P2-P1"
     ]  # fmt: skip
 

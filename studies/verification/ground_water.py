@@ -1,11 +1,12 @@
-"""Ground water: a dam and a sheet pile, slopes through which water seeps, and water that falls over level ground.
+"""Ground water: a dam, a sheet pile, slopes with seepage, and a water level that falls above level ground.
 
-Dupuit's discharge of a dam with vertical faces, k (h₁² - h₂²) / 2L, is exact in spite of the seepage face (Charny 1951); the
-flow under a sheet pile at the depth s in a layer T is that of conformal mapping, q / (k h) = K' / 2K with the modulus sin(π s
-/ 2T) (Polubarinova-Kochina 1962). The singularity at the tip of the pile causes an error in proportion to the cell size, and
-the ends of a slope one in inverse proportion to its length, so that the limit is extrapolated from two sizes. Lowering water
-that stands over level ground changes no effective stress and moves nothing, whatever the conductivity: the load on the
-surface falls by as much as the pressure in the pores.
+Dupuit's discharge of a dam with vertical faces, k (h₁² - h₂²) / 2L, is exact in spite of the seepage face (Charny 1951);
+conformal mapping gives the flow under a sheet pile of the depth s in a layer of the thickness T, q / (k h) = K' / 2K with
+complete elliptic integrals K of the modulus sin(π s / 2T) (Polubarinova-Kochina 1962). The singularity at the tip of the pile
+causes an error in proportion to the cell size, and the ends of a slope cause one in inverse proportion to its length; both
+limits are therefore extrapolated from two sizes. When water that stands above level ground is lowered, effective stresses and
+displacements do not change, whatever the conductivity, because the load on the surface falls by the same amount as the pore
+pressure.
 """
 
 from __future__ import annotations
@@ -174,10 +175,14 @@ def level_ground_checks(method, conductivity):
     elastic = 5.0 * WATER * 3.0 / soil.p_wave_modulus
     name, where = METHODS[method], f"water level falls by 5 m over level ground, k = {conductivity:g} m/s"
     return [
-        Check(f"{where}: change of the effective stress over that of the water", 0.0, "load and pore pressure fall alike",
-              (body.mean_stress()[1] - stress) / (5.0 * WATER), 1e-5, scale=1.0, method=name),
-        Check(f"{where}: settlement over that under such a load", 0.0, "load and pore pressure fall alike",
-              (body.displacement((1.0, 3.0))[1] - moved) / elastic, 1e-5, scale=1.0, method=name),
+        Check(f"{where}: change of the effective stress over that of the water's load", 0.0,
+              "the load and the pore pressure fall by the same amount",
+              (body.mean_stress()[1] - stress) / (5.0 * WATER), 1e-5, scale=1.0, over="the change of the water's load",
+              method=name),
+        Check(f"{where}: settlement over that of dry ground under this change of load", 0.0,
+              "the load and the pore pressure fall by the same amount",
+              (body.displacement((1.0, 3.0))[1] - moved) / elastic, 1e-5, scale=1.0, over="the settlement of dry ground",
+              method=name),
     ]  # fmt: skip
 
 

@@ -4,7 +4,7 @@ A part of the paper's slope yields under 16 kN/m³. It is computed by linear and
 particles. Their stresses balance the weight of the particles exactly, whatever the law, so that nothing moves in explicit
 steps without damping. Then the weight rises to 19 kN/m³: in quasi-static steps with small displacements, particles are
 equivalent to the finite elements and must have the same stresses, also where the soil yields. Stresses from elements on
-another, unstructured mesh balance only up to the error of both meshes; one step without load restores equilibrium.
+another, unstructured mesh balance only up to the error of both meshes; one step without a change of load restores equilibrium.
 """
 
 from __future__ import annotations
@@ -60,9 +60,10 @@ def at_rest(cell: float, degree: int) -> list[Check]:
     name = "linear elements" if degree == 1 else "quadratic elements"
     drift = moved(case, np.zeros_like(case.model.particles.displacement)) / scale
     return [
-        Check(f"out-of-balance ratio, {name}", 0.0, IDENTITY, report.unbalanced_ratio, 1e-8, scale=1.0),
-        Check(f"motion in {REST:g} s without damping, {name}", 0.0, f"{IDENTITY}; over that of the elements", drift,
-              1e-5, scale=1.0),
+        Check(f"out-of-balance ratio, {name}", 0.0, IDENTITY, report.unbalanced_ratio, 1e-8, scale=1.0,
+              over="the external forces"),
+        Check(f"motion in {REST:g} s without damping, {name}", 0.0, IDENTITY, drift, 1e-5, scale=1.0,
+              over="the largest displacement of the elements"),
     ]  # fmt: skip
 
 
@@ -80,13 +81,13 @@ def raised(cell: float, steps: int) -> tuple[list[Check], np.ndarray, np.ndarray
     expected, found = fem.evaluate_at(places)["stress"] - before, model.particles.stress - before
     comm = model.comm
     apart, scale = (comm.allreduce(float(np.abs(a).max(initial=0.0)), MPI.MAX) for a in (found - expected, expected))
-    check = Check(f"largest difference of stresses under {RAISED / 1e3:g} kN/m³", 0.0, f"{IDENTITY}; over their largest change",
-                  apart, 1e-5, "Pa", scale=scale)  # fmt: skip
+    check = Check(f"largest difference of stresses under {RAISED / 1e3:g} kN/m³", 0.0, IDENTITY,
+                  apart, 1e-5, "Pa", scale=scale, over="the largest change of stress")  # fmt: skip
     yielded = comm.allreduce(int((model.particles.state[:, 0] > 0).sum())) / comm.allreduce(len(places))
     part = Check(
-        "part of the particles that has yielded by then",
+        "fraction of the particles that have yielded by then",
         0.02,
-        "else the case would be elastic",
+        "otherwise the case would be elastic",
         yielded,
         0.0,
         kind=Kind.AT_LEAST,
@@ -99,17 +100,26 @@ def other_mesh(cell: float) -> list[Check]:
     case = slope(cell)
     mesh = bridge.slope_mesh(MPI.COMM_WORLD, cell_size=cell, kind="gmsh")
     report = bridge.initialise(case.model, finite_elements(case, 2, mesh), count_displacement=False)
-    of_cells = "error of the cells"
+    of_cells = "no yielding, up to the error of both meshes"
     return [
         Check(
             "out-of-balance ratio after a step without load, another mesh",
             0.0,
-            "equilibrium",
+            "equilibrium of the particles",
             report.equilibrated_ratio,
             1e-5,
             scale=1.0,
+            over="the external forces",
         ),
-        Check("particles that yielded in it", 0.0, of_cells, report.yielded_fraction, 0.1, scale=1.0),
+        Check(
+            "fraction of the particles that yielded in this step",
+            0.0,
+            of_cells,
+            report.yielded_fraction,
+            0.1,
+            scale=1.0,
+            over="the number of particles",
+        ),
     ]
 
 

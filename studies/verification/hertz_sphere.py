@@ -1,13 +1,13 @@
-"""A rigid sphere pressed on an elastic half space: force, contact radius and pressure of Hertz (1882).
+"""A rigid sphere pressed on an elastic half-space: force, contact radius and pressure after Hertz (1882).
 
-The sphere of radius R is a contact body, the half space a half section of 40 contact radii that is finest where they touch.
-For an indentation d the contact radius is a = sqrt(R d), and the force F = 4/3 E* sqrt(R) d^1.5 with E* = E / (1 - nu^2). The
-ground beyond 40 a, which is missing, would reduce the force by 1 to 2 %. The springs of contact, which let particles
-penetrate the sphere by a fraction of the pressure over the stiffness of a cell, reduce the computed force by about as much.
+The sphere of radius R is a rigid contact body; the half-space is a half section of 40 contact radii, whose cells are smallest
+under the sphere. For an indentation d the contact radius is a = sqrt(R d), and the force F = 4/3 E* sqrt(R) d^1.5 with E* = E
+/ (1 - nu^2). The ground beyond 40 a, which is missing, would reduce the force by 1 to 2 %. The penalty stiffness of contact,
+which lets particles penetrate the sphere slightly, reduces the computed force by about as much.
 
-The pressure p_0 sqrt(1 - (r / a)^2), p_0 = 2 E* a / (pi R), is that of implicit steps with a hundredth of the indentation,
-since Hertz' strains are small. Particles that share nodes share the force on these, so that the pressure is a mean over
-rings.
+The pressure p_0 sqrt(1 - (r / a)^2), p_0 = 2 E* a / (pi R), is compared in implicit steps with a hundredth of the indentation,
+since Hertz's theory assumes small strains. Contact forces of neighbouring particles are distributed by their common nodes, so
+that pressures are compared as means over rings.
 """
 
 import numpy as np
@@ -137,7 +137,7 @@ def run(quick: bool, folder) -> Result:
         Check("pressure at the centre over p_0, mean within a/6", hertz[0], HERTZ, found[0], 0.2 if quick else 0.05)
     )
     checks.append(Check("root mean square error of the pressure in six rings, over p_0", 0.0, HERTZ, spread,
-                        0.15 if quick else 0.05, scale=1.0, kind=Kind.AT_MOST))  # fmt: skip
+                        0.15 if quick else 0.05, scale=1.0, over="p_0", kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Pictures --------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
@@ -150,8 +150,8 @@ def run(quick: bool, folder) -> Result:
                         {HERTZ: (r, np.sqrt(1 - r**2))}, ("Distance from the axis over a [-]", "Pressure over $p_0$ [-]"),
                         limits=((0.0, 1.0), (0.0, None)))  # fmt: skip
     return Result(checks, {
-        "force.png": "Force on a sphere of 1 m that is pressed on an elastic half space",
-        "pressure.png": "Pressure between sphere and half space",
+        "force.png": "Force on a sphere of 1 m that is pressed on an elastic half-space",
+        "pressure.png": "Pressure between sphere and half-space",
     })  # fmt: skip
 
 

@@ -5,11 +5,11 @@ along its axis only, and its stretch λ determines the stress: Hencky's law has 
 Compression stiffens it, so that hitting the wall sends a shock into the bar, with the speed U in the undeformed bar that
 follows from the balance of momentum across it, ρ U² = [σ] / [λ], and the velocity U (1 - λ). Tension softens it: the wave
 spreads into a fan, and dv = c(λ) dλ with c² = (dσ/dλ) / ρ gives the velocity 2/3 c₀ (1 - (1 - ln λ)^(3/2)). Behind the wave
-the bar is at rest with one stretch and one stress. A law that is linear in the Cauchy stress gives a stress that is a tenth
-lower after the impact.
+the bar is at rest, with a uniform stretch and stress. A law that is linear in the Cauchy stress would give a stress after the
+impact that is a tenth lower.
 
-Behind the shock particles oscillate; a PIC fraction of 20 % damps this, so that the means are not affected. Particles cross
-from cell to cell.
+Particles oscillate behind the shock; a PIC fraction of 20 % damps this motion, so that mean values are not affected. Particles
+cross from cell to cell.
 """
 
 import numpy as np
@@ -64,15 +64,15 @@ def run(quick: bool, folder) -> Result:
         )
         place, position, stress, density, mass = np.concatenate(comm.allgather(own)).T
         behind = place < 0.7 * front * time
-        source = "balance of momentum across the shock" if stretch < 1 else "simple wave"
+        source = "balance of momentum across the shock" if stretch < 1 else "simple wave of tension"
         checks.append(Check(f"stress at the wall, {name}", MODULUS * np.log(stretch) / stretch, source,
                             np.average(stress[behind], weights=mass[behind]), 0.02 if quick else 0.01, "Pa"))  # fmt: skip
         slope = np.polyfit(place[behind], position[behind], 1)[0]
         checks.append(Check(f"stretch at the wall, {name}", stretch, source, slope, 0.005))
         volume = DENSITY * np.sum(mass[behind] / density[behind]) / mass[behind].sum()
         checks.append(Check(f"volume at the wall, {name}", stretch, "mass over density", volume, 0.01, "of the start"))
-        checks.append(Check(f"unexplained energy, {name}", 0.0, "works, stored energy and losses add up",
-                            abs(report.unexplained_fraction), 0.01, scale=1.0))  # fmt: skip
+        checks.append(Check(f"unexplained energy, {name}", 0.0, "energy balance: works, stored energy and losses add up",
+                            abs(report.unexplained_fraction), 0.01, scale=1.0, over="the energy at work"))  # fmt: skip
 
         # --- 4. Means of the particles of each cell, and what the wave leaves behind ---------------------------------
         number = np.floor(place / cell).astype(int)
@@ -83,8 +83,10 @@ def run(quick: bool, folder) -> Result:
 
     # --- 5. Picture -------------------------------------------------------------------------------------------------
     if comm.rank == 0:
-        save_comparison(folder / "stress.png", computed, exact, ("Place in the undeformed bar [m]", "Stress [kPa]"))
-    return Result(checks, {"stress.png": "Stress along the bar; lines: exact, as far as the wave has passed"})
+        save_comparison(folder / "stress.png", computed, exact, ("Position in the undeformed bar [m]", "Stress [kPa]"))
+    return Result(
+        checks, {"stress.png": "Stress along the bar: particles, and the exact solution behind the wave as lines"}
+    )
 
 
 if __name__ == "__main__":

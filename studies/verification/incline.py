@@ -1,10 +1,10 @@
 """Cylinder on an inclined plane: it slides without friction and rolls without slip.
 
-A solid elastic cylinder lies on the plane through the background mesh alone: nodes on the plane move along it only (sliding)
-or not at all (rolling). The axes are parallel and normal to the plane; gravity is inclined. The centre of the sliding
-cylinder moves by g sin(α) t²/2, that of the rolling one by two thirds of this, since its moment of inertia is m R²/2. The
-cylinder starts one cell above the plane, where the contact by nodes begins: particles that are placed on fixed nodes without
-stress would have to be pulled off them.
+A solid elastic cylinder is in contact with the plane by the nodes of the background mesh alone: nodes on the plane move along
+it only (sliding) or not at all (rolling). The axes are parallel and normal to the plane; gravity is inclined. The centre of
+the sliding cylinder moves by g sin(α) t²/2, that of the rolling one by two thirds of this, since its moment of inertia is m
+R²/2. The cylinder starts one cell above the plane, where this contact begins; particles that start without stress at fixed
+nodes would have to be pulled off them.
 """
 
 import numpy as np

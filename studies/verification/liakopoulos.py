@@ -1,15 +1,15 @@
-"""Drainage of a sand column: soil that dries and shrinks (Liakopoulos), and rain on its way to a water table.
+"""Unsaturated soil: drainage of a sand column (Liakopoulos), and steady rain above a water table.
 
 In the experiment of Liakopoulos (1965) water first seeped through a column of Del Monte sand, 1 m high, under its weight
-alone; then the inflow at the top was closed, and the column drained at its base. Its retention curve and permeability are S =
-1 - 1.9722e-11 s^2.4279 (suction s in Pa) and k_r = 1 - 2.207 (1 - S)^1.0121; k = 4.41e-6 m/s, n = 0.2975, and, as is
+alone; then the inflow at the top was closed, and the column drained at its base. Its retention curve and relative permeability
+are S = 1 - 1.9722e-11 s^2.4279 (suction s in Pa) and k_r = 1 - 2.207 (1 - S)^1.0121; k = 4.41e-6 m/s, n = 0.2975, and, as is
 customary, E = 1.3 MPa and ν = 0.4 (Lewis and Schrefler 1998). The expected values are those of OpenGeoSys with quadratic
-displacement, linear pressure and lumped storage: its test RichardsMechanics/LiakopoulosHM records the smallest pressure and
-the largest displacement after 600 and 7,200 s. Both programs use backward Euler with the same time steps. Air stays at
-atmospheric pressure, and effective stresses are those of Bishop.
+displacement, linear pressure and lumped storage, whose test RichardsMechanics/LiakopoulosHM gives the smallest pressure and
+the largest displacement after 600 and 7,200 s. Both programs use backward Euler with the same time steps. The air stays at
+atmospheric pressure, and effective stresses are defined after Bishop.
 
 Steady rain of half the conductivity above a water table, with k_r = e^(αψ), has a closed form (Gardner 1958; Srivastava and
-Yeh 1991). On particles it falls on the free surface.
+Yeh 1991). In the computation with particles the rain falls on their free surface.
 """
 
 from __future__ import annotations
@@ -86,10 +86,12 @@ def drainage(element, cells):
                 published, moved_there = PUBLISHED[time]
                 checks.append(Check(f"pressure of the water at the top after {time} s", published / 1e3, "OpenGeoSys",
                                     pressure[-1] / 1e3, 0.01, "kPa", method=name))  # fmt: skip
-                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved[-1, 1],
-                                    0.01, "mm", method=name))  # fmt: skip
-                checks.append(Check(f"error of the water balance after the step to {time} s, over the pores", 0.0, "balance",
-                                    report.water_error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
+                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys",
+                                    1e3 * moved[-1, 1], 0.01, "mm", method=name))  # fmt: skip
+                checks.append(Check(f"error of the water balance of the step to {time} s, over the volume of the pores", 0.0,
+                                    "conservation of the water's volume",
+                                    report.water_error / (0.1 * POROSITY), 1e-8, scale=1.0,
+                                    over="the volume of the pores", method=name))  # fmt: skip
     return checks, profiles
 
 
@@ -168,11 +170,12 @@ def drainage_of_particles(cells):
                                    (model.particles.pore_pressure, model.particles.displacement[:, 1]))  # fmt: skip
                 checks.append(Check(f"pressure of the water at the top after {time} s", published / 1e3, "OpenGeoSys",
                                     pressure / 1e3, 0.01, "kPa", method=name))  # fmt: skip
-                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys", 1e3 * moved, 0.01, "mm",
-                                    method=name))  # fmt: skip
+                checks.append(Check(f"displacement of the top after {time} s", moved_there, "OpenGeoSys",
+                                    1e3 * moved, 0.01, "mm", method=name))  # fmt: skip
                 error = model.water_volume() - held - (model.water_inflow() - entered)
-                checks.append(Check(f"error of the water balance after the step to {time} s, over the pores", 0.0, "balance",
-                                    error / (0.1 * POROSITY), 1e-8, scale=1.0, method=name))  # fmt: skip
+                checks.append(Check(f"error of the water balance of the step to {time} s, over the volume of the pores", 0.0,
+                                    "conservation of the water's volume", error / (0.1 * POROSITY), 1e-8, scale=1.0,
+                                    over="the volume of the pores", method=name))  # fmt: skip
     return checks
 
 

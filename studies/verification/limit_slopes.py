@@ -1,15 +1,16 @@
-"""Slopes at collapse, over angles and friction angles, against the stability factors of limit analysis.
+"""Slopes at collapse: stability factors over slope angle and friction angle, against those of limit analysis.
 
-The stability factor is γH/c at collapse. Limit analysis minimises it over all rotations about a logarithmic spiral
-through the toe, with associated flow (Chen 1975), here repeated for each slope. On flat slopes with little friction the
-spiral dips below the level of the toe before it rises to it. Where that is more than a hundredth of the height, the
-ground below and before the toe is of the same soil; else it is rigid. Quadratic finite elements raise the weight to the
-last equilibrium, in steps that begin with c/H and are bisected to 0.5 % of the weight. Both are upper bounds: finite
-elements converge from above and may end below the spiral where another mechanism is more critical. A slope of 30° with
-a friction angle of 30° carries any weight.
+The stability factor is γH/c at collapse. Limit analysis with associated flow minimises it over all rotational mechanisms along
+a logarithmic spiral through the toe (Chen 1975); this is repeated here for each slope. On flat slopes with little friction the
+spiral dips below the level of the toe before it rises to it. If it does so by more than a hundredth of the height, the ground
+below and in front of the toe is of the same soil; otherwise it is rigid. Quadratic finite elements raise the weight to the
+last equilibrium, in steps that begin with c/H and are bisected to 0.5 % of the weight. Both are upper bounds: finite elements
+converge from above and may end below the spiral where another mechanism is more critical. A slope of 30° with a friction angle
+of 30° carries any weight.
 
-Flat slopes of clay, which has no friction, fail deep below the toe: spirals are circles that end before it and reach down to the
-rigid base of the ground. Their factors are the inverse of Taylor's stability numbers (1937, Stability of earth slopes).
+Flat slopes of clay without friction fail deep below the toe: the spirals are circles that end in front of the toe and reach
+down to the rigid base of the ground. Their factors are the inverse of Taylor's stability numbers (1937, Stability of earth
+slopes).
 """
 
 import numpy as np

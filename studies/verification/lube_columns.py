@@ -1,19 +1,18 @@
 """Columns of sand that spread on all sides: run-out and height over their aspect ratio, after Lube et al. (2004).
 
-A cylinder of sand, a times as high as its radius r0, is released on rough ground, computed as a half section. Lube,
-Huppert, Sparks and Hallworth (J. Fluid Mech. 508, 175-199) found, for many sorts of grains, a run-out past its foot of
-1.24 a r0 where a < 1.7 and of 1.6 √a r0 above; a height of the deposit that stays a r0 where a < 1 and is 0.88 a^(1/6)
-r0 where a > 1.7.
+A cylinder of sand, whose height is a times its radius r0, is released on rough ground and computed as a half section. Lube,
+Huppert, Sparks and Hallworth (J. Fluid Mech. 508, 175-199) found, for many sorts of grains, a run-out past its foot of 1.24 a
+r0 for a < 1.7 and of 1.6 √a r0 for larger a, and a height of the deposit of a r0 for a < 1 and of 0.88 a^(1/6) r0 for a > 1.7.
 
-The sand has an angle of repose of 31°. The experiments hardly depend on this angle, but the computed run-outs do. With
-the friction angle of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders
-run less far and end higher than the experiments; with 31° itself they are near. A foot that spreads over a growing ring
-is not in plane strain, and it is an open question which angle is right; both are therefore shown. With 31° the tolerance is a
-tenth, as in a channel (the final radius depends on the size of the grains over the first radius, too: Warnett et al. 2014,
-Granular Matter 16, 115-124), and for the run-out besides the size of a cell, by which the foot is known (8 to 13 % of the
-radius), together a fifth at most; for the height at a = 1, where the laws of low and of high columns differ by 12 %, and for the
-other angle, it is a fifth. With a PIC fraction of 0.1 % instead of 0.6 %, the one number that is calibrated, the columns with 31°
-run up to a fifth farther.
+The sand has an angle of repose of 31°. The experiments hardly depend on this angle, but the computed run-outs do. With the
+friction angle of 36.9° that a layer in plane strain needs to slide at 31° (see the columns in a channel) cylinders run less
+far and end higher than in the experiments; with 31° itself they are close to them. A foot that spreads over a growing ring is
+not in plane strain, and it is an open question which angle is right; both are therefore shown. With 31° the tolerance is a
+tenth, as for the columns in a channel (the final radius also depends on the ratio of the grain size to the initial radius:
+Warnett et al. 2014, Granular Matter 16, 115-124). For the run-out the size of a cell is added, to which the position of the
+foot is known (8 to 13 % of the radius), up to a fifth in all. The tolerance is a fifth for the height at a = 1, where the laws
+of low and of high columns differ by 12 %, and for the other angle. With a PIC fraction of 0.1 % instead of 0.6 %, the only
+calibrated number, the columns with 31° run up to a fifth farther.
 """
 
 import numpy as np

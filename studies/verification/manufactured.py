@@ -122,7 +122,7 @@ def run(quick: bool, folder) -> Result:
             in_space.setdefault(quantity, {})[name] = errors[:, column]
     for scheme, order in (("explicit", 2), ("implicit", 1)):
         errors = [by_steps(n, scheme) for n in steps]
-        source = "central differences" if scheme == "explicit" else "backward Euler"
+        source = "second order of central differences" if scheme == "explicit" else "first order of backward Euler"
         found = np.log2(errors[-2] / errors[-1])
         checks.append(Check(f"order in time, {scheme}", order, source, found, 0.1, kind=Kind.AT_LEAST))
         in_time[scheme] = errors
@@ -136,7 +136,8 @@ def run(quick: bool, folder) -> Result:
                      axis="Time step over the natural period [-]")  # fmt: skip
     return Result(checks, {
         "displacement.png": "Displacement of a manufactured solution: error over the cell size",
-        "stress.png": "Its stress: error over the cell size", "time.png": "A driven particle: error over the time step",
+        "stress.png": "Stress of a manufactured solution: error over the cell size",
+        "time.png": "A driven particle: error over the time step",
     })  # fmt: skip
 
 

@@ -1,12 +1,13 @@
 """Newmark's sliding block: soil on a shaken rigid plane, with frictional contact.
 
 A block of soil, stiff enough to move as one, lies on a plane that moves in its own direction. On level ground the plane is
-accelerated by a rectangular pulse A above μ g, and the block slips by V² / (2 μ g) (1 - μ g / A). On a plane inclined by 15°
-that shakes by band-limited noise the block slides downhill whenever the plane accelerates uphill by more than g (μ cos β -
-sin β), until both have the same velocity again; the slip is integrated exactly for a piecewise linear velocity.
+accelerated by a rectangular pulse A, which exceeds μ g, up to the velocity V, and the block slips by V² / (2 μ g) (1 - μ g /
+A). On a plane inclined by 15° that shakes by band-limited noise the block slides downhill whenever the plane accelerates
+uphill by more than g (μ cos β - sin β), until both have the same velocity again; the slip is integrated exactly for a
+piecewise linear velocity.
 
-The block's own vibrations are damped in proportion to its stiffness. A rigid block has none. Without damping they change the
-pressure on the plane, so that a block that sticks creeps downhill, by another tenth of the slip.
+The block's own vibrations are damped in proportion to its stiffness. A rigid block has no such vibrations. Without damping
+they would change the pressure on the plane, so that a block that sticks creeps downhill by another tenth of the slip.
 """
 
 import numpy as np
@@ -75,7 +76,7 @@ def run(quick: bool, folder) -> Result:
     begins = GRAVITY * (friction * np.cos(slope) - np.sin(slope)), GRAVITY * (friction * np.cos(slope) + np.sin(slope))
     slip = slips(friction, slope, motion.time, motion.velocity, cells)
     path = sliding_block(motion.time, motion.velocity, *begins)[1]
-    checks.append(Check("slip of an inclined block by noise", path[-1], "rigid block, integrated exactly", slip[-1],
+    checks.append(Check("slip of an inclined block by noise", path[-1], "sliding rigid block, integrated exactly", slip[-1],
                         TOLERANCE, "m"))  # fmt: skip
     curves["noise, inclined by 15°"] = (motion.time, slip)
     exact["rigid block, noise"] = (motion.time, path)

@@ -1,16 +1,17 @@
 """Factors of safety of published slopes, without dilation, by strength reduction.
 
 The examples of Griffiths and Lane (1999), Géotechnique 49, 387–403, are computed with a Poisson's ratio of 0.3 and without
-dilation. They are a slope 1:2 of c'/γH = 0.05 and φ' = 20°, on rock and on half its height of the same soil, and an undrained
-slope of c_u/γH = 0.25 on a layer as thick as the slope is high, of another strength. Their own factors, by quadratic
-quadrilaterals and a loose tolerance, are 1.4 for the first two (1.380 by Bishop and Morgenstern, 1960). For the undrained
-slope 1.448 (one soil) and 2.032 (a foundation 1.5 and 4 times as strong) are the values that Code_Aster's validation
-V6.03.507 takes from limit equilibrium; it calls them the reference of the fourth example. Undrained flow is associated, so
-that the best slip circle, found here, is an upper bound. On a stronger foundation the slope slides along it, in a band that
-is as wide as a cell: quadratic triangles of 2, 1 and 0.5 m, a fifth to a twentieth of the height, then come to 2.222, 2.113
-and 2.062. The undrained slope is therefore computed by triangles of degree 4, whose sizes are a fifth, a seventh and a tenth
-of the height. No theorem makes the factor unique for flow without dilation: it falls by 1 to 2 % as the cells are halved,
-since shear bands become thinner, and it depends on the steps by some 0.5 %.
+dilation. They are a slope 1:2 with c'/γH = 0.05 and φ' = 20°, on rock and on a layer of the same soil of half its height, and
+an undrained slope with c_u/γH = 0.25 on a foundation layer as thick as the slope is high, whose strength varies. The factors
+that they found by quadratic quadrilaterals with a loose tolerance are 1.4 for the first two slopes (1.380 by Bishop and
+Morgenstern, 1960). For the undrained slope 1.448 (one soil) and 2.032 (a foundation 1.5 and 4 times as strong) are the values
+that Code_Aster's validation V6.03.507 takes from limit equilibrium; it names them as the reference values of their fourth
+example. Undrained flow is associated, so that the best slip circle, found here, is an upper bound. A slope on a stronger
+foundation slides along its surface, in a shear band that is as wide as a cell: quadratic triangles of 2, 1 and 0.5 m, a fifth
+to a twentieth of the height, then give 2.222, 2.113 and 2.062. The undrained slope is therefore computed by triangles of
+degree 4, whose sizes are a fifth, a seventh and a tenth of the height. No theorem makes the factor unique for flow without
+dilation: it falls by 1 to 2 % as the cells are halved, since shear bands become thinner, and it depends on the steps by some
+0.5 %.
 """
 
 import numpy as np
@@ -98,7 +99,7 @@ def run(quick: bool, folder) -> Result:
             title = f"{name}, cells of {cell:g} m"
             # 2 % beside the range from 1.38 to 1.4
             checks.append(Check(f"φ' 20°, ψ 0, {title}", 1.39, published, found.value, 0.0275))
-            checks.append(Check(f"failure shown, {title}", 1.0, "a mechanism", float(found.failed), 0.0))
+            checks.append(Check(f"failure shown, {title}", 1.0, "1 if a mechanism is found", float(found.failed), 0.0))
 
     # --- 2. Undrained soil on an equal and a stronger foundation ----------------------------------------------------
     for strength, expected in UNDRAINED.items():
@@ -106,9 +107,9 @@ def run(quick: bool, folder) -> Result:
             result = safety(undrained(cell, strength))
             name = f"undrained, foundation of {strength:g} times the strength, cells of {cell:g} m"
             checks.append(Check(name, expected, "Code_Aster V6.03.507", result.value, 0.02))
-            checks.append(Check(f"failure shown, {name}", 1.0, "a mechanism", float(result.failed), 0.0))
-        checks.append(Check(name, circle_bound(strength), "best slip circle", result.value, 0.03 if quick else 0.01,
-                            kind=Kind.AT_MOST))  # fmt: skip
+            checks.append(Check(f"failure shown, {name}", 1.0, "1 if a mechanism is found", float(result.failed), 0.0))
+        checks.append(Check(name, circle_bound(strength), "upper bound by the best slip circle", result.value,
+                            0.03 if quick else 0.01, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 3. Pictures ------------------------------------------------------------------------------------------------
     for picture, last, flow in (("drained", found, "$\\psi$ = 0"), ("undrained", result, "strong foundation")):
@@ -116,7 +117,7 @@ def run(quick: bool, folder) -> Result:
         if field is not None:
             save_mechanism(folder / f"{picture}.png", field, f"Factor of safety {last.value:.3f}, {flow}")
     return Result(checks, {
-        "drained.png": "The mechanism of the slope on soil, as the body flows at the factor above",
+        "drained.png": "Mechanism of the slope on a layer of soil at the smallest factor for which failure was shown",
         "undrained.png": "The undrained slope slides along the strong foundation, in triangles of degree 4",
     })  # fmt: skip
 

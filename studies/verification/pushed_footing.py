@@ -1,11 +1,11 @@
-"""Rigid footings pushed into clay as bodies that touch particles: the bearing capacity factor N_c, smooth and rough.
+"""Rigid footings pushed into clay by contact with particles: the bearing capacity factor N_c, smooth and rough.
 
 This case runs the study footing_push with stiff clay, so that the soil has yielded all around before the footing is embedded.
 The factor is the load over area and shear strength at settlements of 0.6 to 1.2 % of the width for a strip, and of half of
-that for a circular footing. Cells at the edge make the footing wider by about half of their size, which is 1 % of the width
-of the strip, and 1 % of the area of the circular footing, whose cells are half as large. The rest comes from the cells below
-it and from the settlement: a strip gains about 1 % when it is embedded by 1 % of its width. The factors therefore converge
-from above, and the error decreases with the cell size.
+that for a circular footing. Cells at the edge make the footing wider by about half of their size, which is 1 % of the width of
+the strip, and 1 % of the area of the circular footing, whose cells are half as large. The rest of the error comes from the
+cells below the footing and from the settlement: a strip gains about 1 % when it is embedded by 1 % of its width. The factors
+therefore converge from above, and the error decreases with the cell size.
 """
 
 import footing_push
@@ -65,8 +65,8 @@ def run(quick: bool, folder) -> Result:
     if not quick:
         exact, coarse = footing_push.EXACT["strip", "smooth"], pushed("strip", "smooth", COARSE)[0]
         ratio = (checks[0].computed - exact) / (coarse - exact)
-        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6, "convergence", ratio,
-                            0.0, kind=Kind.AT_MOST))  # fmt: skip
+        checks.append(Check("error of N_c, smooth strip footing, over that on cells of 0.1 m", 0.6,
+                            "convergence with the cell size", ratio, 0.0, kind=Kind.AT_MOST))  # fmt: skip
 
     # --- 2. Picture --------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

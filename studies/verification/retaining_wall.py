@@ -1,17 +1,18 @@
 """Rigid walls that move away from sand and into it: active and passive pressure, smooth and rough.
 
 This case runs the study wall: sand with a friction angle of 30 degrees lies on rock beside walls that are contact bodies.
-Behind smooth walls Rankine's coefficients are exact. Behind rough walls they lie between the lower bound of a stress field
-and the upper bound of a mechanism. For the active pressure these are 2 % apart. For the passive pressure a plane wedge is far
-too high, and a body that rotates on a log-spiral is a much closer upper bound. Both theorems hold for sand that dilates by
-its friction angle. The friction that it mobilises on the wall is 17 to 20 of the 20 degrees available, and less at the foot,
-where the rock holds it.
+Behind smooth walls Rankine's coefficients are exact. Behind rough walls they lie between the lower bound of a stress field and
+the upper bound of a mechanism. For the active pressure these are 2 % apart. For the passive pressure a plane wedge is far too
+high, and a body that rotates on a log-spiral is a much closer upper bound. Both theorems hold for sand that dilates by its
+friction angle. The friction angle that this sand mobilises on the wall is 17 to 20 of the 20 degrees available, and less at
+the foot, where the rock restrains the sand.
 
-For sand that does not dilate there is no exact coefficient. It cannot resist more than the same sand with associated flow
-(Radenkovic 1961), so that the log-spiral remains an upper bound; the stress field at the full strength is no longer a lower
-one. Sand that shears at constant volume has the strength tan(phi*) = sin(phi) on its slip lines (Davis 1968): the stress
-field for phi* is the other end of the interval. Such sand hardly rises along the lower half of the wall and does not mobilise
-its friction there, so that its passive pressure is also compared with the stress field for the friction that acts.
+For sand that does not dilate there is no exact coefficient. Such sand cannot resist more than the same sand with associated
+flow (Radenkovic 1961), so that the log-spiral remains an upper bound; the stress field with the full strength is no longer a
+lower bound. Sand that shears at constant volume has the strength tan(phi*) = sin(phi) on its slip lines (Davis 1968): the
+stress field for phi* is the other end of the interval. Such sand hardly rises along the lower half of the wall and does not
+mobilise its friction there, so that its passive pressure is also compared with the stress field for the mobilised wall
+friction.
 """
 
 import numpy as np
@@ -56,7 +57,7 @@ def run(quick: bool, folder) -> Result:
             else:
                 delta = np.arctan(wall.in_the_end(a, rows, "wall_friction"))
                 acting = stress_field(np.radians(a.friction_angle), delta, passive=True)
-                source = f"{LANCELLOTTA}, for the {np.degrees(delta):.1f} degrees that act"
+                source = f"{LANCELLOTTA}, for the {np.degrees(delta):.1f} degrees that are mobilised"
                 checks.append(Check(name, acting, source, found, tolerance))
                 angles = np.radians([a.friction_angle, ROUGH])
                 least = stress_field(np.arctan(np.sin(angles[0])), angles[1], passive=True)
@@ -71,7 +72,7 @@ def run(quick: bool, folder) -> Result:
         field, spiral = wall.bounds(a)[0], log_spiral(*np.radians([a.friction_angle, ROUGH]))
         checks.append(Check(f"{name}: at least", field, LANCELLOTTA, found, tolerance, kind=Kind.AT_LEAST))
         checks.append(Check(f"{name}: at most", spiral, SPIRAL, found, tolerance, kind=Kind.AT_MOST))
-        checks.append(Check(f"{name}: near the closer bound", spiral, SPIRAL, found, tolerance))
+        checks.append(Check(f"{name}: against the closer bound", spiral, SPIRAL, found, tolerance))
 
     # --- 2. Pictures -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:

@@ -1,18 +1,18 @@
 """An undamped slide of frictional soil: influence of cells, time steps, particles and mesh on crest and run-out.
 
-The paper's slope under 60 kN/m³, applied at once, for two seconds, without damping, with mixed integration and averaged
-strains. In flow without dilation shear bands have no intrinsic width: they become thinner with the cells, and the slope
-slides farther, whichever integration is used. Strength that rises with the shear rate gives the bands a width, and the
-slide must then converge. Its viscosity here is 1 kPa s, which raises the strength by some kilopascals. There is no
-reference solution: each variant is compared with the run that differs from it in one parameter.
+The paper's slope slides for two seconds under 60 kN/m³, which is applied at once, without damping, with mixed integration and
+averaged strains. In flow without dilation shear bands have no intrinsic width: they become thinner with the cells, and the
+slope slides farther, whichever integration is used. Strength that rises with the shear rate gives the bands a width, and the
+slide must then converge. Its viscosity here is 1 kPa s, which raises the strength by some kilopascals. There is no reference
+solution: each variant is compared with the run that differs from it in one parameter.
 
-On a smooth base, on which it slides as one body and has no such bands, the same soil without viscosity converges as well, after
-0.6 s. A slope of 80 kN/m³ with viscosity and the affine transfer converges without damping while it comes to rest; it is compared
-after 4 s, and its crest moves by a tenth more until 8 s.
+On a smooth base the slope slides as one body without shear bands, and the results for the same soil without viscosity converge
+as well; they are compared after 0.6 s. Under 80 kN/m³, with viscosity and the affine transfer, the results converge without
+damping while the slope comes to rest; they are compared after 4 s, and the crest moves by another tenth until 8 s.
 
-The energy balance is that of a body whose particles cross cells all the time. With sums over particles the crossings
-dissipate a part of it that grows as cells become smaller. Implicit steps of second order follow the
-explicit slide, with viscosity and without.
+The particles cross cells all the time, which the energy balance shows: if stresses are summed over particles, the crossings
+dissipate a part of the energy, which grows as cells become smaller. Implicit steps of second order follow the explicit slide,
+with viscosity and without.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SMOOTH_END = 0.6  # s: of the slide on a smooth base
 HEAVY, REST_END = "80e3", 4.0  # N/m3, s: of the slide that comes to rest
 MIXED, PARTICLES = mpm.Integration.MIXED, mpm.Integration.PARTICLES
 CROSSINGS = (
-    "particles that cross cells dissipate energy if stresses are summed over particles; mixed integration avoids this"
+    "Particles that cross cells dissipate energy if stresses are summed over particles; mixed integration avoids this."
 )
 
 
@@ -101,7 +101,7 @@ def slide(
 
 def alike(name: str, reference: Slide, other: Slide, tolerance: float, of_run_out: float | None = None) -> list[Check]:
     """Checks that a variant slides as far as the reference; the run-out may have a tolerance of its own."""
-    source = "no closed form; the same slide otherwise"
+    source = "reference run, which differs in the named parameter only"
     of_run_out = tolerance if of_run_out is None else of_run_out
     return [
         Check(f"crest, {name}", reference.crest, source, other.crest, tolerance, "m"),
@@ -111,8 +111,17 @@ def alike(name: str, reference: Slide, other: Slide, tolerance: float, of_run_ou
 
 def balanced(name: str, slide: Slide, limit: str = "") -> Check:
     """Check of the energy balance."""
-    source = "works, stored energy and losses add up"
-    return Check(f"unexplained energy, {name}", 0.0, source, abs(slide.unexplained), 0.01, scale=1.0, limit=limit)
+    source = "energy balance: works, stored energy and losses add up"
+    return Check(
+        f"unexplained energy, {name}",
+        0.0,
+        source,
+        abs(slide.unexplained),
+        0.01,
+        scale=1.0,
+        over="the energy at work",
+        limit=limit,
+    )
 
 
 def run(quick: bool, folder: Path) -> Result:

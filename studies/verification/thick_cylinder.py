@@ -1,10 +1,10 @@
 """Thick-walled cylinder of Mohr-Coulomb soil under internal pressure: plastic ring, expansion, and limit pressure.
 
-A quarter of the cylinder is computed in plane strain, with plastic flow without dilation, under the pressure at which the
-ring between the inner wall and a chosen radius is plastic. The methods are quadratic finite elements, and particles in
-quasi-static steps with nodal mixed discretisation. On particles the pressure acts over the width of the innermost cells, so
-that stresses there are not compared. Finite elements give the limit pressure, by load steps that begin with the cohesion and
-are bisected to 0.2 %.
+A quarter of the cylinder is computed in plane strain, with plastic flow without dilation, under the pressure at which the ring
+between the inner wall and a chosen radius is plastic. The methods are quadratic finite elements, and particles in quasi-static
+steps with nodal mixed discretisation. On particles the pressure acts over the width of the innermost cells, so that stresses
+there are not compared. Finite elements also find the limit pressure, by load steps that begin with the cohesion and are
+bisected down to 0.2 %.
 """
 
 import numpy as np
@@ -114,14 +114,14 @@ def compared(name, r, radial, hoop, yields, widening, size, tolerance):
     scale = pressure_for(PLASTIC)
     off = np.sqrt(np.mean((radial - radial_stress(r)) ** 2)), np.sqrt(np.mean((hoop - hoop_stress(r)) ** 2))
     return [
-        Check(f"displacement of the outer wall, {name}", 1e6 * WIDENING, "Lamé outside of the plastic ring", 1e6 * widening,
-              tolerance, "µm"),
-        Check(f"radius of the plastic ring, {name}", PLASTIC, "chosen; the pressure follows from equilibrium", r[yields].max(),
-              size, "m", scale=OUTER - INNER),
-        Check(f"error of the radial stress, {name}", 0.0, "equilibrium and Mohr-Coulomb; over the pressure", off[0], tolerance,
-              "Pa", scale=scale),
-        Check(f"error of the hoop stress, {name}", 0.0, "equilibrium and Mohr-Coulomb; over the pressure", off[1], tolerance,
-              "Pa", scale=scale),
+        Check(f"displacement of the outer wall, {name}", 1e6 * WIDENING, "Lamé's solution outside the plastic ring",
+              1e6 * widening, tolerance, "µm"),
+        Check(f"radius of the plastic ring, {name}", PLASTIC, "chosen radius, from which the pressure follows", r[yields].max(),
+              size, "m", scale=OUTER - INNER, over="the thickness of the wall"),
+        Check(f"error of the radial stress, {name}", 0.0, "equilibrium and Mohr-Coulomb criterion", off[0], tolerance,
+              "Pa", scale=scale, over="the pressure"),
+        Check(f"error of the hoop stress, {name}", 0.0, "equilibrium and Mohr-Coulomb criterion", off[1], tolerance,
+              "Pa", scale=scale, over="the pressure"),
     ]  # fmt: skip
 
 

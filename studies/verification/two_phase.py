@@ -1,11 +1,11 @@
-"""Soil and pore water with a velocity each, by explicit steps: waves, consolidation, critical gradient.
+"""Soil and pore water with separate velocities, by explicit steps: waves, consolidation, critical gradient.
 
 A saturated column stands on a fixed base between rollers. Without drag it oscillates in its first mode by either of the two
 compression waves (Verruijt, Soil Dynamics, 2010, section 5): det(K - c² M) = 0 with K = [E + (1-n)² K_w/n, (1-n) K_w; (1-n)
 K_w, n K_w] and M = diag((1-n) rho_s, n rho_w). With large drag soil and water move together, and a load travels through the
-column as one front; implicit particles, in which water and soil have one velocity, have this wave too. Slow consolidation is
-that of Terzaghi; c_v is that with compressible water, k / gamma_w / (1/E + n/K_w). With averages over nodes (NMD) the pressures
-that act are compared, which are averaged too.
+column as one front; the implicit scheme, in which water and soil have one velocity, must give this wave too. Slow
+consolidation follows Terzaghi's theory with the coefficient of consolidation for compressible water, c_v = k / gamma_w / (1/E
++ n/K_w). With strains averaged over nodes (NMD), the averaged pressures are compared, which are those that act.
 """
 
 import numpy as np
@@ -164,8 +164,9 @@ def run(quick: bool, folder) -> Result:
             height, p = cell_pressures(model, averaged=nmd)
             expected = first * terzaghi(height, factor)
             worst = np.argmax(np.abs(p - expected))
-            checks.append(Check(f"pore pressure over the load, worst cell, T = {factor:g}", expected[worst] / LOAD, "Terzaghi 1925",
-                                p[worst] / LOAD, 0.02, scale=1.0, method="explicit, NMD" if nmd else "explicit"))  # fmt: skip
+            checks.append(Check(f"pore pressure over the load, worst cell, T = {factor:g}", expected[worst] / LOAD,
+                                "Terzaghi 1925", p[worst] / LOAD, 0.02, scale=1.0, over="the load",
+                                method="explicit, NMD" if nmd else "explicit"))  # fmt: skip
             if not nmd:
                 curves[f"$T = {factor:g}$"] = (p / LOAD, height)
                 line = np.linspace(0, HEIGHT, 101)

@@ -1,19 +1,20 @@
 """An undrained slope on a foundation with a thin weak layer, by strength reduction between the bounds of limit analysis.
 
-The third example of Griffiths and Lane (1999), Géotechnique 49, 387–403: a slope 1:2 with c_u1/γH = 0.25 on a layer of
-the same clay as thick as the slope is high, and in it a thin layer of the strength c_u2, which runs parallel to the
-slope, level below its toe and up to the ground at 45° beyond. The paper gives no coordinates; those of
-`meshes/weak_layer_slope.geo` are as the authors of XSLOPE measured them in its figure 6. With c_u2 = c_u1 the slope
-fails on a deep circle (1.47 by Taylor's chart). Below a ratio of some 0.6 the soil slides on the layer instead, which
-no search among circles finds. Undrained flow is associated, so that both theorems of limit analysis hold: any mechanism is
-an upper bound, for which the best circle and the best of three blocks that slide along the layer are computed here, and any
-stresses in equilibrium are a lower bound, for which linear programming finds the best.
+The third example of Griffiths and Lane (1999), Géotechnique 49, 387–403, is a slope 1:2 with c_u1/γH = 0.25 on a layer of the
+same clay as thick as the slope is high, and in it a thin layer of the strength c_u2, which runs parallel to the slope, level
+below its toe and up to the ground at 45° beyond. The paper gives no coordinates; those of `meshes/weak_layer_slope.geo` are
+the ones that the authors of XSLOPE measured in its figure 6. With c_u2 = c_u1 the slope fails on a deep circle (1.47 by
+Taylor's chart). Below a ratio of some 0.6 the soil slides on the layer instead, which no search among circles finds. Undrained
+flow is associated, so that both theorems of limit analysis hold: any mechanism is an upper bound, for which the best circle
+and the best of three blocks that slide along the layer are computed here, and any stresses in equilibrium are a lower bound,
+for which linear programming finds the best.
 
-Triangles of degree 4 on cells of 2.8, 2 and 1.4 m, half of that in the layer, differ by 1.3 % at most, and lie 2 to 4 %
-above the lower bound, whose mesh is coarse. They are within 2 % of Taylor's chart, and of the finite elements of XSLOPE
-on the same coordinates (its documentation, "Finite-Element Slope Stability (SSRM) Benchmarks": 1.447, 1.41, 1.38, 1.19 and
-0.96 at the ratios 1, 0.8, 0.6, 0.5 and 0.4). At a ratio of 0.2 XSLOPE has 0.453 to 0.478 by finite elements and 0.462 by
-Spencer's method, less than the lower bound of 0.481: slices leave out that the strong clay must shear where the layer bends.
+Triangles of degree 4 on cells of 2.8, 2 and 1.4 m, half of that in the layer, differ by 1.3 % at most, and lie 2 to 4 % above
+the lower bound, whose mesh is coarse. They are within 2 % of Taylor's chart, and of the finite elements of XSLOPE on the same
+coordinates (its documentation, "Finite-Element Slope Stability (SSRM) Benchmarks": 1.447, 1.41, 1.38, 1.19 and 0.96 at the
+ratios 1, 0.8, 0.6, 0.5 and 0.4). At a ratio of 0.2 XSLOPE has 0.453 to 0.478 by finite elements and 0.462 by Spencer's method,
+less than the lower bound of 0.481: methods of slices do not take into account that the strong clay must shear where the layer
+bends.
 
 The factors of the paper can be read off its figure 7 to 0.05. At ratios from 0.6 they are 1.5 to 2 % above the best circle, an
 upper bound; the one for the body of one clay is 1.50 there and 1.45 in figure 10. At ratios of 0.5 and less they are 6 to 21 %
@@ -43,7 +44,10 @@ UPPER = HEIGHT * np.array([(0.8, 1.0), (3.6, -0.4), (4.8, -0.4), (5.2, 0.0)])
 LOWER = HEIGHT * np.array([(0.6, 1.0), (3.8, -0.6), (4.8, -0.6), (5.4, 0.0)])
 PUBLISHED = {1.0: 1.5, 0.8: 1.45, 0.6: 1.4, 0.5: 1.25, 0.4: 1.05, 0.2: 0.6}
 """Factors of the paper's finite elements by c_u2/c_u1, as read off its figure"""
-READ_OFF = "the paper's factors can be read to 0.05 only, and its meshes have two elements across the layer; see above"
+READ_OFF = (
+    "The factors of the paper can be read to 0.05 only, and its meshes have two elements across the layer, as "
+    "explained above."
+)
 XSLOPE = {1.0: 1.447, 0.8: 1.41, 0.6: 1.38, 0.5: 1.19, 0.4: 0.96}
 """Factors of XSLOPE's finite elements on the same coordinates"""
 
@@ -120,19 +124,19 @@ def run(quick: bool, folder) -> Result:
         save_mechanism(
             folder / "mechanism.png", field, f"$c_{{u2}}/c_{{u1}}$ = 0.2, factor of safety {found[0.2].value:.3f}"
         )
-    captions = {"factors.png": "Factor of safety over the strength of the layer",
-                "mechanism.png": "The soil slides on the layer"}  # fmt: skip
+    captions = {"factors.png": "Factor of safety over the ratio of the strengths of layer and clay",
+                "mechanism.png": "Mechanism: the soil slides along the weak layer"}  # fmt: skip
     return Result(checks, captions)
 
 
 def compared(name, ratio, result, lower, upper):
     """The checks of one factor."""
     checks = [
-        Check(f"failure shown, {name}", 1.0, "a mechanism", float(result.failed), 0.0),
-        Check(name, lower, "stresses in equilibrium", result.value, 0.0, kind=Kind.AT_LEAST),
-        Check(name, upper, "best block or circle mechanism", result.value, 0.0, kind=Kind.AT_MOST),
+        Check(f"failure shown, {name}", 1.0, "1 if a mechanism is found", float(result.failed), 0.0),
+        Check(name, lower, "lower bound by stresses in equilibrium", result.value, 0.0, kind=Kind.AT_LEAST),
+        Check(name, upper, "upper bound by blocks or a circle", result.value, 0.0, kind=Kind.AT_MOST),
         # The stresses are those of a coarse mesh, within a polygon of 0.991 of the strength
-        Check(name, lower, "stresses in equilibrium", result.value, 0.045),
+        Check(name, lower, "lower bound by stresses in equilibrium", result.value, 0.045),
         Check(
             name,
             PUBLISHED[ratio],

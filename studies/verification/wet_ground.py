@@ -1,10 +1,10 @@
-"""Heavy soil and its pore water: own weight, upward flow, large strains, and the limits of no drainage and of full drainage.
+"""Saturated soil with weight: consolidation, upward flow, large strains, and the limits of no drainage and of full drainage.
 
-A fresh fill settles under its own weight as its water drains at the top (Gibson's linear limit). Water that flows up through
-a layer reduces the effective stress in proportion to its gradient, to zero at the critical gradient. A slope that hardly
-drains moves like undrained soil in total stresses, and a slope under water that drains at once moves like soil under its
-buoyant weight: these two are compared with quadratic elements without flow. Each problem is computed by finite elements with
-quadratic displacement and linear pressure (P2-P1), by finite elements with linear displacement and pressure and the
+A fresh fill settles under its own weight as its water drains at the top (the linear limit of Gibson's theory). Water that
+flows up through a layer reduces the effective stress in proportion to its gradient, to zero at the critical gradient. A slope
+that hardly drains moves as undrained soil does in total stresses, and a submerged slope that drains at once moves as soil does
+under its buoyant weight; both are compared with quadratic elements without flow. Each problem is computed by finite elements
+with quadratic displacement and linear pressure (P2-P1), by finite elements with linear displacement and pressure and the
 polynomial pressure projection (P1-P1), and by implicit particles, three per cell.
 
 A layer that is compressed by up to 39 % has a closed form if stress follows a rate law and the conductivity is proportional
@@ -59,8 +59,9 @@ def own_weight_checks(method, n):
             body.advance(min(dt * period, factor * period - body.time))
             dt = min(1.1 * dt, 0.02)
         settled = -body.displacement((0.1, 1.0))[1] / final
-        checks.append(Check(f"fresh fill, settlement at T = {factor:g}", fill_settled(factor), "series in sin(m) / m³", settled,
-                            0.012, scale=1.0, method=name))  # fmt: skip
+        checks.append(Check(f"fresh fill, settlement over the final one at T = {factor:g}", fill_settled(factor),
+                            "linear consolidation under own weight: series in sin(m) / m³", settled,
+                            0.012, scale=1.0, over="the final settlement", method=name))  # fmt: skip
     return checks
 
 
@@ -72,7 +73,8 @@ def upward_flow_checks(method, n):
             body.advance(1e9)
         found = body.mean_stress()[1] / (-0.5 * BUOYANT)
         checks.append(Check(f"upward flow at {part:g} of the critical gradient, effective stress over that at rest", 1 - part,
-                            "1 - i / i_c, i_c = (G_s - 1)(1 - n)", found, 1e-5, scale=1.0, method=METHODS[method]))  # fmt: skip
+                            "1 - i / i_c, i_c = (G_s - 1)(1 - n)", found, 1e-5, scale=1.0,
+                            over="the effective stress at rest", method=METHODS[method]))  # fmt: skip
     return checks
 
 
@@ -95,13 +97,15 @@ def slope_checks(method, size, tolerance):
     body = wet(method, mesh, SOIL, 1e-16, HELD, {}, WEIGHT, modulus=modulus)
     body.advance(1.0)
     expected = 1e3 * np.linalg.norm(dry(mesh, undrained, HELD, WEIGHT, CREST))
-    checks.append(Check("slope that does not drain, displacement of its crest", expected, "undrained law of total stress, P2",
+    checks.append(Check("slope that does not drain, displacement of its crest", expected,
+                        "quadratic elements, undrained law of total stresses",
                         1e3 * np.linalg.norm(body.displacement(CREST)), tolerance, "mm", method=name))  # fmt: skip
     surface = {"slope": 2.0, "crest": 2.0}
     body = wet(method, mesh, SOIL, 1e-2, HELD, surface, WEIGHT, start=2.0)
     body.advance(1e4)
     expected = 1e3 * np.linalg.norm(dry(mesh, SOIL, HELD, BUOYANT, CREST))
-    checks.append(Check("slope under water that drains at once, displacement of its crest", expected, "buoyant weight, P2",
+    checks.append(Check("slope under water that drains at once, displacement of its crest", expected,
+                        "quadratic elements under the buoyant weight",
                         1e3 * np.linalg.norm(body.displacement(CREST)), tolerance, "mm", method=name))  # fmt: skip
     return checks
 
@@ -120,7 +124,8 @@ def large_checks(cells, tolerances):
             checks.append(Check(f"large strains, q / M = {ratio:g}, settlement over the height at T = {factor:g}", expected[k],
                                 "Xie and Leo (2004)", settled[k], tolerance, method="particles"))  # fmt: skip
             checks.append(Check(f"large strains, q / M = {ratio:g}, pressure at the base over the load at T = {factor:g}",
-                                expected_base[k], "Xie and Leo (2004)", base[k], 0.01, scale=1, method="particles"))  # fmt: skip
+                                expected_base[k], "Xie and Leo (2004)", base[k], 0.01, scale=1, over="the load",
+                                method="particles"))  # fmt: skip
         found[f"q / M = {ratio:g}, particles"] = np.array(factors), settled
         times = np.linspace(0.001, 1.0, 200)
         exact[f"q / M = {ratio:g}, exact"] = times, closed_form(ratio, times)[0]

@@ -72,13 +72,22 @@ def check(computed, **options):
         (12.0, {"kind": Kind.AT_LEAST}, 0.0),
         (8.0, {"kind": Kind.AT_LEAST}, 0.2),
         (12.0, {"kind": Kind.AT_MOST}, 0.2),
-        (12.0, {"scale": 4.0}, 0.5),
+        (12.0, {"scale": 4.0, "over": "the load"}, 0.5),
     ],
 )
 def test_error_of_a_check(computed, options, error):
     found = check(computed, **options)
     assert found.error == pytest.approx(error)
     assert found.passed == (error <= 0.1)
+
+
+def test_the_source_names_the_scale_of_the_error():
+    """The scale is named where there is one, and only there."""
+    for wrong in ({"scale": 4.0}, {"over": "the load"}):
+        with pytest.raises(ValueError, match="expected the name of the scale"):
+            check(12.0, **wrong)
+    row = case_row("case", "group", "Title.", Result([check(12.0, scale=4.0, over="the load")]), "", 0.0).checks[0]
+    assert row.source == "by hand; error over the load"
 
 
 def test_nothing_computed_is_no_pass():
