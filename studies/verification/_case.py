@@ -1,9 +1,8 @@
-"""Common parts of the cases: checks, what a case hands back, and how a case runs alone."""
+"""Common parts of the cases: checks and what a case hands back."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -11,11 +10,6 @@ from pathlib import Path
 STUDIES = Path(__file__).parents[1]
 if str(STUDIES) not in sys.path:
     sys.path.insert(0, str(STUDIES))  # a case imports what studies share, and other studies
-
-from common.options import add_flag, study_parser  # noqa: E402
-from common.ranks import run_study  # noqa: E402
-from common.results import note_what_was_written, open_results  # noqa: E402
-from mpi4py import MPI  # noqa: E402
 
 
 class Kind(Enum):
@@ -92,22 +86,3 @@ def line(check: Check) -> str:
         f"  {verdict:5} {check.quantity}{', ' * bool(check.method)}{check.method}: {check.computed:.5g}{unit}, "
         f"expected {check.kind.value} {check.expected:.5g}{unit}, error {check.error:.2%}, tolerance {check.tolerance:.2%}"
     )
-
-
-def run_alone(case: Callable[[bool, Path], Result]) -> None:
-    """Run one case as a script: ``--quick`` for its small size. Exits with 1 when a check fails."""
-
-    def main() -> int:
-        name = Path(sys.argv[0]).stem
-        parser = study_parser(sys.modules["__main__"].__doc__)
-        parser.prog = f"studies/run verification_{name}"
-        add_flag(parser, "--quick", "a small size, as the tests run it")
-        options = parser.parse_args()
-        folder = open_results(options)
-        result = case(options.quick, folder)
-        if MPI.COMM_WORLD.rank == 0:
-            print(*map(line, result.checks), f"pictures in {folder}", sep="\n")
-            note_what_was_written(folder)
-        return 0 if all(check.passed or check.limit for check in result.checks) else 1
-
-    run_study(main)

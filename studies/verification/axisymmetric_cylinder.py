@@ -7,7 +7,7 @@ a pressure would act on the particles a third of a cell inside of the wall, whic
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison, save_refinement
 from mpi4py import MPI
 
@@ -177,7 +177,3 @@ def run(quick: bool, folder) -> Result:
         "error.png": "Errors over the number of cells: finite elements, and particles whose wall is moved or pressed",
         "stress.png": "Means of the particles' stresses in rings as thick as a cell, and Lamé's solution",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

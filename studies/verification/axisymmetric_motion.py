@@ -6,7 +6,7 @@ rough ground vibrates: the sum of kinetic and stored energy equals the work of i
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -120,7 +120,3 @@ def run(quick: bool, folder) -> Result:
         "ring.png": "Radial momentum of a thin ring that vibrates",
         "energy.png": "Energies of an elastic cylinder that is released on rough ground",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -5,7 +5,7 @@ with the velocity of its lowest mode, without damping or load.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -61,7 +61,3 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "momentum.png", computed, exact, ("Time [s]", "Momentum over that at the start [-]"),
                         limits=((None, None), (-1.1, 1.7)))  # fmt: skip
     return Result(checks, {"momentum.png": "Momentum of the vibrating bar"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -11,7 +11,7 @@ thick is 406 and 380 mm instead of 394 mm. With a fifth of the time step the run
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -91,7 +91,3 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "surface.png", {"particles": (1e3 * x[:, 0], 1e3 * x[:, 1])},
                         {"experiment": tuple(1e3 * SURFACE.T)}, ("$x$ [mm]", "$y$ [mm]"), equal=True)  # fmt: skip
     return Result(checks, {"surface.png": "The column of bars after its collapse, and the surface of the experiment"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -16,7 +16,7 @@ decreases only with the number of particles in a cell: with 72 particles the bea
 from typing import NamedTuple
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _hencky_elements import SwingingBeam
 from _plots import save_comparison
 from mpi4py import MPI
@@ -157,7 +157,3 @@ def run(quick: bool, folder) -> Result:
     return Result(checks, {
         "tip.png": f"Displacement of the tip of the cantilever; {PER_SIDE**2 // 2} particles in a cell where nothing else is said"
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

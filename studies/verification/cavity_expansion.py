@@ -16,7 +16,7 @@ For finite elements with small strains p = s_u (1 + ln(2 I_r u / a) - c²/b²), 
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _moving_mesh import on_moved_mesh
 from _plots import save_comparison
 from mpi4py import MPI
@@ -146,7 +146,3 @@ def run(quick: bool, folder) -> Result:
     return Result(
         checks, {"pressure.png": "Pressure at the wall of the cavity: particles (marks), and the closed form (lines)"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -8,7 +8,7 @@ is more than halved, at different rates, so nothing is extrapolated.
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.files import ROOT
 from mpi4py import MPI
@@ -92,7 +92,3 @@ def run(quick: bool, folder) -> Result:
         "load.png": f"Load over the settlement of a circular footing, quadratic elements, cells of {sizes[-1]:g} m",
         "meshes.png": "Bearing capacity factor over the size of the cells, and the exact ones as lines",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -6,7 +6,7 @@ stresses are compared as means over rows of cells.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -70,7 +70,3 @@ def run(quick: bool, folder) -> Result:
         exact = {"$w (H - y)$": (np.array([-1.0, 0.0]), np.array([0.0, 1.0]))}
         save_comparison(folder / "stress.png", curves, exact, ("Vertical stress over $w H$ [-]", "Height over $H$ [-]"))
     return Result(checks, {"stress.png": "Vertical stress of each row of cells of the column under its weight"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

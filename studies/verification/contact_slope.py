@@ -10,7 +10,7 @@ on a falling block before the block touches it.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -182,7 +182,3 @@ def run(quick: bool, folder) -> Result:
                         ("Friction μ [-]", "Displacement after 1 s on a slope of 30° [m]"),
                         limits=((0.0, None), (0.0, None)))  # fmt: skip
     return Result(checks, {"way.png": "Displacement of a block on a rigid plane over the coefficient of friction"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -15,7 +15,7 @@ Time is integrated by backward Euler with steps that grow with the time.
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _particle_body import ParticleBody
 from _plots import save_comparison
 from common.consolidation_theory import (
@@ -260,7 +260,3 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "pressure.png", slabs | balls, exact, labels, limits=((0, 1), (0, 1.5)))
     caption = "Pore pressure in the middle of Mandel's slab and of Cryer's ball: it rises first. Points: computed"
     return Result(checks, {"pressure.png": caption})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_refinement
 from mpi4py import MPI
 
@@ -70,7 +70,3 @@ def run(quick: bool, folder: Path) -> Result:
         panels = {"Stability factor above limit analysis": errors}
         save_refinement(folder / "error.png", sizes, "Squares over the height", panels)
     return Result(checks, {"error.png": "Stability factors above limit analysis over the number of cells"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

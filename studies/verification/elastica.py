@@ -14,7 +14,7 @@ the elastica does not include (0.8 %), and to the length of the steps (1 %).
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _moving_mesh import in_order, on_moved_mesh, set_in_order
 from _plots import save_refinement
 from common.figures import save_figure
@@ -201,7 +201,3 @@ def draw_stress(path, beams) -> None:
         panels[0].set_ylabel("$y$ [m]")
         draw_bar(figure, figure.add_axes((0.2, 0.15, 0.6, 0.03)), STRESS, limits)
         save_figure(figure, path)
-
-
-if __name__ == "__main__":
-    run_alone(run)

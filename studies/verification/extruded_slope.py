@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -119,7 +119,3 @@ def run(quick: bool, folder: Path) -> Result:
         save_comparison(folder / "cells.png", curves, {}, ("Size of the cells [m]", "Displacement after 1 s [m]"),
                         limits=((0, None), (0, None)), joined=True)  # fmt: skip
     return Result(checks, {"cells.png": "Crest and run-out in plane strain and of a slice in three dimensions"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

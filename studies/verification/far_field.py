@@ -8,7 +8,7 @@ not. Large linear elements are stiffer than the cells that they replace, and qua
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.figures import save_figure
 from common.files import ROOT
@@ -137,7 +137,3 @@ def run(quick: bool, folder) -> Result:
             "meshes.png"
         ] = "Cells of particles under the load, and quadratic elements beyond, whose nodes do not match"
     return Result(checks, figures)
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -12,7 +12,7 @@ particles there are no crossings, and only the error of the step length remains.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _moving_mesh import in_order, on_moved_mesh
 from _plots import save_refinement
 from mpi4py import MPI
@@ -107,7 +107,3 @@ def run(quick: bool, folder) -> Result:
     return Result(
         checks, {"error.png": "Error of the settlement over the number of cells: with crossings, and without"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

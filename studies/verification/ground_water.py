@@ -12,7 +12,7 @@ pressure.
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from _wet_bodies import GRAVITY, PARTICLES, POROSITY, WATER, wet
 from dolfinx import mesh
@@ -199,7 +199,3 @@ def run(quick: bool, folder) -> Result:
         labels = "Depth of the pile over that of the layer [-]", "Flow over $k h$ [-]"
         save_comparison(folder / "sheet_pile.png", {"quadratic elements": tuple(piles)}, expected, labels)
     return Result(checks, {"sheet_pile.png": "Flow under a sheet pile"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.options import study_parser
 from common.slope_case import GRAVITY, SUPPORTS, SlopeCase, add_slope_options, build_slope
@@ -137,7 +137,3 @@ def run(quick: bool, folder: Path) -> Result:
     return Result(
         checks, {"raised.png": "Change of shear stresses as the weight rises from 16 to 19 kN/m³ after the hand-over"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

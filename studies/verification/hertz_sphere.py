@@ -11,7 +11,7 @@ that pressures are compared as means over rings.
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from mpi4py import MPI
 from mpm_core.surfaces import distances
@@ -153,7 +153,3 @@ def run(quick: bool, folder) -> Result:
         "force.png": "Force on a sphere of 1 m that is pressed on an elastic half-space",
         "pressure.png": "Pressure between sphere and half-space",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -13,7 +13,7 @@ cross from cell to cell.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -87,7 +87,3 @@ def run(quick: bool, folder) -> Result:
     return Result(
         checks, {"stress.png": "Stress along the bar: particles, and the exact solution behind the wave as lines"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -8,7 +8,7 @@ nodes would have to be pulled off them.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -57,7 +57,3 @@ def run(quick: bool, folder) -> Result:
     return Result(
         checks, {"path.png": "Path of the centre of a cylinder that slides and of one that rolls down a plane"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -15,7 +15,7 @@ Yeh 1991). In the computation with particles the rain falls on their free surfac
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -209,7 +209,3 @@ def run(quick: bool, folder) -> Result:
         rest = {"at rest in the end": (np.array([0.0, -WATER / 1e3]), np.array([0.0, 1.0]))}
         save_comparison(folder / "pressure.png", shown, rest, ("Pressure of the water [kPa]", "Height [m]"))
     return Result(checks, {"pressure.png": "Pressure of the water in Liakopoulos's column as it drains"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -7,7 +7,7 @@ surcharge. Finite elements converge from above; their load steps begin with the 
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.files import ROOT
 from footing import AXIS, BASE, FAR, FOOTING, footing, parse, prandtl_factor, prandtl_line
@@ -74,7 +74,3 @@ def run(quick: bool, folder) -> Result:
                         {name: (angles, values) for name, values in exact.items()},
                         ("Friction angle [degrees]", "Bearing capacity factor [-]"))  # fmt: skip
     return Result(checks, {"factors.png": "Bearing capacity factors: finite elements (marks) and closed forms (lines)"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

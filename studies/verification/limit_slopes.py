@@ -14,7 +14,7 @@ slopes).
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from common.figures import curve_figure
 from common.plots import CURVES
 from common.slope_fem import slope_on_ground
@@ -108,7 +108,3 @@ def save_factors(path, found):
         axes.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
         axes.minorticks_off()
         axes.legend()
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -16,7 +16,7 @@ calibrated number, the columns with 31° run up to a fifth farther.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from lube_runout import FRICTION, GRAVITY, PIC_FRACTION, REPOSE, column, tolerance
 from lube_runout import WIDTH as RADIUS
@@ -99,7 +99,3 @@ def run(quick: bool, folder) -> Result:
         "height.png": "Height of the deposits over the aspect ratio, and the scaling of experiments",
         "deposit.png": f"Surfaces of deposits with φ = {REPOSE:g}°: half sections, the axis at the left; over the first radius",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

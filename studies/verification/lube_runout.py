@@ -22,7 +22,7 @@ where a column first falls freely, friction alone dissipates less energy than co
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -127,7 +127,3 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "run_out.png", {name: (ratios, got) for name, (got, ratios) in found.items()},
                         lines, ("Aspect ratio $a$ [-]", "Run-out over the width [-]"))  # fmt: skip
     return Result(checks, {"run_out.png": "Run-out of columns over their aspect ratio, and the scaling of experiments"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

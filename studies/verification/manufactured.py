@@ -7,7 +7,7 @@ equation of motion is known exactly and whose load makes it move by u = A (1 - c
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from common.field_plots import save_log_log
 from mpi4py import MPI
 
@@ -139,7 +139,3 @@ def run(quick: bool, folder) -> Result:
         "stress.png": "Stress of a manufactured solution: error over the cell size",
         "time.png": "A driven particle: error over the time step",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

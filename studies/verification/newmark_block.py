@@ -11,7 +11,7 @@ they would change the pressure on the plane, so that a block that sticks creeps 
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.motions import as_motion, band_limited_noise
 from common.newmark import pulse_slip, sliding_block
@@ -84,7 +84,3 @@ def run(quick: bool, folder) -> Result:
     if MPI.COMM_WORLD.rank == 0:
         save_comparison(folder / "slip.png", curves, exact, ("Time [s]", "Slip [m]"), joined=True)
     return Result(checks, {"slip.png": "Slip of a block of soil on a plane that shakes, and of a rigid block"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

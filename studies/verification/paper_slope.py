@@ -13,7 +13,7 @@ because the slope creeps along shear bands, which become thinner with the cells 
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.figures import save_figure
 from common.options import study_parser
@@ -161,7 +161,3 @@ def draw_variants(path, slides):
             draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
             bar.set_xticks(np.linspace(*limits, 3))
         save_figure(figure, path, dpi=200)
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -13,7 +13,7 @@ The adhesion is therefore alpha s_u divided by this fraction, which is taken fro
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.files import ROOT
 from mpi4py import MPI
@@ -88,7 +88,3 @@ def run(quick: bool, folder) -> Result:
                         ("Displacement over the diameter [-]", "Load over diameter and $s_u$ [-]"), joined=True,
                         limits=((0.0, None), (0.0, None)))  # fmt: skip
     return Result(checks, {"load.png": "Load on pipes that are pulled through clay"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

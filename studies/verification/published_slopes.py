@@ -15,7 +15,7 @@ dilation: it falls by 1 to 2 % as the cells are halved, since shear bands become
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _slip_surfaces import best_circle
 from common.field_plots import mechanism_field, save_mechanism
 from common.results import ROOT
@@ -120,7 +120,3 @@ def run(quick: bool, folder) -> Result:
         "drained.png": "Mechanism of the slope on a layer of soil at the smallest factor for which failure was shown",
         "undrained.png": "The undrained slope slides along the strong foundation, in triangles of degree 4",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -10,7 +10,7 @@ therefore converge from above, and the error decreases with the cell size.
 
 import footing_push
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.body_runs import scheme
 from mpi4py import MPI
@@ -77,7 +77,3 @@ def run(quick: bool, folder) -> Result:
                         ("Settlement over the width [-]", "Load over area and $s_u$ [-]"), joined=True,
                         limits=((0.0, None), (0.0, None)))  # fmt: skip
     return Result(checks, {"load.png": "Load over the settlement of footings that are pushed into clay"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

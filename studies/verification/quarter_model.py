@@ -9,7 +9,7 @@ and in the collapse the quarter is cut out of a mesh of cubes; energies and mome
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison, save_refinement
 from common.files import ROOT
 from mpi4py import MPI
@@ -152,7 +152,3 @@ def run(quick: bool, folder) -> Result:
         "sand.png": "Collapse of a cylinder of sand: largest difference between both over the number of cells",
         "collapse.png": "Collapse of a cylinder of sand: mean radius and height of the quarter and of the half section",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

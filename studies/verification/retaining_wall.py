@@ -17,7 +17,7 @@ friction.
 
 import numpy as np
 import wall
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _log_spiral import log_spiral
 from _plots import save_comparison
 from _rows import followed
@@ -97,7 +97,3 @@ def run(quick: bool, folder) -> Result:
         "active.png": "Coefficient of the pressure on walls that move away from sand",
         "passive.png": "Coefficient of the pressure on walls that move into sand",
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.options import study_parser
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope
@@ -187,7 +187,3 @@ def run(quick: bool, folder: Path) -> Result:
         save_comparison(folder / "cells.png", curves, {}, ("Size of the cells [m]", "Displacement after 2 s [m]"),
                         limits=((0, None), (0, 0.6)), joined=True)  # fmt: skip
     return Result(checks, {"cells.png": "Crest and run-out of an undamped slide over the size of the cells"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -9,7 +9,7 @@ the distance from it is its roughness.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from common.field_plots import save_log_log
 from common.figures import save_figure
 from common.plots import VERTICAL_STRESS, WIDTH, Scene, colour_limits, discs, draw_bar, draw_scene, paper_style
@@ -131,7 +131,3 @@ def save_stresses(path, models, rough):
         panels[-1].set_xlabel("$x$ [m]")
         draw_bar(figure, figure.add_axes((0.25, 0.06, 0.5, 0.015)), VERTICAL_STRESS, limits)
         save_figure(figure, path)
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -8,7 +8,7 @@ bisected down to 0.2 %.
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.files import ROOT
 from mpi4py import MPI
@@ -174,7 +174,3 @@ def run(quick: bool, folder) -> Result:
         exact = {"radial, exact": (line, radial_stress(line) / 1e3), "hoop, exact": (line, hoop_stress(line) / 1e3)}
         save_comparison(folder / "stress.png", curves, exact, ("Radius [m]", "Stress [kPa]"))
     return Result(checks, {"stress.png": "Stresses in the wall: particles, and the closed form as lines"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -9,7 +9,7 @@ consolidation follows Terzaghi's theory with the coefficient of consolidation fo
 """
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -197,7 +197,3 @@ def run(quick: bool, folder) -> Result:
     return Result(
         checks, {"pressure.png": "Pore pressure of the cells of a column that consolidates, by explicit steps"}
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

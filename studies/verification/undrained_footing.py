@@ -14,7 +14,7 @@ by the error of the mesh, not by the water.
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from common.results import ROOT
 from mpi4py import MPI
@@ -162,7 +162,3 @@ def run(quick: bool, folder) -> Result:
         )
     caption = "Load of a footing on soil whose water does not leave, without and with averaged volumetric strains"
     return Result(checks, {"load.png": caption})
-
-
-if __name__ == "__main__":
-    run_alone(run)

@@ -7,7 +7,7 @@ result of Taylor-Hood elements on the finest mesh for the others. The bodies and
 
 from argparse import Namespace
 
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from locking import compare
 from locking_cases import CASES
 from locking_cases.pictures import save_errors
@@ -41,7 +41,3 @@ def run(quick: bool, folder) -> Result:
             save_errors(folder / f"{case.NAME}.png", rows, case.TITLE)
         figures[f"{case.NAME}.png"] = f"{case.TITLE}: error of the {case.QUANTITY}"
     return Result(checks, figures)
-
-
-if __name__ == "__main__":
-    run_alone(run)

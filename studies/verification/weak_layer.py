@@ -25,7 +25,7 @@ by an out-of-balance force where the paper ends by a change of displacements.
 from functools import partial
 
 import numpy as np
-from _case import Check, Kind, Result, run_alone
+from _case import Check, Kind, Result
 from _plots import save_comparison
 from _slip_surfaces import best_circle, least, sliding_blocks
 from _static_bound import static_bound
@@ -168,7 +168,3 @@ def draw(folder, found, bounds, lower):
         ("$c_{u2}/c_{u1}$ [-]", "Factor of safety [-]"),
         limits=((0, 1.05), (0, 1.7)),
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

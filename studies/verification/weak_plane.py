@@ -11,7 +11,7 @@ its acceleration must be g (sin β - μ cos β).
 """
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from mpi4py import MPI
 
@@ -118,7 +118,3 @@ def run(quick: bool, folder) -> Result:
         checks,
         {"friction.png": "Force of a weak plane on a layer of soil that stays up to 20° and slides on steeper slopes"},
     )
-
-
-if __name__ == "__main__":
-    run_alone(run)

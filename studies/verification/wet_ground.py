@@ -15,7 +15,7 @@ and water leaves at the free surface as it moves.
 from __future__ import annotations
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from _plots import save_comparison
 from _wet_bodies import GRAVITY, PARTICLES, POROSITY, WATER, dry, wet
 from _wet_layer import closed_form, follow, large_layer
@@ -144,7 +144,3 @@ def run(quick: bool, folder) -> Result:
         save_comparison(folder / "large_strains.png", found, exact, labels, limits=((0, 1), (0, 0.4)))
     caption = "Settlement of a layer in large strains: particles (points), Xie and Leo (lines)"
     return Result(checks + more, {"large_strains.png": caption})
-
-
-if __name__ == "__main__":
-    run_alone(run)
