@@ -35,10 +35,10 @@ from typing import Any
 import numpy as np
 import tomllib
 from mpi4py import MPI
+from mpm_core.setup_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from mpm_core.setup_warnings import keeps_volume
 
 from .options import add_number, study_parser
 from .parameters import ParameterError, checked_values
