@@ -1,12 +1,12 @@
 """A cone is pushed into soil, as in a cone penetration test: resistance over depth, in axial symmetry.
 
-Half of the section of a 60 degree cone and of its smooth shaft, which are rigid bodies that touch the particles, from the
-surface of the ground downwards. The soil has neither weight nor initial stress. Without friction it is clay that does not
-drain (Tresca), and the resistance over the shear strength is the cone factor, which depends on the rigidity index and on the
-roughness of the cone. With friction and cohesion it is a soil that drains (Mohr-Coulomb); its cohesion acts as an
-initial stress of c cot(phi) does (Caquot). The factor rises until the cone is some diameters deep, the more the stiffer the
-soil. There is no exact one: clay has two fits to numerical results, soil with friction the limit pressure of a spherical
-cavity, which is too low.
+A 60 degree cone with a smooth shaft is pushed downwards from the surface of the ground; both are rigid bodies in contact with
+the particles, and half of the section is computed. The soil has neither weight nor initial stress. Without friction it is
+undrained clay (Tresca), and the resistance over the shear strength is the cone factor, which depends on the rigidity index and
+on the roughness of the cone. With friction and cohesion it is a drained soil (Mohr-Coulomb), whose cohesion acts as an initial
+stress of c cot(phi) does (Caquot). The factor rises until the cone is some diameters deep, the more the stiffer the soil.
+There is no exact factor: it is compared with two fits to numerical results for clay and, for soil with friction, with the
+limit pressure of a spherical cavity, which is too low.
 """
 
 from __future__ import annotations

@@ -51,18 +51,25 @@ ELEMENTS = {"P2-P1": water.Element.TAYLOR_HOOD, "P1-P1": water.Element.STABILISE
 def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
-    elements = "P1-P1", tuple(ELEMENTS), "quadratic displacement (P2-P1), or stabilised linear one"
+    elements = (
+        "P1-P1",
+        tuple(ELEMENTS),
+        "elements: quadratic displacement (P2-P1), or stabilised linear displacement (P1-P1)",
+    )
     add_site_file(p, "fill", "soils, water and pressures", elements)
     p.add_argument(
         "--pressures", nargs="+", default=None, metavar="NAME=ROWS",
-        help="pressures on boundaries beside those of the site file, or in their place: NAME=PA, or over time "
+        help="pressures on boundaries, in addition to those of the site file or replacing them: NAME=PA, or over time "
         "NAME=DAYS:PA,DAYS:PA,... joined by straight lines, such as footing=0:0,10:20e3,60:20e3,70:40e3",
     )  # fmt: skip
-    add_number(p, "--days", 3000.0, "days", "time that is followed", above=0)
+    add_number(p, "--days", 3000.0, "days", "duration of the run", above=0)
     add_number(p, "--first-step", 0.5, "days", "first step, at the beginning and after each change of a load", above=0)
-    add_number(p, "--growth", 1.15, "-", "factor from step to step", at_least=1)
+    add_number(p, "--growth", 1.15, "-", "factor by which time steps grow", at_least=1)
     add_count(
-        p, "--frames", 5, "pictures in time, evenly over its logarithm; sites with stages have one at the end of each"
+        p,
+        "--frames",
+        5,
+        "number of pictures, evenly over the logarithm of time; sites with stages have one at the end of each",
     )
     add_switch(
         p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking"

@@ -1,11 +1,11 @@
 """Cost of an equilibrium: explicit scheme, transient relaxation and Newton's method, in drained and in undrained soil.
 
-The slope under 20 kN/m3 is brought to an out-of-balance ratio of 1e-6 in two ways. Drained: from zero stress. Undrained: from
-drained equilibrium under --initial-unit-weight, where the remaining weight is applied too quickly for the water to drain;
-pore water makes the soil so stiff that the critical time step is smaller by two orders of magnitude. The explicit scheme has
-local damping; the others take quasi-static steps. Each run has a limit of processor time; if it is reached, the table gives a
-lower bound. Another table has the force evaluations of every solver in one implicit step from zero stress. The study runs on
-one rank.
+The slope under 20 kN/m3 is brought to an out-of-balance ratio of 1e-6 in two cases. In the drained case it starts from zero
+stress. In the undrained case it starts from drained equilibrium under --initial-unit-weight, and the remaining weight is
+applied too quickly for the water to drain; pore water makes the soil so stiff that the critical time step is smaller by two
+orders of magnitude. The explicit scheme has local damping; the others take quasi-static steps. Each run has a limit of
+processor time; if it is reached, the table gives a lower bound. Another table lists the force evaluations of every solver in
+one implicit step from zero stress. The study runs on one rank.
 """
 
 from __future__ import annotations

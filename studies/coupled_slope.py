@@ -56,7 +56,7 @@ def parser() -> ArgumentParser:
     )
     add_number(p, "--cell-size", 0.1, "m", "side of the squares", above=0)
     add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
-    add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    add_number(p, "--initial-unit-weight", 15e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     add_number(p, "--unit-weight", 60e3, "N/m3", "unit weight under which the slope fails", above=0)
     add_soil_options(p, dilation_angle=0.0)
     p.set_defaults(young=1e9)
@@ -67,7 +67,7 @@ def parser() -> ArgumentParser:
         p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
     )
     add_number(
-        p, "--displacement", 0.015, "-", "ratio of its displacement to the cell size above which it does, too", above=0
+        p, "--displacement", 0.015, "-", "ratio of the displacement to the cell size above which it turns, too", above=0
     )
     return p
 

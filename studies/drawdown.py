@@ -1,9 +1,10 @@
-"""A bank whose reservoir falls: its factor of safety over time by finite elements, and its slide by particles (`--slide`).
+"""A bank during drawdown: its factor of safety over time by finite elements, and its slide by particles (`--slide`).
 
-The site is a TOML file (`meshes/drawdown.toml` unless another is given): mesh, soils, supports, and the level of the reservoir in
-time. Seepage in time gives pore pressures, strength reduction the factor of safety at chosen times. Its limits stand beside it:
-slow drawdown, by the steady flow under the last levels, and fast drawdown without drainage, where pore pressures fall by the
-weight of the water that left (Morgenstern 1963). `--slower` stretches the times of the drawdown.
+The site is a TOML file (`meshes/drawdown.toml` unless another is given): mesh, soils, supports, and the level of the reservoir
+in time. Transient seepage gives the pore pressures, and strength reduction the factor of safety at chosen times. The factor is
+compared with two limits: slow drawdown, by the steady flow under the last levels, and fast drawdown without drainage, where
+pore pressures fall by the weight of the water that has left (Morgenstern 1963). `--slower` stretches the times of the
+drawdown.
 """
 
 from __future__ import annotations

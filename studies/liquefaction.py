@@ -1,12 +1,12 @@
 """A slope of loose saturated sand loses its strength and runs out as a flow slide, until its pore water has left.
 
-The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise
-by a part of the effective vertical stresses, as an earthquake raises them, and effective stresses fall by as much. Soil and
-water then move by velocities of their own. In fine sand next to no water leaves while it flows; coarse sand drains as fast.
+The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise by
+a fraction of the effective vertical stresses, as in an earthquake, and effective stresses decrease by the same amount. Soil
+and water then move with separate velocities. Fine sand hardly drains while it flows; coarse sand drains as fast as it flows.
 
-While pores are full the sand keeps its volume (`volume_gain`), and flows out to some 4 degrees. Loose sand would contract instead
-and flow on, so that the run-out is a lower bound; dense sand would stop earlier. Sand that is so coarse that it holds no suction
-has `--air-entry 0`: where effective stresses would become tensile it dilates, and its pores run empty.
+As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out to a slope of some 4 degrees. Loose sand
+would contract and flow further, so that the run-out is a lower bound; dense sand would stop earlier. Use `--air-entry 0` for
+sand so coarse that it sustains no suction: it dilates where effective stresses would become tensile, and its pores empty.
 """
 
 from __future__ import annotations
@@ -52,13 +52,15 @@ def parser() -> ArgumentParser:
     add_number(p, "--height", 3.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 12.0, "degrees", "angle of the slope", above=0, below=60)
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
-    add_number(p, "--runout", 8.0, "m", "length of the mesh past the toe", above=0)
+    add_number(p, "--runout", 8.0, "m", "length of the mesh beyond the toe", above=0)
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "ratio of the rise of the pore pressures to the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip
     add_number(p, "--conductivity", 1e-5, "m/s", "hydraulic conductivity", above=0)
     add_number(p, "--porosity", 0.45, "-", "porosity of the loose sand", above=0, below=1)
-    add_number(p, "--water-modulus", 2e7, "Pa", "bulk modulus of the water; below 2.2e9 steps are longer", above=0)
+    add_number(
+        p, "--water-modulus", 2e7, "Pa", "bulk modulus of the water; values below 2.2e9 allow longer steps", above=0
+    )
     add_number(p, "--young", 1e7, "Pa", "Young's modulus of the sand", above=0)
     add_number(p, "--friction-angle", 33.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--cohesion", 100.0, "Pa", "cohesion of the sand", at_least=0)

@@ -1,9 +1,10 @@
 """Volumetric locking of linear triangles: particles with and without mixed discretisation against Taylor-Hood elements.
 
-Three bodies that keep, or nearly keep, their volume: Cook's membrane (elastic), a strip footing and a slope on undrained
-soil (friction angle 0). All diagonals of their meshes run one way, the arrangement in which linear triangles lock. Particles
-fill every cell, plain and with nodal mixed discretisation (NMD), in quasi-static implicit steps and by damped explicit motion,
-on meshes of rising fineness. The explicit step shrinks as the Poisson ratio nears 0.5, so explicit runs have 0.49 to 0.499.
+Three nearly incompressible bodies are computed: Cook's membrane (elastic), and a strip footing and a slope of undrained soil
+(friction angle 0). All diagonals of their meshes have the same direction, the arrangement in which linear triangles lock.
+Particles fill every cell, plain and with nodal mixed discretisation (NMD), in quasi-static implicit steps and by damped
+explicit motion, on finer and finer meshes. The explicit step becomes shorter as Poisson's ratio approaches 0.5, so that
+explicit runs have 0.49 to 0.499.
 """
 
 from __future__ import annotations

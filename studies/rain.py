@@ -1,8 +1,8 @@
 """An unsaturated slope in the rain: its factor of safety over time by finite elements, and its slide by particles (`--slide`).
 
-The site is a TOML file (`meshes/rain.toml` unless another is given): mesh, soils with retention curves, supports, and the rain in
-time. Suction times effective saturation adds to the effective stress (Bishop 1959), until rain takes it away; strength reduction
-finds the factor of safety at chosen times. Beside it stands that of the beginning without suction.
+The site is a TOML file (`meshes/rain.toml` unless another is given): mesh, soils with retention curves, supports, and the rain
+in time. Suction times effective saturation is added to the effective stress (Bishop 1959) and decreases as rain infiltrates;
+strength reduction finds the factor of safety at chosen times. It is compared with the initial factor without suction.
 """
 
 from __future__ import annotations

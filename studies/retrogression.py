@@ -1,10 +1,10 @@
-"""A slope of sensitive clay: a disturbed toe slips, and the bank fails retrogressively, piece by piece, on two cell sizes.
+"""A slope of sensitive clay: the disturbed toe fails, and the bank fails retrogressively, block by block, on two cell sizes.
 
 The clay is undrained and softens (by default Tresca with a strength that falls with plastic strain, scaled by the cell size,
-so that a slip dissipates the same energy on any mesh). Finite elements give the stresses of the intact slope. Then the clay
-in a zone around the toe loses strength, and the explicit scheme computes the failure until the slope is at rest, that is,
-until its kinetic energy has been below a thousandth of its maximum for two seconds. The results with the given cell size and
-with half of it are compared.
+so that a slip dissipates the same energy on any mesh). Finite elements give the stresses of the intact slope. Then the clay in
+a zone around the toe loses strength, and the explicit scheme computes the failure until the slope is at rest, that is, until
+its kinetic energy has been below a thousandth of its maximum for two seconds. The results with the given cell size and with
+half of it are compared.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")
     add_picture_options(p)
-    add_choice(p, "--meshes", "two", ("one", "two"), "the cell size given, or also half of it")
+    add_choice(p, "--meshes", "two", ("one", "two"), "compute with the given cell size only, or also with half of it")
     add_switch(p, "--nmd", True, "average volumetric strains over nodes, against locking")
     add_switch(
         p, "--coupled", False, "begin with resting cells, which are finite elements until the clay in them fails"

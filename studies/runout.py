@@ -67,7 +67,7 @@ def parser() -> ArgumentParser:
         p, "--ground-friction-angle", 15.0, "degrees", "friction angle between slide and ground", at_least=0, below=90
     )
     add_number(p, "--density", 1900.0, "kg/m3", "density of the slide", above=0)
-    add_number(p, "--young", 5e6, "Pa", "Young's modulus; stiffer soil takes shorter steps", above=0)
+    add_number(p, "--young", 5e6, "Pa", "Young's modulus; stiffer soil needs shorter steps", above=0)
     add_number(p, "--friction-angle", 28.0, "degrees", "friction angle of the slide", at_least=0, below=60)
     add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide", at_least=0)
     add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)

@@ -52,7 +52,7 @@ def parser() -> ArgumentParser:
     add_flow_options(p)
     add_site_option(p)
     p.add_argument(
-        "--unreduced", nargs="*", default=[], metavar="SOIL", help="soils of the site that keep their strength"
+        "--unreduced", nargs="*", default=[], metavar="SOIL", help="soils of the site whose strength is not reduced"
     )
     add_flag(p, "--particles", "also find the factor by particles on the same cells, which come to rest or flow")
     return p

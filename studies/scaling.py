@@ -1,9 +1,9 @@
 """Scaling over ranks: messages and bytes counted for 1 to 64 ranks, and the time of a step on the ranks of this run.
 
-Counted: DOLFINx's partitioner divides a square (cube) full of particles into any number of parts; the messages of each part
-in a step follow from the nodes that it shares. Timed: explicit steps of a full box on the ranks of this run, with the same
-total size on any number of ranks (strong scaling) and with the same size per rank (weak scaling). Rows are added to an existing
-timed.csv, so that runs with --ranks 1 and --ranks 2 give one table; --overwrite begins a new one.
+Messages are counted: DOLFINx's partitioner divides a square (cube) full of particles into any number of parts, and the
+messages of each part in a step follow from the nodes that it shares. Explicit steps of a full box are timed on the ranks of
+this run, with the same total size on any number of ranks (strong scaling) and with the same size per rank (weak scaling). Rows
+are added to an existing timed.csv, so that runs with --ranks 1 and --ranks 2 give one table; --overwrite begins a new one.
 """
 
 from __future__ import annotations

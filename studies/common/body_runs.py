@@ -59,7 +59,7 @@ def add_body_run_options(
     add_number(run, "--rebalance", 1.2, "-",
                "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
     files = p.add_argument_group("frames and pictures")
-    add_count(files, "--frames", frames, "times at which particles are stored and drawn")
+    add_count(files, "--frames", frames, "number of times at which particles are stored and drawn")
     add_output_options(files, PARTICLE_FIELDS)
     add_picture_options(files)
     add_checkpoint_options(p.add_argument_group("checkpoints"))

@@ -31,7 +31,7 @@ def add_scheme_options(parser: argparse.ArgumentParser, integration: str | None 
         integration: default of ``--integration``; None for that of `stable_integration`.
     """
     add_choice(parser, "--scheme", "explicit", SCHEMES,
-               "time scheme; quasi-static leaves inertia out and raises the unit weight from zero over --time")  # fmt: skip
+               "time scheme; quasi-static neglects inertia and raises the unit weight from zero over --time")  # fmt: skip
     add_choice(parser, "--solver", "newton", SOLVERS, "solver of an implicit or quasi-static step")
     add_discretisation(parser, integration)
     add_number(parser, "--dt", None, "s", "largest time step (default: half of the critical one; 20 times the critical "
@@ -48,7 +48,8 @@ def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> Non
 def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
     """Option ``--pic``."""
     add_number(parser, "--pic", default, "-",
-               "PIC fraction: part of a particle's velocity that the nodal velocity replaces in a critical time step (0 is FLIP)",
+               "PIC fraction: fraction of a particle's velocity that is replaced by the nodal one in a critical time step "
+               "(0 is FLIP)",
                at_least=0, at_most=1)  # fmt: skip
 
 

@@ -63,7 +63,7 @@ def add_slide_options(parser: ArgumentParser, damping: float, pic: float) -> Non
     add_pic(p, pic)
     add_switch(p, "--nmd", True, "average volumetric strains over nodes in the slide, against locking")
     add_number(p, "--time", 10.0, "s", "duration of the slide", above=0)
-    add_count(p, "--frames", 60, "times at which particles are stored and drawn")
+    add_count(p, "--frames", 60, "number of times at which particles are stored and drawn")
     add_picture_options(p)
 
 

@@ -43,8 +43,8 @@ def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> N
     add_number(parser, "--crest", 1.1, "m", "length of the level crest", above=0)
     add_number(parser, "--cell-size", cell_size, "m", "side of the squares or of the triangles", above=0)
     add_choice(parser, "--mesh", None, ("crossed", "fitted", "gmsh"),
-               "squares divided by their diagonals, the same stretched to fit the slope, or unstructured (default: the first "
-               "of them that suits the angle)")  # fmt: skip
+               "squares divided by their diagonals, the same stretched to fit the slope, or unstructured triangles (default: the "
+               "first of these that suits the angle)")  # fmt: skip
 
 
 def add_soil_options(parser: argparse.ArgumentParser, dilation_angle: float | None) -> None:

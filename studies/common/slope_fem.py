@@ -29,18 +29,18 @@ def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
 
 def add_ground_option(parser: argparse.ArgumentParser) -> None:
     """Option ``--depth``."""
-    add_number(parser, "--depth", 0.0, "m", "ground of the same soil below the toe, on a rigid base, and as far before it as the "
-               "slope is high and twice as deep; 0: the slope stands on a rigid base", at_least=0)  # fmt: skip
+    add_number(parser, "--depth", 0.0, "m", "depth of the rigid base below the toe, in ground of the same soil that reaches "
+               "beyond the toe by the slope's height plus twice this depth; 0: the base is at the toe", at_least=0)  # fmt: skip
 
 
 def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Options ``--elements`` and ``--equilibrium``."""
     add_choice(parser, "--elements", "P2", ("P1", "P1-averaged", "P2", "P4"),
-               "linear triangles, the same with averaged volumetric strains, quadratic ones, or those of degree 4, "
-               "which are the most accurate for their number of nodes")  # fmt: skip
+               "triangles: linear, linear with averaged volumetric strains, quadratic, or of degree 4, which are the most "
+               "accurate for a given number of nodes")  # fmt: skip
     add_choice(parser, "--equilibrium", "fine", ("fine", "practice"),
-               "what is accepted: an out-of-balance force of 1e-8 of the forces at work by Newton's method and 1e-5 by "
-               "relaxation, or, as in practice, that 1 % of the stress is missing in cells that yield")  # fmt: skip
+               "tolerance of equilibrium: fine accepts an out-of-balance force of 1e-8 of the acting forces by Newton's method "
+               "and 1e-5 by relaxation, practice an error of 1 % of the stress in cells that yield")  # fmt: skip
 
 
 def finite_elements(options: argparse.Namespace) -> dict[str, object]:

@@ -39,7 +39,9 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
                                   ("critical_slope", 1.0, None), ("void_ratio", 1.0, None),
                                   ("preconsolidation", 20e3, None), ("attraction", 1e3, None)]:  # fmt: skip
         add_parameter(p, mpm.CamClay, name, default, "Cam-Clay: ", option)
-    add_switch(p, "--undrained", False, "undrained: effective stresses, and pore water that does not drain")
+    add_switch(
+        p, "--undrained", False, "undrained soil: a law of effective stresses, and pore water that does not drain"
+    )
     for name, default in [("water_modulus", 2e7), ("porosity", 0.4)]:
         add_parameter(p, mpm.Undrained, name, default, "undrained: ")
     add_code(
@@ -48,8 +50,8 @@ def add_law_options(parser: argparse.ArgumentParser) -> None:
     add_code(p, "--umat", "LIBRARY", "shared library with an Abaqus UMAT, instead of --material")
     p.add_argument("--properties", type=float, nargs="*", default=[], metavar="X", help="PROPS of the UMAT")
     p.add_argument("--strength-properties", nargs="*", default=[], metavar="NUMBER:KIND",
-                   help="PROPS of the UMAT that a factor of safety divides, by number from one and kind (strength, friction, "
-                        "dilation), such as 3:strength 4:friction 5:dilation; angles in degrees")  # fmt: skip
+                   help="PROPS of the UMAT that are its strength, for strength reduction: number from 1 and kind (strength, "
+                        "friction, dilation) of each, such as 3:strength 4:friction 5:dilation; angles in degrees")  # fmt: skip
     p.add_argument("--variables", type=int, default=0, metavar="N", help="NSTATV of the UMAT (default: 0)")
     add_switch(p, "--finite-strain", False, "Kirchhoff stress in logarithmic strain (Hencky)")
 

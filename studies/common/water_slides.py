@@ -44,9 +44,9 @@ def add_optional_slide(parser: ArgumentParser) -> None:
     add_flag(p, "--slide", "compute the slide by particles if the slope fails")
     add_choice(p, "--slide-from", "failure", ("failure", "lowest"),
                "begin the slide at the first factor of safety below 1, or at the lowest one")  # fmt: skip
-    add_choice(p, "--slide-water", "still", ("still", "flows"), "pore pressures of the slide stay in space as they are at "
-               "failure, or the water flows through the particles and out at their surface, by implicit steps")  # fmt: skip
-    add_number(p, "--slide-step", 0.02, "s", "longest step of the slide where its water flows", above=0)
+    add_choice(p, "--slide-water", "still", ("still", "flows"), "still: pore pressures remain fixed in space as they are at "
+               "failure; flows: water flows through the particles and drains at their surface, by implicit steps")  # fmt: skip
+    add_number(p, "--slide-step", 0.02, "s", "longest time step with --slide-water flows", above=0)
     add_slide_options(p, damping=0.0, pic=0.01)
 
 

@@ -39,13 +39,13 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
     elements = "P2", ("P1", "P2"), "linear or quadratic triangles for the factor of safety"
     add_site_file(p, site, "soils, supports and water", elements)
     add_number(p, "--days", days, "days", "duration of the transient flow", above=0)
-    add_number(p, "--slower", 1.0, "-", "factor on the times of all tables of the site", above=0)
-    add_count(p, "--factor-times", 6, "times, evenly over --days, at which the factor of safety is found, beside the beginning, "
-              "the corners of the site's tables and three times before each of them")  # fmt: skip
+    add_number(p, "--slower", 1.0, "-", "factor by which all times in the tables of the site are multiplied", above=0)
+    add_count(p, "--factor-times", 6, "number of times, evenly over --days, at which the factor of safety is found, in addition "
+              "to the beginning, the corners of the site's tables and three times before each of them")  # fmt: skip
     add_number(p, "--start", 0.3, "-", "first factor of safety to try; the slope must be stable with it", above=0)
-    add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives to soil of "
-               "less dilation; otherwise with the flow that the site gives")  # fmt: skip
-    add_switch(p, "--suction", suction, "suction times effective saturation adds to effective stress (Bishop)")
+    add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives for soil of "
+               "less dilation; otherwise with the flow rule of the site's soils")  # fmt: skip
+    add_switch(p, "--suction", suction, "add suction times effective saturation to the effective stress (Bishop)")
 
 
 @dataclass
