@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
 import importlib
 import os
 import shutil
@@ -20,6 +19,8 @@ OTHERS = ("h5py", "gmsh", "matplotlib", "jinja2", "tqdm")
 
 def about() -> str:
     """Versions, solvers and processors as lines of text."""
+    from ctypes.util import find_library  # which takes a third of the other imports of `talus`
+
     sys.path.insert(0, str(find.SHIPPED))
     common = importlib.import_module("common.versions")
     lines = {
@@ -28,7 +29,7 @@ def about() -> str:
         "linear solvers": common.version_of("petsc4py.PETSc", _solvers),
         "processors": f"{len(os.sched_getaffinity(0))} for this process; mpirun {shutil.which('mpirun') or 'not found'}",
         "films": "MP4 by ffmpeg" if shutil.which("ffmpeg") else "GIF (ffmpeg not found)",
-        "meshes": "gmsh reads them in a process that cannot start programs" if ctypes.util.find_library("seccomp") else
+        "meshes": "gmsh reads them in a process that cannot start programs" if find_library("seccomp") else
         "files are searched for commands before gmsh reads them (libseccomp not found)",
         "studies": ", ".join(str(folder) for folder in find.folders()),
     }  # fmt: skip

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import os
+import tokenize
 from pathlib import Path
+from tokenize import COMMENT, NL, STRING
 
 PACKAGE = Path(__file__).parent
 SHIPPED = PACKAGE / "studies" if (PACKAGE / "studies").is_dir() else PACKAGE.parent / "studies"
@@ -37,9 +39,10 @@ def study_path(name: str) -> Path | None:
 
 
 def purpose(path: Path) -> str:
-    """The first line of a script's docstring."""
-    try:
-        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
-    except (SyntaxError, UnicodeDecodeError):
-        text = None
-    return (text or "").split("\n")[0]
+    """The first line of a script's docstring; to parse all of each script would take most of the time of ``talus list``."""
+    with open(path, encoding="utf-8") as file:
+        try:
+            first = next(t for t in tokenize.generate_tokens(file.readline) if t.type not in (COMMENT, NL))
+            return str(ast.literal_eval(first.string)).split("\n")[0] if first.type == STRING else ""
+        except (SyntaxError, ValueError, tokenize.TokenError, UnicodeDecodeError, StopIteration):
+            return ""
