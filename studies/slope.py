@@ -79,7 +79,7 @@ def parser() -> ArgumentParser:
     start = p.add_argument_group("initial state")
     add_choice(start, "--initial", None, ("fem", "elastic", "k0", "zero"),
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
-    add_number(start, "--initial-unit-weight", 20e3, "N/m3", "unit weight that the initial stresses carry", above=0)
+    add_number(start, "--initial-unit-weight", 20e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     slide = p.add_argument_group("slide")
     add_number(slide, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_pic(slide, 0.0)
@@ -92,7 +92,7 @@ def parser() -> ArgumentParser:
     add_count(slide, "--ensemble", 1,
               "runs with initial states that differ by round-off; mean and standard deviation are reported")  # fmt: skip
     files = p.add_argument_group("frames and pictures")
-    add_count(files, "--frames", 120, "times at which particles are stored and drawn")
+    add_count(files, "--frames", 120, "number of times at which particles are stored and drawn")
     add_count(
         files, "--frame-steps", None, "store particles every so many steps too, without drawing them (default: not)"
     )
@@ -396,7 +396,9 @@ def print_summary(summary: dict, folder: Path) -> None:
     )
     print(f"results in {folder}", flush=True)
     if summary["stopped_because"]:
-        print(f"the run ended early: {summary['stopped_because']}; what there is has been written", file=sys.stderr)
+        print(
+            f"the run ended early: {summary['stopped_because']}; the results so far have been written", file=sys.stderr
+        )
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ def given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | Non
     given = np.asarray(stress(model.points.coordinates()[new]), dtype=float)
     expected = int(new.sum()), model.points.size
     good = given.shape == expected and np.all(np.isfinite(given))
-    agree(model.domain.comm, None if good else f"stress: got shape {given.shape}, expected finite {expected}")
+    agree(model.domain.comm, None if good else f"stress has shape {given.shape}, expected finite {expected}")
     return given
 
 
@@ -122,7 +122,7 @@ def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
     dim = domain.geometry.dim
     p = fem.Function(compat.function_space(domain, "Lagrange", 1), name="pore_pressure")
     p.interpolate(lambda x: np.broadcast_to(np.asarray(pore_pressure(x[:dim].T), dtype=float), x.shape[1]))
-    agree(domain.comm, None if np.all(np.isfinite(p.x.array)) else "pore_pressure: it gives values that are not finite")
+    agree(domain.comm, None if np.all(np.isfinite(p.x.array)) else "pore_pressure gives values that are not finite")
     return p
 
 

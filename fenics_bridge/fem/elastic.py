@@ -201,7 +201,7 @@ def solve_nearly_incompressible(
         Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
-    agree(domain.comm, None if poisson > 0 else f"poisson: got {poisson!r}, expected more than 0")
+    agree(domain.comm, None if poisson > 0 else f"poisson is {poisson!r}, expected more than 0")
     geometry = geometry_of(domain, geometry)
     radius = radius_of(domain, geometry)
     space = compat.displacement_pressure_space(domain, 2)
@@ -261,11 +261,11 @@ def _solved(space: Any, constraints: Any, tangent: Any, load: Any, internal: Any
 
 def _first_mistake(young: float, poisson: float, unit_weight: Any, degree: int) -> str | None:
     if not (np.isfinite(young) and young > 0):
-        return f"young: got {young!r} Pa, expected a positive number"
+        return f"young is {young!r} Pa, expected a positive number"
     if not 0 <= poisson < 0.5:
-        return f"poisson: got {poisson!r}, expected at least 0 and below 0.5"
+        return f"poisson is {poisson!r}, expected at least 0 and below 0.5"
     if not np.isfinite(unit_weight):
-        return f"unit_weight: got {unit_weight!r} N/m3, expected a finite number"
+        return f"unit_weight is {unit_weight!r} N/m3, expected a finite number"
     if degree not in (1, 2):
-        return f"degree: got {degree!r}, expected 1 or 2"
+        return f"degree is {degree!r}, expected 1 or 2"
     return None

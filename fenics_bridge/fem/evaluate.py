@@ -37,7 +37,7 @@ class PointSearch:
         self._comm, dim = domain.comm, domain.geometry.dim
         points = np.ascontiguousarray(points, dtype=float)
         good = points.ndim == 2 and points.shape[1] == dim and np.all(np.isfinite(points))
-        agree(self._comm, None if good else f"points: got shape {points.shape}, expected finite (n, {dim})")
+        agree(self._comm, None if good else f"points has shape {points.shape}, expected finite (n, {dim})")
         self.points = points
         boxes = self._comm.allgather(_owned_box(domain))
         near = np.array([np.all((points >= low) & (points <= high), axis=1) for low, high in boxes])

@@ -41,9 +41,12 @@ class FemSite:
         progress: Callable[[LoadStep], Any] | None = None,
     ) -> None:
         comm = fem.domain.comm
-        agree(comm, None if fem.cell_tags is not None else "fem: it has no cell_tags, by which stages know soils")
+        agree(
+            comm,
+            None if fem.cell_tags is not None else "fem has no cell_tags, expected those of the soils that stages name",
+        )
         fresh = fem.load == Load() and not fem.off
-        agree(comm, None if fresh else "fem: it is loaded already, expected a new one, whose soils the stages place")
+        agree(comm, None if fresh else "fem is loaded already, expected a new one, whose soils the stages place")
         self.fem = fem
         """The finite elements"""
         self.number = 0

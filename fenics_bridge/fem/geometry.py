@@ -38,11 +38,11 @@ def geometry_of(domain: Mesh, given: Geometry | None = None) -> Geometry:
     usual = Geometry.PLANE_STRAIN if dim == 2 else Geometry.SOLID
     geometry = usual if given is None else given
     fits = geometry == usual or (geometry == Geometry.AXISYMMETRIC and dim == 2)
-    agree(domain.comm, None if fits else f"geometry: got {given!r}, which a mesh of {dim} dimensions cannot have")
+    agree(domain.comm, None if fits else f"geometry is {given!r}, which a mesh of {dim} dimensions cannot have")
     if geometry == Geometry.AXISYMMETRIC:
         least = float(domain.geometry.x[:, 0].min(initial=np.inf))
         good = least >= 0
-        agree(domain.comm, None if good else f"domain: it has the radius {least:g} m, expected radii from 0 on")
+        agree(domain.comm, None if good else f"domain has the radius {least:g} m, expected radii from 0 on")
     return geometry
 
 
@@ -65,7 +65,7 @@ def body_volumes(domain: Mesh, geometry: Geometry | None) -> NDArray[np.float64]
 def require_same_geometry(model: Any, fem: Any) -> None:
     """Raise InputError, on all ranks, unless particles and finite elements have the same geometry. Collective."""
     same = model.geometry == fem.geometry
-    problem = f"fem: its geometry is {fem.geometry.name}, that of the particles is {model.geometry.name}"
+    problem = f"the geometry of the finite elements is {fem.geometry.name}, that of the particles is {model.geometry.name}"
     agree(model.comm, None if same else problem)
 
 

@@ -25,7 +25,7 @@ def k0_elastic(poisson: float) -> float:
         InputError: poisson is not in [0, 0.5).
     """
     if not 0 <= poisson < 0.5:
-        raise InputError(f"poisson: got {poisson!r}, expected at least 0 and below 0.5")
+        raise InputError(f"poisson is {poisson!r}, expected at least 0 and below 0.5")
     return poisson / (1 - poisson)
 
 
@@ -39,7 +39,7 @@ def k0_jaky(friction_angle: float) -> float:
         InputError: friction_angle is not in [0, 90).
     """
     if not 0 <= friction_angle < 90:
-        raise InputError(f"friction_angle: got {friction_angle!r} degrees, expected at least 0 and below 90")
+        raise InputError(f"friction_angle is {friction_angle!r} degrees, expected at least 0 and below 90")
     return 1 - np.sin(np.radians(friction_angle))
 
 
@@ -84,7 +84,7 @@ def k0_layered_stress(
     """
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InputError(f"points: got shape {points.shape}, expected (n, 2) or (n, 3)")
+        raise InputError(f"points has shape {points.shape}, expected (n, 2) or (n, 3)")
     bottoms, unit_weights, ratios = _checked_layers(layers)
     dim, y = points.shape[1], points[:, -1]
     number = np.sum(y[:, None] < bottoms[:-1], axis=1)  # of the layer around each point
@@ -100,14 +100,14 @@ def k0_layered_stress(
 def _checked_layers(layers: Any) -> Any:
     table = np.asarray(layers, dtype=float)
     if table.ndim != 2 or table.shape[1] != 3 or len(table) == 0 or np.isnan(table).any():
-        raise InputError(f"layers: got {layers!r}, expected rows of (bottom, unit_weight, k0)")
+        raise InputError(f"layers is {layers!r}, expected rows of (bottom, unit_weight, k0)")
     bottoms, unit_weights, ratios = table.T
     if np.any(np.diff(bottoms) >= 0):
-        raise InputError(f"layers: got bottoms {bottoms.tolist()} m, expected them from the top down")
+        raise InputError(f"layers has the bottoms {bottoms.tolist()} m, expected them from the top down")
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
-        raise InputError(f"k0: got {ratios.tolist()}, expected zero or more")
+        raise InputError(f"k0 is {ratios.tolist()}, expected zero or more")
     if not np.isfinite(unit_weights).all():
-        raise InputError(f"unit_weight: got {unit_weights.tolist()} N/m3, expected finite numbers")
+        raise InputError(f"unit_weight is {unit_weights.tolist()} N/m3, expected finite numbers")
     return bottoms, unit_weights, ratios
 
 
@@ -120,5 +120,5 @@ def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.
     if line.ndim == 0:
         return np.full(len(points), float(line))
     if line.ndim != 2 or line.shape[1] != 2 or np.any(np.diff(line[:, 0]) < 0):
-        raise InputError(f"surface: got an array of shape {line.shape}, expected (k, 2) points with x rising")
+        raise InputError(f"surface has shape {line.shape}, expected (k, 2) points with x rising")
     return np.interp(points[:, 0], line[:, 0], line[:, 1])

@@ -61,7 +61,7 @@ def log_spiral(
     best = _best(slope)
     if not np.isfinite(best.load):
         raise InputError(
-            f"angle: got {angle!r} degrees, expected one further above friction_angle={friction_angle!r} degrees: there is no "
+            f"angle is {angle!r} degrees, expected one further above friction_angle={friction_angle!r} degrees: there is no "
             "mechanism"
         )
     size = height / best.height
@@ -92,7 +92,7 @@ def log_spiral_safety(
         InputError: angles or lengths out of range.
     """
     if not 0 < unit_weight < math.inf:
-        raise InputError(f"unit_weight: got {unit_weight!r} N/m3, expected a positive number")
+        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
     low, high = 1e-2, 1e2
     for _ in range(24):
         factor = math.sqrt(low * high)
@@ -131,13 +131,13 @@ class _Mechanisms(NamedTuple):
 def _checked(height: float, angle: float, cohesion: float, friction_angle: float, depth: float | None) -> _Slope:
     if not 0 <= friction_angle < angle <= 90:
         raise InputError(
-            f"angle: got {angle!r} degrees with friction_angle={friction_angle!r}; expected "
+            f"angle is {angle!r} degrees with friction_angle={friction_angle!r}; expected "
             "0 <= friction_angle < angle <= 90"
         )
     if not (height > 0 and cohesion > 0):
-        raise InputError(f"height, cohesion: got {height!r} m, {cohesion!r} Pa, expected positive numbers")
+        raise InputError(f"height and cohesion are {height!r} m, {cohesion!r} Pa, expected positive numbers")
     if depth is not None and not 0 <= depth < math.inf:
-        raise InputError(f"depth: got {depth!r} m, expected a number of at least 0, or None")
+        raise InputError(f"depth is {depth!r} m, expected a number of at least 0, or None")
     return _Slope(
         math.radians(angle), math.tan(math.radians(friction_angle)), None if depth is None else depth / height
     )

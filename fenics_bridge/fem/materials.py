@@ -35,7 +35,7 @@ class Materials:
             return
         agree(
             self._comm,
-            "cell_tags: got None, expected the tags that the laws are given for" if cell_tags is None else None,
+            "cell_tags is None, expected the tags that the laws are given for" if cell_tags is None else None,
         )
         values = tag_values(domain, cell_tags, domain.topology.dim)[:n_cells]
         law = by_number(self._comm, cell_tags, law, "law", "cell")
@@ -65,5 +65,5 @@ class Materials:
         tags = described(self._cell_tags, self.tags)
         expected = f"laws for the cell tags {tags}" if self.tags != (None,) else "one law"
         mistake = set(given) != set(self.tags) or isinstance(given.get(None), dict)
-        agree(self._comm, f"law: got {law!r}, expected {expected}" if mistake else None)
+        agree(self._comm, f"law is {law!r}, expected {expected}" if mistake else None)
         return [given[tag] for tag in self.tags]

@@ -256,10 +256,10 @@ def _first_mistake(law: Any) -> str | None:
     if isinstance(law, mpm.LinearElastic):
         return None
     if not isinstance(law, mpm.MohrCoulomb):
-        return f"law: got {type(law).__name__}, expected LinearElastic or MohrCoulomb"
+        return f"law is {type(law).__name__}, expected LinearElastic or MohrCoulomb"
     if law.friction_angle != 0 or np.isfinite(law.tension_cutoff):
         return (
-            f"law: got a friction angle of {law.friction_angle:g} degrees and a tension cut-off of "
+            f"law has a friction angle of {law.friction_angle:g} degrees and a tension cut-off of "
             f"{law.tension_cutoff:g} Pa, expected 0 and none"
         )
     return None

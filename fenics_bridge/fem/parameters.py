@@ -17,7 +17,7 @@ def set_parameter(model: Any, name: str, values: Any) -> None:
     domain, points, laws = model.domain, model.points, model.laws
     tags, of_point = {}, None
     if isinstance(values, dict):
-        given = "cell_tags: got None, expected the tags that values are given for" if model.cell_tags is None else None
+        given = "cell_tags is None, expected the tags that values are given for" if model.cell_tags is None else None
         agree(domain.comm, given)
         tags = {key: tag_numbers(domain.comm, model.cell_tags, (key,), name, "cell") for key in values}
         of_cell = tag_values(domain, model.cell_tags, domain.topology.dim)[: owned_cells(domain)]

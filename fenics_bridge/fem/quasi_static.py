@@ -86,8 +86,13 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.radius = radius_of(domain, self.geometry)
         """Radius of an axisymmetric body, a UFL expression; None in others"""
         known = (1, 2) if domain.geometry.dim == 3 else (1, 2, 4)
-        agree(domain.comm, None if degree in known else f"degree: got {degree!r}, expected one of {known}")
-        agree(domain.comm, f"nmd: averages strains of degree=1, got degree={degree}" if nmd and degree != 1 else None)
+        agree(domain.comm, None if degree in known else f"degree is {degree!r}, expected one of {known}")
+        agree(
+            domain.comm,
+            f"nmd is True, expected False with degree={degree}: it averages strains of linear elements"
+            if nmd and degree != 1
+            else None,
+        )
         space = compat.function_space(domain, "Lagrange", degree, domain.geometry.dim)
         self.domain = domain
         """Mesh of the body"""
@@ -107,7 +112,9 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """The boundary conditions in force"""
         self.off: Sequence[int] = ()
         """Tags of the cells that are inactive"""
-        agree(domain.comm, "as_particles: is for elements with nmd=True" if as_particles and not nmd else None)
+        agree(
+            domain.comm, "as_particles is True, expected False without nmd=True" if as_particles and not nmd else None
+        )
         self._nmd, self._as_particles, self._options_prefix = nmd, as_particles, options_prefix
         constraints = Constraints(space, facet_tags, supports)
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
@@ -216,7 +223,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """
         shape = self.points.stress.shape
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
-        agree(self.domain.comm, None if good else f"stress: got shape {np.shape(stress)}, expected finite {shape}")
+        agree(self.domain.comm, None if good else f"stress has shape {np.shape(stress)}, expected finite {shape}")
         self.points.stress[:] = stress
         self.points.reset_state(self.laws)
         self.displacement.x.array[:] = 0.0

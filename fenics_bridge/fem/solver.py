@@ -34,12 +34,12 @@ class Solver:
     def __post_init__(self) -> None:
         for name in ("tolerance", "relaxed_tolerance"):
             if not 0 < getattr(self, name) < 1:
-                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a number between 0 and 1")
+                raise InputError(f"{name} is {getattr(self, name)!r}, expected a number between 0 and 1")
         if not 0 <= self.missing_tolerance < 1:
-            raise InputError(f"missing_tolerance: got {self.missing_tolerance!r}, expected a number from 0 to below 1")
+            raise InputError(f"missing_tolerance is {self.missing_tolerance!r}, expected a number from 0 to below 1")
         for name in ("max_iterations", "max_steps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) > 0):
-                raise InputError(f"{name}: got {getattr(self, name)!r}, expected a whole number above 0")
+                raise InputError(f"{name} is {getattr(self, name)!r}, expected a whole number above 0")
 
 
 PRACTICE = Solver(tolerance=1e-5, missing_tolerance=1e-2)

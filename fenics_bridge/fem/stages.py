@@ -112,7 +112,7 @@ def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
         InputError: unit_weight is negative or not finite.
     """
     if not (np.isfinite(unit_weight) and unit_weight >= 0):
-        raise InputError(f"unit_weight: got {unit_weight!r} N/m3, expected a number from 0 on")
+        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a number from 0 on")
     return lambda x: unit_weight * np.maximum(surface_height(level, x) - x[:, -1], 0.0)
 
 
@@ -245,8 +245,8 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
     for name in ("unit_weight", "pressure"):
         for key, value in getattr(stage, name).items():
             if not (np.isscalar(value) and np.isfinite(value)):
-                return f"{where}{name}: got {value!r} for {key!r}, expected a finite number"
+                return f"{where}{name} is {value!r} for {key!r}, expected a finite number"
     for key, law in stage.law.items():
         if not isinstance(law, tuple(_core.law_types)):
-            return f"{where}law: got {law!r} for {key!r}, expected a constitutive law such as MohrCoulomb(...)"
+            return f"{where}law is {law!r} for {key!r}, expected a constitutive law such as MohrCoulomb(...)"
     return None

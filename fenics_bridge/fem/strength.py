@@ -41,14 +41,14 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
         InputError: the factor is not positive, a tag has no law, no law is left to reduce, or the strength of a law is not known.
     """
     if not (np.isfinite(factor) and factor > 0):
-        raise InputError(f"factor: got {factor!r}, expected a positive number")
+        raise InputError(f"factor is {factor!r}, expected a positive number")
     if isinstance(law, dict):
         unknown = [tag for tag in unreduced if tag not in law]
         if unknown:
             raise InputError(f"unreduced: there is no law for {unknown[0]!r}; laws are given for {list(law)}")
         kept = [tag for tag, one in law.items() if tag in unreduced or isinstance(one, mpm.LinearElastic)]
         if len(kept) == len(law):
-            raise InputError(f"unreduced: got {list(unreduced)}; no law is left whose strength could be reduced")
+            raise InputError(f"unreduced is {list(unreduced)}; no law is left whose strength could be reduced")
         return {tag: one if tag in kept else reduced_strength(one, factor) for tag, one in law.items()}
     return _core.reduced_strength(law, factor)
 
@@ -69,7 +69,7 @@ def davis_strength(law: Laws) -> Laws:
     if isinstance(law, dict):
         return {tag: davis_strength(one) if isinstance(one, mpm.MohrCoulomb) else one for tag, one in law.items()}
     if not isinstance(law, mpm.MohrCoulomb):
-        raise InputError(f"law: got {type(law).__name__}, expected MohrCoulomb")
+        raise InputError(f"law is {type(law).__name__}, expected MohrCoulomb")
     phi, psi = math.radians(law.friction_angle), math.radians(law.dilation_angle)
     factor = (1 - math.sin(psi) * math.sin(phi)) / (math.cos(psi) * math.cos(phi))
     friction = _divided(law.friction_angle, factor)

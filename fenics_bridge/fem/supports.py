@@ -55,7 +55,7 @@ def roller(facet_tag: int | str, normal: ArrayLike) -> Support:
     along = np.flatnonzero(normal)
     if len(along) != 1:
         raise InputError(
-            f"normal: got {tuple(normal.tolist())}, expected an axis such as (1, 0): the finite elements hold "
+            f"normal is {tuple(normal.tolist())}, expected an axis such as (1, 0): the finite elements hold "
             "components of the displacement, so their rollers cannot be inclined"
         )
     return Support(facet_tag, tuple(0.0 if i == along[0] else None for i in range(len(normal))))

@@ -54,11 +54,11 @@ def _arrays(lengths: Any, counts: Any, diagonals: str, body: Any) -> Any:
     lengths, counts = np.asarray(lengths, dtype=float), np.asarray(counts)
     dim = len(lengths)
     if dim not in (2, 3) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
-        raise InputError(f"lengths: got {lengths.tolist()} m, expected two or three positive lengths")
+        raise InputError(f"lengths is {lengths.tolist()} m, expected two or three positive lengths")
     if counts.shape != lengths.shape or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
-        raise InputError(f"counts: got {counts.tolist()}, expected {dim} whole numbers from 1 on")
+        raise InputError(f"counts is {counts.tolist()}, expected {dim} whole numbers from 1 on")
     if diagonals not in ("alternating", "one-way"):
-        raise InputError(f"diagonals: got {diagonals!r}, expected 'alternating' or 'one-way'")
+        raise InputError(f"diagonals is {diagonals!r}, expected 'alternating' or 'one-way'")
     grid = np.indices(counts + 1).reshape(dim, -1).T
     points, cells = grid * (lengths / counts), _simplices(counts, diagonals == "alternating")
     centres = points[cells].mean(axis=1)

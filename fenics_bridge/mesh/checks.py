@@ -31,7 +31,7 @@ def check_cells_fit(cells: NDArray[np.integer], name: str) -> None:
         raise InputError(f"{name}: cell {np.argmax(flat)} has a node twice")
     first, counts = _distinct(nodes)
     if (counts > 1).any():
-        raise InputError(f"{name}: cell {first[np.argmax(counts > 1)]} is there {counts.max()} times")
+        raise InputError(f"{name}: cell {first[np.argmax(counts > 1)]} is listed {counts.max()} times")
     facets = np.concatenate([np.delete(nodes, k, axis=1) for k in range(nodes.shape[1])])
     first, counts = _distinct(facets)
     if (counts > 2).any():
@@ -61,14 +61,14 @@ def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], na
     if on is not None:
         raise InputError(
             f"{name}: the node at {_place(points[nodes[on]])} lies within {kind} of another cell; cells must meet node to node, "
-            "or the mesh is torn there"
+            "otherwise the mesh has a gap there"
         )
     centres = points[facets].mean(axis=1)
     on = _point_on_facet(centres, None, points, facets)
     if on is not None:
         raise InputError(
-            f"{name}: {kind} of a cell overlaps that of another at {_place(centres[on])}; cells must meet node to node, or the "
-            "mesh is torn there"
+            f"{name}: {kind} of a cell overlaps that of another at {_place(centres[on])}; cells must meet node to node, "
+            "otherwise the mesh has a gap there"
         )
 
 

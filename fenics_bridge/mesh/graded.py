@@ -49,12 +49,12 @@ def graded_tags(
     """
     comm, dim = domain.comm, domain.topology.dim
     old = tag_numbers(comm, cell_tags, soil, "soil", "cell")
-    agree(comm, None if classes >= 1 else f"classes: got {classes!r}, expected a whole number from 1 on")
+    agree(comm, None if classes >= 1 else f"classes is {classes!r}, expected a whole number from 1 on")
     tags = tag_values(domain, cell_tags, dim)
     corners = domain.geometry.x[compat.cell_nodes(domain), : domain.geometry.dim]
     rows = np.flatnonzero(np.isin(tags, old))
     values = np.broadcast_to(np.asarray(value_of(corners[rows].mean(axis=1)), dtype=float), len(rows))
-    agree(comm, None if np.all(np.isfinite(values)) else "value_of: it gives values that are not finite")
+    agree(comm, None if np.all(np.isfinite(values)) else "value_of gives values that are not finite")
     low, high = comm.allreduce(values.min(initial=np.inf), MPI.MIN), comm.allreduce(
         values.max(initial=-np.inf), MPI.MAX
     )

@@ -80,9 +80,9 @@ def _check_arguments(comm: MPI.Comm, path: str | Path, dim: int, parameters: Map
     message = None
     suffix = Path(path).suffix.lower()
     if dim not in (2, 3):
-        message = f"dim: got {dim!r}, expected 2 or 3"
+        message = f"dim is {dim!r}, expected 2 or 3"
     elif suffix not in (".msh", ".geo"):
-        message = f"path: got {str(path)!r}, expected a gmsh file ending in .msh or .geo"
+        message = f"path is {str(path)!r}, expected a gmsh file ending in .msh or .geo"
     elif parameters and suffix != ".geo":
         message = f"parameters: only a .geo file takes them, got path {str(path)!r}"
     agree(comm, message)

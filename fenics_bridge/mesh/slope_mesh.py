@@ -75,7 +75,7 @@ def slope_mesh(
         shape = _checked(height, angle, crest, cell_size, runout, headroom, depth)
         makers = {"crossed": _crossed, "fitted": _fitted, "gmsh": _unstructured}
         if kind not in makers:
-            raise InputError(f"kind: got {kind!r}, expected one of {', '.join(makers)}")
+            raise InputError(f"kind is {kind!r}, expected one of {', '.join(makers)}")
         return makers[kind](*shape)
 
     result = on_first_rank(comm, arrays)
@@ -94,15 +94,15 @@ def _checked(
 ) -> tuple[Any, ...]:
     for name, value in (("height", height), ("crest", crest), ("cell_size", cell_size), ("runout", runout)):
         if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name}: got {value!r} m, expected a positive length")
+            raise InputError(f"{name} is {value!r} m, expected a positive length")
     if not (np.isfinite(headroom) and headroom >= 0):
-        raise InputError(f"headroom: got {headroom!r} m, expected a length, zero or more")
+        raise InputError(f"headroom is {headroom!r} m, expected a length, zero or more")
     if not (np.isfinite(depth) and depth >= 0):
-        raise InputError(f"depth: got {depth!r} m, expected a length, zero or more")
+        raise InputError(f"depth is {depth!r} m, expected a length, zero or more")
     if not 0 < angle <= 90:
-        raise InputError(f"angle: got {angle!r} degrees, expected more than 0 and at most 90")
+        raise InputError(f"angle is {angle!r} degrees, expected more than 0 and at most 90")
     if cell_size > min(height, crest):
-        raise InputError(f"cell_size: got {cell_size!r} m, expected at most the height {height} m and crest {crest} m")
+        raise InputError(f"cell_size is {cell_size!r} m, expected at most the height {height} m and crest {crest} m")
     slope_length = 0.0 if angle == 90 else height / math.tan(math.radians(angle))
     return height, crest, crest + slope_length, cell_size, runout, headroom, depth
 
@@ -115,7 +115,7 @@ def _crossed(
     run = base - crest
     if min(abs(run - height), run) > 1e-9 * height:
         raise InputError(
-            f"angle: got {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
+            f"angle is {_angle(height, run):.6g} degrees; kind='crossed' has cell edges at 45 and 90 "
             "degrees only, use kind='fitted' or 'gmsh'"
         )
     return _fitted(height, crest, base, size, runout, headroom, depth)
@@ -140,7 +140,7 @@ def _fitted(
     run = base - crest
     if run > 0 and not 0.2 <= height / run <= 5:
         raise InputError(
-            f"angle: got {_angle(height, run):.6g} degrees; kind='fitted' would need cells that are too "
+            f"angle is {_angle(height, run):.6g} degrees; kind='fitted' would need cells that are too "
             "long, expected 11.4 to 78.6, or 90, degrees; use kind='gmsh'"
         )
     rows, columns = round(height / size), round(crest / size)
@@ -205,7 +205,7 @@ def _unstructured(
     height: float, crest: float, base: float, size: float, runout: float, headroom: float, depth: float
 ) -> tuple[Any, ...]:
     if depth > 0:
-        raise InputError(f"depth: got {depth!r} m, expected 0 with kind='gmsh'; use kind='fitted'")
+        raise InputError(f"depth is {depth!r} m, expected 0 with kind='gmsh'; use kind='fitted'")
     with gmsh_session():
         try:
             _slope_geometry(height, crest, base, size, runout, headroom)

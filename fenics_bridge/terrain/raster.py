@@ -101,7 +101,7 @@ class Raster:
             and high[1] - eps <= self.y[-1]
         )
         if not (low[0] < high[0] and low[1] < high[1] and inside):
-            raise InputError(f"window: got {tuple(low)} to {tuple(high)} m, expected corners inside of x "
+            raise InputError(f"window is {tuple(low)} to {tuple(high)} m, expected corners inside of x "
                              f"{self.x[0]:g} to {self.x[-1]:g} m "
                              f"and y {self.y[0]:g} to {self.y[-1]:g} m")  # fmt: skip
         return Raster(self.x[columns], self.y[rows], self.values[np.ix_(rows, columns)], self.crs)
@@ -145,7 +145,7 @@ def read_raster(
             raise InputError(f"path: {str(path)!r} cannot be read: {error}") from None
         inside = ""
     else:
-        raise InputError(f"path: got {str(path)!r}, expected a file ending in {', '.join((*readers, *TIFF))}")
+        raise InputError(f"path is {str(path)!r}, expected a file ending in {', '.join((*readers, *TIFF))}")
     raster = Raster(x, y, values, _reference(path, crs if crs is not None else inside or None))
     raster = raster if window is None else raster.window(*window)
     _check_heights(raster, str(path))

@@ -58,9 +58,9 @@ def seed_slide(
 def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[Any, ...]:
     """Places and volumes of the particles, and how far they were lifted at most."""
     if before.crs != rupture.crs:
-        raise InputError(f"rupture: is in {rupture.crs!r}, expected {before.crs!r} as the ground before the slide")
+        raise InputError(f"rupture is in {rupture.crs!r}, expected {before.crs!r} as the ground before the slide")
     if not (np.isfinite(spacing) and spacing > 0):
-        raise InputError(f"spacing: got {spacing!r} m, expected a positive length")
+        raise InputError(f"spacing is {spacing!r} m, expected a positive length")
     low = np.maximum((before.x[0], before.y[0]), (rupture.x[0], rupture.y[0]))
     high = np.minimum((before.x[-1], before.y[-1]), (rupture.x[-1], rupture.y[-1]))
     along = [a + spacing * (np.arange(int((b - a) / spacing)) + 0.5) for a, b in zip(low, high)]
@@ -70,7 +70,7 @@ def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[An
     plan, thickness, numbers = plan[numbers > 0], thickness[numbers > 0], numbers[numbers > 0]
     if len(plan) == 0:
         raise InputError(
-            f"before: is nowhere higher than rupture by more than half a spacing of {spacing:g} m, expected a body"
+            f"before is nowhere higher than rupture by more than half a spacing of {spacing:g} m, expected a body"
         )
     column = np.repeat(np.arange(len(plan)), numbers)
     first = np.repeat(np.cumsum(numbers) - numbers, numbers)

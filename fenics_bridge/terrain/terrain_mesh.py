@@ -66,14 +66,14 @@ def terrain_mesh(
 def _check(ground: Any, cell_size: float, height: float, coarse: Any, below: Any, fine: Any) -> None:
     for name, value in (("cell_size", cell_size), ("height", height), ("coarse_size", coarse), ("depth", below)):
         if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name}: got {value!r} m, expected a positive length")
+            raise InputError(f"{name} is {value!r} m, expected a positive length")
     if coarse < cell_size:
-        raise InputError(f"coarse_size: got {coarse!r} m, expected at least cell_size, {cell_size!r} m")
+        raise InputError(f"coarse_size is {coarse!r} m, expected at least cell_size, {cell_size!r} m")
     (x0, y0), (x1, y1) = fine
     if not (x0 < x1 and y0 < y1):
-        raise InputError(f"fine: got {fine!r} m, expected two corners, the lower left one first")
+        raise InputError(f"fine is {fine!r} m, expected two corners, the lower left one first")
     if min(len(ground.x), len(ground.y)) < 4:
-        raise InputError(f"ground: has {len(ground.y)} rows and {len(ground.x)} columns, expected 4 or more of both")
+        raise InputError(f"ground has {len(ground.y)} rows and {len(ground.x)} columns, expected 4 or more of both")
 
 
 def _plan(ground: Any, cell_size: float, coarse: Any, fine: Any) -> tuple[Any, ...]:

@@ -262,13 +262,13 @@ def _first_mistake(
     young: float, poisson: float, density: float, degree: int, supports: Sequence[Support]
 ) -> str | None:
     if not (np.isfinite(young) and young > 0):
-        return f"young: got {young!r} Pa, expected a positive number"
+        return f"young is {young!r} Pa, expected a positive number"
     if not 0 <= poisson < 0.5:
-        return f"poisson: got {poisson!r}, expected at least 0 and below 0.5"
+        return f"poisson is {poisson!r}, expected at least 0 and below 0.5"
     if not (np.isfinite(density) and density >= 0):
-        return f"density: got {density!r} kg/m3, expected a number not below zero"
+        return f"density is {density!r} kg/m3, expected a number not below zero"
     if isinstance(degree, bool) or degree != int(degree) or degree < 1:
-        return f"degree: got {degree!r}, expected a whole number from 1 on"
+        return f"degree is {degree!r}, expected a whole number from 1 on"
     moving = [support for support in supports if any(support.displacement or ())]
     return f"supports: {moving[0]} moves, expected displacements of zero" if moving else None
 

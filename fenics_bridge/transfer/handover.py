@@ -111,7 +111,7 @@ def initialise(
     _require_usable(model, fem, move)
     _warn_of_other_weight(model, fem)
     if resting:
-        agree(model.comm, "move: cells that rest are not moved, expected False with resting" if move else None)
+        agree(model.comm, "move is True, expected False with resting: resting cells are not moved" if move else None)
         model.rest()
     search = PointSearch(fem.displacement.function_space.mesh, particles.position)
     search.require_all("particles")
@@ -120,7 +120,7 @@ def initialise(
         outside = int(np.sum(number < 0))
         agree(
             model.comm,
-            f"particles: {outside} of them lie where the soil of the finite elements is not there" if outside else None,
+            f"{outside} particles lie where the finite elements have no soil" if outside else None,
         )
         _require_same_laws(model, fem, number)
     returned = _take_stress_and_state(model, fem, search, smooth)
@@ -192,11 +192,11 @@ def _returned(
 
 def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
-    agree(model.comm, None if solved else "fem: it has not been solved, or its last solution did not converge")
+    agree(model.comm, None if solved else "fem has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
     fits = (model._core.water is not None) == isinstance(fem, Consolidation)
     problem = (
-        f"fem: is a {type(fem).__name__}, expected a water.Consolidation where particles have pore water (Model.add_water), "
+        f"fem is a {type(fem).__name__}, expected a water.Consolidation where particles have pore water (Model.add_water), "
         "and another one where they have none"
     )
     agree(model.comm, None if fits else problem)
@@ -241,11 +241,11 @@ def _require_same_laws(model: mpm.Model, fem: Any, number: Any) -> None:
 def _law_mistake(material: Any, law: Any, there: Any) -> str | None:
     """Difference between the law of a material and that of the finite elements, in words; None for none."""
     if type(law) is not type(there):
-        return f"fem: its law is {type(there).__name__}, that of material {material} is {type(law).__name__}"
+        return f"the law of fem is {type(there).__name__}, that of material {material} is {type(law).__name__}"
     for name in _parameters(law):
         if getattr(law, name) != getattr(there, name):
             return (
-                f"fem: its law has {name}={getattr(there, name)!r}, that of material {material} has "
+                f"the law of fem has {name}={getattr(there, name)!r}, that of material {material} has "
                 f"{name}={getattr(law, name)!r}"
             )
     return None

@@ -59,7 +59,7 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
     """
     mesh, cells = model.mesh, model.particles.cell
     p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
-    agree(model.comm, None if np.all(np.isfinite(p)) else "pore_pressure: it gives values that are not finite")
+    agree(model.comm, None if np.all(np.isfinite(p)) else "pore_pressure gives values that are not finite")
     gradient = np.einsum("ck,ckd->cd", p[mesh.cells], _gradients(mesh))
     force = -model.particles.volume[:, None] * gradient[cells]
     suction = np.maximum(-p, 0.0)

@@ -99,7 +99,12 @@ def particle_safety(
 
     def attempt(factor: float) -> Any:
         models[factor] = model = model_of(factor)
-        agree(model.comm, None if np.any(model.gravity) else "model_of: its model has no gravity to fail under")
+        agree(
+            model.comm,
+            None
+            if np.any(model.gravity)
+            else "model_of returns a model without gravity, expected one that may fail under its weight",
+        )
         report, moved = _follow(model, damping, rest, nmd)
         if report.converged:
             curve.append((factor, moved))
@@ -133,7 +138,7 @@ def _check(**values: float) -> None:
         below = {"tolerance": 1.0, "damping": 1.0, "rest": 1.0}.get(name, math.inf)
         if not 0 < value < below:
             expected = "a positive number" if below == math.inf else "a number between 0 and 1"
-            raise InputError(f"{name}: got {value!r}, expected {expected}")
+            raise InputError(f"{name} is {value!r}, expected {expected}")
 
 
 def _follow(model: Any, damping: float, rest: float, nmd: bool) -> Any:

@@ -50,7 +50,7 @@ class ParticleSite:
         **options: Any,
     ) -> None:
         comm, mesh = model.comm, model.mesh
-        agree(comm, None if comm.allreduce(len(model.particles)) == 0 else "model: it has particles, expected none yet")
+        agree(comm, None if comm.allreduce(len(model.particles)) == 0 else "model has particles, expected none yet")
         self.model = model
         """The particles"""
         self.number = 0

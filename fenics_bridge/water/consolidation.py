@@ -296,7 +296,7 @@ class Consolidation(ConsolidationResults):
         Note:
             Collective.
         """
-        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
+        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
         end, stored = self.time + dt, self.stored_water()
         load = self.load_at(end)
@@ -413,19 +413,19 @@ def _first_mistake(
     element: Any, nmd: bool, soil: Any, unit_weight: Any, water_modulus: float, geometry: Any, inertia: Any
 ) -> str | None:
     if not isinstance(element, Element):
-        return f"element: got {element!r}, expected one of {', '.join(map(str, Element))}"
+        return f"element is {element!r}, expected one of {', '.join(map(str, Element))}"
     if nmd and element != Element.STABILISED:
-        return f"nmd: averages strains of linear elements, Element.STABILISED, got element={element}"
+        return f"nmd is True, expected False with element={element}: it averages strains of linear elements, Element.STABILISED"
     for one in soil.values() if isinstance(soil, dict) else [soil]:
         retention = getattr(one, "retention", None)
         if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):
-            return f"soil: it has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
+            return f"soil has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
         if inertia is not None and getattr(one, "density", None) is None:
             return f"soil: {one!r} has no density, expected one for steps with inertia"
     if not isinstance(inertia, (Newmark, type(None))):
-        return f"inertia: got {inertia!r}, expected a Newmark, or None"
+        return f"inertia is {inertia!r}, expected a Newmark, or None"
     if not (np.isfinite(unit_weight) and unit_weight > 0):
-        return f"unit_weight: got {unit_weight!r} N/m3, expected a positive number"
+        return f"unit_weight is {unit_weight!r} N/m3, expected a positive number"
     if not water_modulus > 0:
-        return f"water_modulus: got {water_modulus!r} Pa, expected a positive number, or infinity"
+        return f"water_modulus is {water_modulus!r} Pa, expected a positive number, or infinity"
     return None

@@ -65,11 +65,11 @@ def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
 
 def _check(model: Any, off: Any, duration: float) -> None:
     comm = model.domain.comm
-    agree(comm, "reconfigure: it has inertia, expected quasi-static steps" if model.motion is not None else None)
+    agree(comm, "the model has inertia, expected quasi-static steps" if model.motion is not None else None)
     good = is_finite(duration) and duration >= 0
-    agree(comm, None if good else f"duration: got {duration!r} s, expected a number from 0 on")
+    agree(comm, None if good else f"duration is {duration!r} s, expected a number from 0 on")
     missing = len(off) and model.cell_tags is None
-    agree(comm, "off: the model has no cell_tags, by which soils are known" if missing else None)
+    agree(comm, "off names soils, but the model has no cell_tags" if missing else None)
 
 
 def _place(model: Any, there: Any, was_there: NDArray[np.bool_]) -> None:
@@ -95,7 +95,7 @@ def _pressures(model: Any, pore_pressure: Any) -> NDArray[np.float64]:
     x = model._pressures[0].tabulate_dof_coordinates()[:, : model.domain.geometry.dim]
     given = np.zeros(len(x)) if pore_pressure is None else np.asarray(pore_pressure(x), dtype=float)
     good = given.shape == (len(x),) and np.all(np.isfinite(given))
-    agree(model.domain.comm, None if good else f"pore_pressure: got shape {given.shape}, expected finite {(len(x),)}")
+    agree(model.domain.comm, None if good else f"pore_pressure has shape {given.shape}, expected finite {(len(x),)}")
     return given
 
 

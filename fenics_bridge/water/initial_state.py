@@ -50,4 +50,4 @@ def _pressures(model: Any, pore_pressure: Any) -> Any:
 
 def _require(comm: MPI.Comm, name: str, values: Any, shape: Any) -> None:
     good = values is None or (np.shape(values) == shape and np.all(np.isfinite(values)))
-    agree(comm, None if good else f"{name}: got shape {np.shape(values)}, expected finite values of shape {shape}")
+    agree(comm, None if good else f"{name} has shape {np.shape(values)}, expected finite values of shape {shape}")

@@ -34,10 +34,10 @@ class Newmark:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.gamma) and self.gamma >= 0.5):
-            raise InputError(f"gamma: got {self.gamma!r}, expected 0.5 or more")
+            raise InputError(f"gamma is {self.gamma!r}, expected 0.5 or more")
         least = 0.25 * (self.gamma + 0.5) ** 2
         if not (np.isfinite(self.beta) and self.beta >= least * (1 - 1e-12)):
-            raise InputError(f"beta: got {self.beta!r}, expected (gamma + 1/2)^2 / 4 = {least:g} or more")
+            raise InputError(f"beta is {self.beta!r}, expected (gamma + 1/2)^2 / 4 = {least:g} or more")
 
 
 class Motion:
@@ -93,7 +93,7 @@ class Motion:
             self._space.mesh.comm,
             None
             if good
-            else f"velocity: got shape {values.shape}, expected finite values of shape {x.shape} or ({dim},)",
+            else f"velocity has shape {values.shape}, expected finite values of shape {x.shape} or ({dim},)",
         )
         self.velocity.x.array[:] = np.broadcast_to(values, x.shape).ravel()
         self.acceleration.x.array[:] = 0.0

@@ -29,6 +29,6 @@ def apply_reservoirs(model: mpm.Model, boundary: Iterable[WaterBoundary], time: 
     conditions = list(boundary)
     reservoirs = [one for one in conditions if isinstance(one, Reservoir)]
     others = [one for one in conditions if not isinstance(one, Reservoir)]
-    agree(model.comm, f"boundary: has {others[0]!r}, expected reservoirs only for particles" if others else None)
+    agree(model.comm, f"boundary has {others[0]!r}, expected reservoirs only for particles" if others else None)
     for one in reservoirs:
         model.hold_pore_pressure(one.facet_tag, level=value_at(one.level, time))

@@ -80,10 +80,10 @@ class VanGenuchten(_Curve):
     def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
         if not (np.isfinite(self.n) and self.n > 1):
-            raise InputError(f"n: got {self.n!r}, expected more than 1")
+            raise InputError(f"n is {self.n!r}, expected more than 1")
         _check_residual(self.residual)
         if not (np.isfinite(self.air_entry) and self.air_entry >= 0):
-            raise InputError(f"air_entry: got {self.air_entry!r} Pa, expected 0 or more")
+            raise InputError(f"air_entry is {self.air_entry!r} Pa, expected 0 or more")
 
     def _powers(self, suction: Any) -> Any:
         """(alpha s)^n at the suction and at the air entry."""
@@ -172,18 +172,16 @@ class Tabulated(_Curve):
                              "expected as many of each, two or more")  # fmt: skip
         s = np.asarray(self.suction, dtype=float)
         if not (s[0] == 0 and np.all(np.diff(s) > 0) and np.all(np.isfinite(s))):
-            raise InputError(f"suction: got {self.suction!r} Pa, expected rising values from 0 on")
+            raise InputError(f"suction is {self.suction!r} Pa, expected rising values from 0 on")
         for name in ("saturation_values", "permeability_values"):
             values = np.asarray(getattr(self, name), dtype=float)
             wrong = np.flatnonzero(~(np.diff(values) <= 0))
             if len(wrong):
                 k = wrong[0]
-                raise InputError(f"{name}: rises from {values[k]:g} to {values[k + 1]:g} between suctions of {s[k]:g} and "
+                raise InputError(f"{name} rises from {values[k]:g} to {values[k + 1]:g} between suctions of {s[k]:g} and "
                                  f"{s[k + 1]:g} Pa, expected values that fall")  # fmt: skip
             if values[0] != 1 or values[-1] < 0:
-                raise InputError(
-                    f"{name}: goes from {values[0]:g} to {values[-1]:g}, expected from 1 to no less than 0"
-                )
+                raise InputError(f"{name} goes from {values[0]:g} to {values[-1]:g}, expected from 1 to no less than 0")
 
     @property
     def residual(self) -> float:  # type: ignore[override]
@@ -238,7 +236,7 @@ class FreeSurface(_Curve):
         _check_positive("fringe", self.fringe, "Pa")
         _check_residual(self.residual)
         if not 0 < self.dry_permeability < 1:
-            raise InputError(f"dry_permeability: got {self.dry_permeability!r}, expected more than 0 and less than 1")
+            raise InputError(f"dry_permeability is {self.dry_permeability!r}, expected more than 0 and less than 1")
 
     def effective(self, suction: Any) -> Any:
         """Effective saturation S_e [-].
@@ -303,9 +301,9 @@ def _joined(x: Any, places: Any, values: Any) -> Any:
 
 def _check_positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0):
-        raise InputError(f"{name}: got {value!r} {unit}, expected a positive number")
+        raise InputError(f"{name} is {value!r} {unit}, expected a positive number")
 
 
 def _check_residual(value: float) -> None:
     if not 0 <= value < 1:
-        raise InputError(f"residual: got {value!r}, expected at least 0 and less than 1")
+        raise InputError(f"residual is {value!r}, expected at least 0 and less than 1")

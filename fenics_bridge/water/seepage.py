@@ -81,10 +81,10 @@ class Seepage:
         loading: Callable[[NDArray[np.float64], float], ArrayLike] | None = None,
     ) -> None:
         comm = domain.comm
-        problem = None if degree in (1, 2) else f"degree: got {degree!r}, expected 1 or 2"
+        problem = None if degree in (1, 2) else f"degree is {degree!r}, expected 1 or 2"
         for name, value in (("unit_weight", unit_weight), ("water_modulus", water_modulus)):
             if not (np.isfinite(value) and value > 0):
-                problem = f"{name}: got {value!r}, expected a positive number"
+                problem = f"{name} is {value!r}, expected a positive number"
         agree(comm, problem)
         self.domain = domain
         """Mesh of the body"""
@@ -130,7 +130,7 @@ class Seepage:
             return
         points = self._load.function_space.tabulate_dof_coordinates()[:, : self._dim]
         load = np.broadcast_to(np.asarray(self._loading(points, self.time), dtype=float), len(points))
-        agree(self.domain.comm, None if np.all(np.isfinite(load)) else "loading: it gives values that are not finite")
+        agree(self.domain.comm, None if np.all(np.isfinite(load)) else "loading gives values that are not finite")
         self._load.x.array[:] = load
 
     # --- solving -----------------------------------------------------------------------------------------------------
@@ -193,7 +193,7 @@ class Seepage:
         Note:
             Collective.
         """
-        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt: got {dt!r} s, expected a positive number")
+        agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
         if self._transient is None:
             self._transient = self._problem(transient=True)

@@ -49,15 +49,15 @@ class PorousSoil:
         if not (
             np.all(np.isfinite(k)) and (k.ndim < 2 or square) and np.all(np.linalg.eigvalsh(self.tensor(k, 3)) > 0)
         ):
-            raise InputError(f"conductivity: got {self.conductivity!r} m/s, expected positive numbers, or a "
+            raise InputError(f"conductivity is {self.conductivity!r} m/s, expected positive numbers, or a "
                              "symmetric tensor with positive principal values")  # fmt: skip
         if not 0 < self.porosity < 1:
-            raise InputError(f"porosity: got {self.porosity!r}, expected more than 0 and less than 1")
+            raise InputError(f"porosity is {self.porosity!r}, expected more than 0 and less than 1")
         if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
-            raise InputError(f"compressibility: got {self.compressibility!r} 1/Pa, expected 0 or more")
+            raise InputError(f"compressibility is {self.compressibility!r} 1/Pa, expected 0 or more")
         curve_values(self.retention)
         if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
-            raise InputError(f"density: got {self.density!r} kg/m3, expected a positive number")
+            raise InputError(f"density is {self.density!r} kg/m3, expected a positive number")
 
     @staticmethod
     def tensor(conductivity: ArrayLike, dim: int) -> NDArray[np.float64]:
@@ -91,10 +91,10 @@ def dipping(along: float, across: float, dip: float, direction: float | None = N
     """
     for name, value in (("along", along), ("across", across)):
         if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name}: got {value!r} m/s, expected a positive number")
+            raise InputError(f"{name} is {value!r} m/s, expected a positive number")
     for name, value in (("dip", dip), ("direction", 0.0 if direction is None else direction)):
         if not np.isfinite(value):
-            raise InputError(f"{name}: got {value!r} degrees, expected a finite number")
+            raise InputError(f"{name} is {value!r} degrees, expected a finite number")
     sine, cosine = np.sin(np.radians(dip)), np.cos(np.radians(dip))
     turned = None if direction is None else np.radians(direction)
     normal = np.array([sine, cosine] if turned is None else [sine * np.cos(turned), sine * np.sin(turned), cosine])
@@ -122,14 +122,14 @@ def soils_by_tag(
     by_tag: dict[Any, PorousSoil] = {None: soil} if not isinstance(soil, dict) else soil
     for key, one in by_tag.items():
         allowed = isinstance(one, PorousSoil) or (dry and one is None and key is not None)
-        agree(comm, None if allowed else f"soil: got {one!r} for {key!r}, expected a PorousSoil")
+        agree(comm, None if allowed else f"soil is {one!r} for {key!r}, expected a PorousSoil")
         shape = np.shape(getattr(one, "conductivity", 0.0))
-        agree(comm, None if not shape or shape[0] == dim else f"conductivity: has shape {shape}, expected ({dim},) or "
+        agree(comm, None if not shape or shape[0] == dim else f"conductivity has shape {shape}, expected ({dim},) or "
               f"({dim}, {dim}) in {dim}D")  # fmt: skip
     if not isinstance(soil, dict):
         every = np.arange(owned_cells(domain) + domain.topology.index_map(dim).num_ghosts, dtype=np.int32)
         return [soil], [ufl.Measure("dx", domain=domain)], [every]
-    agree(comm, "cell_tags: got None, expected the tags that the soils are given for" if cell_tags is None else None)
+    agree(comm, "cell_tags is None, expected the tags that the soils are given for" if cell_tags is None else None)
     by_tag = by_number(comm, cell_tags, by_tag, "soil", "cell")
     values = tag_values(domain, cell_tags, dim)
     known = set().union(*comm.allgather(set(values.tolist())))
@@ -137,6 +137,6 @@ def soils_by_tag(
     agree(comm, f"soil: none for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None)
     dx = ufl.Measure("dx", domain=domain, subdomain_data=cell_tags)
     wet = [tag for tag, one in by_tag.items() if one is not None]
-    agree(comm, None if wet else "soil: got None for all cells, expected a PorousSoil for some")
+    agree(comm, None if wet else "soil is None for all cells, expected a PorousSoil for some")
     cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in wet]
     return [by_tag[tag] for tag in wet], [dx(tag) for tag in wet], cells

@@ -38,9 +38,9 @@ def standing_water(
         Collective.
     """
     dim = domain.geometry.dim
-    agree(domain.comm, None if dim == 2 else f"domain: has {dim} dimensions, expected a plane section")
+    agree(domain.comm, None if dim == 2 else f"domain has {dim} dimensions, expected a plane section")
     reservoirs = [condition for condition in boundary if isinstance(condition, Reservoir)]
-    agree(domain.comm, None if reservoirs else "boundary: has no Reservoir, expected one or more")
+    agree(domain.comm, None if reservoirs else "boundary has no Reservoir, expected one or more")
     grounds = [(condition, ground_line(domain, facet_tags, condition.facet_tag)) for condition in reservoirs]
     close = 1e-9 * max(
         (np.ptp(line) for _, ground in grounds for line in ground), default=0.0

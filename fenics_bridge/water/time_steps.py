@@ -34,9 +34,9 @@ def run(
 
 def _mistake(until: float, time: float, first_step: float, growth: float, longest: float) -> str | None:
     if not (is_finite(until) and until > time):
-        return f"until: got {until!r} s, expected a time after the present one, {time:g} s"
+        return f"until is {until!r} s, expected a time after the present one, {time:g} s"
     if not (is_finite(first_step) and first_step > 0):
-        return f"first_step: got {first_step!r} s, expected a positive number"
+        return f"first_step is {first_step!r} s, expected a positive number"
     if not longest > 0:
-        return f"longest: got {longest!r} s, expected a positive number"
-    return None if np.isfinite(growth) and growth >= 1 else f"growth: got {growth!r}, expected 1 or more"
+        return f"longest is {longest!r} s, expected a positive number"
+    return None if np.isfinite(growth) and growth >= 1 else f"growth is {growth!r}, expected 1 or more"

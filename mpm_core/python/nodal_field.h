@@ -56,7 +56,7 @@ FieldView nodal_field(const Model<G>& model, const std::string& name, std::size_
                      std::to_string(model.fields.size() - 1));
   const VelocityField<G>& nodes = model.fields[velocity_field];
   if (!model.ready)
-    throw InputError("nodal values of '" + name + "' are there only after a step or a report");
+    throw InputError("nodal values of '" + name + "' exist only after a step or a report");
   FieldView found{name, nodes.nodes.size(), {}};
   for_each_nodal_field(nodes,
                        [&](const Field& field, const double* first, std::size_t components, std::size_t bytes_apart)

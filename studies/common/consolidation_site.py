@@ -182,7 +182,7 @@ def read_consolidation_site(
     for name, given in table["soils"].items():
         where = f"{path}: soils.{name}"
         if "unit_weight" not in given:
-            raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
+            raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
         weights[name] = float(given["unit_weight"])
         porous = {key: given[key] for key in POROUS if key in given}
         soils[name] = porous_soil(porous, where) if porous else None
@@ -202,5 +202,5 @@ def read_consolidation_site(
 def _point(given: Any, where: str) -> np.ndarray:
     point = np.array(given, dtype=float) if isinstance(given, list) and len(given) == 2 else np.empty(0)
     if point.shape != (2,):
-        raise mpm.InputError(f"{where}: is {given!r}, expected [x, y] in m")
+        raise mpm.InputError(f"{where} is {given!r}, expected [x, y] in m")
     return point

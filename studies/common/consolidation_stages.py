@@ -48,9 +48,9 @@ def pressure_table(given: Any, where: str) -> Table:
     except (TypeError, ValueError):
         table = np.empty(0)
     if table.ndim != 2 or table.shape[1] != 2:
-        raise mpm.InputError(f"{where}: is {given!r}, expected a number or rows [days, Pa]")
+        raise mpm.InputError(f"{where} is {given!r}, expected a number or rows [days, Pa]")
     if not np.all(np.isfinite(table)):
-        raise mpm.InputError(f"{where}: is {given!r}, expected finite numbers")
+        raise mpm.InputError(f"{where} is {given!r}, expected finite numbers")
     late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
     if len(late):
         first, second = table[late[0] : late[0] + 2, 0]
@@ -75,7 +75,7 @@ def pressures_of(words: Iterable[str]) -> dict[str, Table]:
             rows = []
         one = len(rows) == 1 and len(rows[0]) == 1
         if not name or not equals or not rows or (not one and any(len(row) != 2 for row in rows)):
-            raise mpm.InputError(f"--pressures: is {word!r}, expected NAME=PA or NAME=DAYS:PA,DAYS:PA,...")
+            raise mpm.InputError(f"--pressures is {word!r}, expected NAME=PA or NAME=DAYS:PA,DAYS:PA,...")
         found[name] = pressure_table(rows[0][0] if one else rows, f"--pressures {name}")
     return found
 
@@ -112,7 +112,7 @@ def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, fir
         )
     fill, gone = _names(row, "fill", where), _names(row, "excavate", where)
     if not fill and not gone:
-        raise mpm.InputError(f"{where}: has neither fill nor excavate, expected soils to place or to dig away")
+        raise mpm.InputError(f"{where} has neither fill nor excavate, expected soils to place or to dig away")
     for soil in (*fill, *gone):
         if soil not in soils:
             raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(soils)}")
@@ -128,7 +128,7 @@ def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, fir
 
 def _names(row: Any, key: str, where: str) -> list[str]:
     if not isinstance(row, dict):
-        raise mpm.InputError(f"{where}: is {row!r}, expected tables [[stages]]")
+        raise mpm.InputError(f"{where} is {row!r}, expected tables [[stages]]")
     names = row.get(key, [])
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):

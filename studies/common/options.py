@@ -107,6 +107,7 @@ class _Parser(argparse.ArgumentParser):
             super()._print_message(message, file)
 
     def error(self, message: str) -> NoReturn:
+        message = re.sub(r"^argument ([^:]+): (is|has) ", r"\1 \2 ", message)
         wrong = re.search(r"unrecognized arguments: (--[\w-]+)", message)
         near = get_close_matches(wrong.group(1), self._option_string_actions, cutoff=0.75) if wrong else []
         message += f"; did you mean {' or '.join(near)}?" if near else ""

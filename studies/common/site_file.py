@@ -160,7 +160,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
         if "unit_weight" not in given:
-            raise mpm.InputError(f"{where}: has no unit_weight [N/m3]")
+            raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
         weights[soil] = float(given["unit_weight"])
         parameters = _located({key: value for key, value in given.items() if key != "unit_weight"}, path)
         if any(isinstance(value, dict) for value in parameters.values()):
@@ -203,7 +203,7 @@ def law_at(table: dict, height: float, where: str) -> Any:
     )
     values = vars(parser.parse_args([]))
     try:
-        here = {key.replace("_", "-"): _at_height(value, height) for key, value in table.items()}
+        here = {key.replace("_", "-"): _at_height(key, value, height) for key, value in table.items()}
         values |= checked_values(where, here, parser._actions)
     except (ParameterError, ValueError) as error:
         raise mpm.InputError(str(error) if isinstance(error, ParameterError) else f"{where}: {error}") from None
@@ -218,12 +218,14 @@ def _located(table: dict, path: Path) -> dict:
     return table | files
 
 
-def _at_height(value: Any, height: float) -> Any:
+def _at_height(name: str, value: Any, height: float) -> Any:
     """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
     if not isinstance(value, dict):
         return value
     if set(value) != {"value", "per_metre", "top"}:
-        raise ValueError(f"got {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]")
+        raise ValueError(
+            f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
+        )
     return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
 
 
@@ -249,7 +251,7 @@ def read_toml(path: Path, keys: Sequence[str], needed: Sequence[str]) -> dict:
             raise mpm.InputError(f"{path}: unknown key {key!r}, expected some of {', '.join(keys)}")
     for key in needed:
         if key not in table:
-            raise mpm.InputError(f"{path}: has no {key!r}")
+            raise mpm.InputError(f"{path} has no {key!r}")
     return table
 
 
@@ -259,7 +261,7 @@ def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[b
     given = table.get("supports") or {name: kind for name, kind in DEFAULT_SUPPORTS.items() if name in names}
     if not given:
         raise mpm.InputError(
-            f"{path}: has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
+            f"{path} has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
         )
     return [_support(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
 

@@ -57,7 +57,7 @@ def write_summary(
     if said is not None and comm.rank == 0:
         print("\n".join([*filter(None, [said]), f"results in {folder}"]), flush=True)
         if stopped:
-            print(f"the run ended early: {stopped}; what there is has been written", file=sys.stderr)
+            print(f"the run ended early: {stopped}; the results so far have been written", file=sys.stderr)
     return 1 if stopped else 0
 
 

@@ -98,7 +98,7 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
     curves = [key for key in given if key in CURVES]
     if len(curves) > 1 or "conductivity" not in given:
         raise mpm.InputError(
-            f"{where}: has {', '.join(given) or 'nothing'}, expected conductivity and one retention curve at most"
+            f"{where} has {', '.join(given) or 'nothing'}, expected conductivity and one retention curve at most"
         )
     try:
         parameters = {key: value for key, value in given.items() if key not in CURVES}
@@ -123,7 +123,7 @@ def condition(name: str, given: dict, where: str) -> Any:
     if given == {"seepage_face": True}:
         return water.SeepageFace(name)
     if len(given) != 1 or next(iter(given)) not in CONDITIONS:
-        raise mpm.InputError(f"{where}: has {given}, expected one of {', '.join(CONDITIONS)} or seepage_face = true")
+        raise mpm.InputError(f"{where} has {given}, expected one of {', '.join(CONDITIONS)} or seepage_face = true")
     key, value = next(iter(given.items()))
     make, unit = CONDITIONS[key]
     if isinstance(value, list):

@@ -54,7 +54,7 @@ def test_steps_with_plastic_soil_and_a_seepage_face_do_not_depend_on_the_number_
 
 def test_a_bad_argument_is_refused_on_all_ranks():
     model = layer(MPI.COMM_WORLD, water.Element.STABILISED)
-    with pytest.raises(mpm.InputError, match="dt: got -1.0 s"):
+    with pytest.raises(mpm.InputError, match="dt is -1.0 s"):
         model.advance(-1.0)
     with pytest.raises(mpm.InputError, match="no facet has the tag 9"):
         model.boundary = [water.Head(9, 1.0)]

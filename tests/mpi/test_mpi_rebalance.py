@@ -187,7 +187,7 @@ def test_nodal_fields_of_a_model_are_written_as_copies_of_them_are(comm, shared_
             model, mesh=shared_path / "model", nodal_fields=names, float32=False, compression=compression
         ) as output,
     ):
-        with pytest.raises(mpm.InputError, match="'mass' are there only after a step or a report"):
+        with pytest.raises(mpm.InputError, match="'mass' exist only after a step or a report"):
             output.write()
         everything = np.arange(start.cell_numbers)
         cuts = (

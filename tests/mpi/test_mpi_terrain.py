@@ -42,5 +42,5 @@ def test_a_slide_is_the_same_on_any_number_of_ranks(comm):
 
 def test_wrong_sizes_are_refused_on_all_ranks(comm):
     ground = terrain.Raster(np.arange(5.0), np.arange(5.0), np.zeros((5, 5)))
-    with pytest.raises(bridge.InputError, match="coarse_size: got 0.1 m"):
+    with pytest.raises(bridge.InputError, match="coarse_size is 0.1 m"):
         terrain.terrain_mesh(comm, ground, cell_size=1.0, height=1.0, fine=((1, 1), (2, 2)), coarse_size=0.1)

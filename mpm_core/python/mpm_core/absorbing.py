@@ -157,7 +157,7 @@ class AbsorbingSides:
             raise InputError("no side absorbs, expected a call of absorb before shake")
         if self._columns:
             raise InputError(
-                "free fields have begun to move, expected shake before the run, or absorb for the sides anew"
+                "free fields have begun to move, expected shake before the run, or absorb for these sides again"
             )
         self._take_incoming((motion.time.tolist(), (factor * motion.velocity).tolist(), unit))
 

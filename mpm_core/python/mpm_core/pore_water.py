@@ -109,7 +109,7 @@ class PoreWater(Conditions):
             water.anisotropy = tensors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
                 raise InputError(
-                    "laws has an Undrained one, whose pores hold water already; expected laws of effective stress"
+                    "laws has an Undrained law, which contains pore water already; expected laws of effective stress"
                 )
             return water, n, k
 

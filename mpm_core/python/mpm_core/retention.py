@@ -60,11 +60,13 @@ def curve_values(curve: Any) -> list[NDArray[np.float64]]:
         rises = np.flatnonzero(~(np.diff(found) <= 1e-12))
         if len(rises):
             k = rises[0]
-            raise InputError(f"retention: {name} goes from {found[k]:g} to {found[k + 1]:g} from a suction of {SUCTIONS[k]:g} to "
-                             f"{SUCTIONS[k + 1]:g} Pa, expected values that fall")  # fmt: skip
+            raise InputError(f"in retention, {name} goes from {found[k]:g} to {found[k + 1]:g} from a suction of "
+                             f"{SUCTIONS[k]:g} to {SUCTIONS[k + 1]:g} Pa, expected values that fall")  # fmt: skip
         least = "more than" if name == CURVES[2] else "no less than"
         if abs(found[0] - 1) > 1e-9 or found[-1] < 0 or (name == CURVES[2] and found[-1] == 0):
-            raise InputError(f"retention: {name} goes from {found[0]:g} to {found[-1]:g}, expected from 1 to {least} 0")
+            raise InputError(
+                f"in retention, {name} goes from {found[0]:g} to {found[-1]:g}, expected from 1 to {least} 0"
+            )
     return values
 
 

@@ -152,7 +152,7 @@ def _inertia(body: FreeBody, surface: Surface, centre: NDArray[np.float64], mass
     if (moments <= 0).any():
         raise InputError(f"inertia is {moments.tolist()} kg m2, expected positive moments")
     if len(moments) == 3 and 2 * moments.max() > moments.sum() * (1 + 1e-12):
-        raise InputError(f"inertia is {moments.tolist()} kg m2, expected none above the sum of the two others")
+        raise InputError(f"inertia is {moments.tolist()} kg m2, expected no moment above the sum of the other two")
     return moments if dim == 2 or len(moments) == 3 else np.full(3, moments[0])
 
 

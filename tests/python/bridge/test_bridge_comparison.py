@@ -128,10 +128,10 @@ def test_slope_without_a_mechanism_is_refused(arguments):
 
 @pytest.mark.parametrize("depth", [-1.0, float("inf"), float("nan")])
 def test_ground_without_a_depth_is_refused(depth):
-    with pytest.raises(bridge.InputError, match=f"depth: got {depth} m, expected a number of at least 0, or None"):
+    with pytest.raises(bridge.InputError, match=f"depth is {depth} m, expected a number of at least 0, or None"):
         bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 20e3, depth=depth)
 
 
 def test_soil_without_weight_has_no_factor_of_safety():
-    with pytest.raises(bridge.InputError, match="unit_weight: got 0.0 N/m3, expected a positive number"):
+    with pytest.raises(bridge.InputError, match="unit_weight is 0.0 N/m3, expected a positive number"):
         bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 0.0)

@@ -246,10 +246,10 @@ def one_far_field(**changes):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"young": -1.0}, "young: got -1.0 Pa"),
-        ({"poisson": 0.5}, "poisson: got 0.5"),
-        ({"density": np.nan}, "density: got nan"),
-        ({"degree": 0}, "degree: got 0, expected a whole number from 1"),
+        ({"young": -1.0}, "young is -1.0 Pa"),
+        ({"poisson": 0.5}, "poisson is 0.5"),
+        ({"density": np.nan}, "density is nan"),
+        ({"degree": 0}, "degree is 0, expected a whole number from 1"),
         ({"border": 77}, "border: no facet has the tag 77"),
         ({"supports": [bridge.prescribed(3, (0.0, -0.1))]}, "supports: .*moves, expected displacements of zero"),
     ],
@@ -283,5 +283,5 @@ def test_what_a_model_refuses():
         far.attach(empty, 1)
     round_body = mpm.Model(empty.mesh, SOIL, geometry=mpm.Geometry.AXISYMMETRIC)
     round_body.seed(density=DENSITY, per_cell=3)
-    with pytest.raises(mpm.InputError, match="geometry is PLANE_STRAIN, that of the particles is AXISYMMETRIC"):
+    with pytest.raises(mpm.InputError, match="geometry of the finite elements is PLANE_STRAIN, that of the particles is AXISYMMETRIC"):
         far.attach(round_body, 1)

@@ -172,7 +172,7 @@ def test_three_dimensional_file_is_read():
         ("flat.msh", {}, 3, "no cells of dimension 3"),
         ("body.msh", {"dim": 3}, 2, "dimension 3"),
         ("bent.msh", {"z_corner": 0.3}, 2, "different z"),
-        ("square.msh", {}, 1, "dim: got 1"),
+        ("square.msh", {}, 1, "dim is 1"),
     ],
 )
 def test_file_that_cannot_be_used_is_refused(tmp_path, file, make, dim, words):

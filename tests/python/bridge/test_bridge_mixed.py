@@ -85,5 +85,5 @@ def test_a_divided_step_reports_the_displacement_of_all_of_it():
                                  mpm.DruckerPrager(young=1e5, poisson=0.3, strength=1.0)])  # fmt: skip
 def test_a_law_whose_shear_depends_on_the_mean_stress_is_refused(law):
     domain, facet_tags = read("bank", 2)
-    with pytest.raises(bridge.InputError, match="law: got"):
+    with pytest.raises(bridge.InputError, match="law (is|has)"):
         bridge.MixedQuasiStatic(domain, law, facet_tags, [bridge.fixed(2)])

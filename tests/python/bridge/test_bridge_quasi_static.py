@@ -280,8 +280,8 @@ def test_progress_names_every_step(capsys):
     [
         (lambda m: m.set_initial_stress(np.zeros((3, 4)), bridge.Load()), r"stress.*\(3, 4\)"),
         (lambda m: m.solve(bridge.Load(pressure={77: 1.0})), "pressure.*tag 77"),
-        (lambda m: slope_model(degree=3), r"degree: got 3, expected one of \(1, 2, 4\)"),
-        (lambda m: elastic_column(3, 4), r"degree: got 4, expected one of \(1, 2\)"),
+        (lambda m: slope_model(degree=3), r"degree is 3, expected one of \(1, 2, 4\)"),
+        (lambda m: elastic_column(3, 4), r"degree is 4, expected one of \(1, 2\)"),
         (lambda m: m.evaluate_at(np.array([[5.0, 5.0]])), r"\(5, 5\)"),
     ],
 )

@@ -69,5 +69,5 @@ def test_a_body_of_revolution_goes_on_at_rest_until_its_foot_fails():
 
 
 def test_resting_cells_are_not_moved_by_the_hand_over():
-    with pytest.raises(mpm.InputError, match="move: cells that rest are not moved"):
+    with pytest.raises(mpm.InputError, match="move is True, expected False with resting"):
         handed_over(resting=True, move=True)

@@ -132,9 +132,9 @@ def test_a_mesh_follows_the_ground():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"cell_size": 0.0}, "cell_size: got 0.0 m"),
-        ({"height": np.nan}, "height: got nan m"),
-        ({"coarse_size": 0.5}, "coarse_size: got 0.5 m"),
+        ({"cell_size": 0.0}, "cell_size is 0.0 m"),
+        ({"height": np.nan}, "height is nan m"),
+        ({"coarse_size": 0.5}, "coarse_size is 0.5 m"),
         ({"fine": ((110, 204), (104, 208))}, "expected two corners"),
     ],
 )
@@ -206,7 +206,7 @@ def test_maps_keep_the_volume_and_the_greatest_values():
 def test_rasters_that_do_not_fit_are_named():
     before, rupture = slab()
     other = terrain.Raster(before.x, before.y, before.values, "EPSG:25832")
-    with pytest.raises(bridge.InputError, match="rupture: is in 'local', expected 'EPSG:25832'"):
+    with pytest.raises(bridge.InputError, match="rupture is in 'local', expected 'EPSG:25832'"):
         slide_model(other, rupture)
     with pytest.raises(bridge.InputError, match="nowhere higher than rupture"):
         slide_model(rupture, rupture)

@@ -76,7 +76,7 @@ def test_a_node_without_a_place_is_named(tmp_path):
     ("cells", "message"),
     [
         ([[0, 1, 2], [2, 1, 1]], "cell 1 has a node twice"),
-        ([[0, 1, 2], [2, 0, 1]], "is there 2 times"),
+        ([[0, 1, 2], [2, 0, 1]], "is listed 2 times"),
         ([[0, 1, 2], [0, 1, 3], [1, 0, 4]], "has a facet that 3 cells share"),
     ],
 )

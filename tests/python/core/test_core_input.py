@@ -208,7 +208,7 @@ def test_bad_particle_fields(model, name, values, words):
 
 
 def test_bad_questions(model):
-    with pytest.raises(mpm.InputError, match="'velocity' are there only after a step or a report"):
+    with pytest.raises(mpm.InputError, match="'velocity' exist only after a step or a report"):
         model.nodal("velocity")
     run(model, 1e-3)
     with pytest.raises(mpm.InputError, match="nodal field is 'pressure'"):

@@ -50,17 +50,17 @@ def test_help_says_units_and_defaults():
 
 
 BAD_OPTIONS = [
-    (["--height", "0"], "argument --height: is '0', expected a number above 0 m"),
-    (["--height", "tall"], "argument --height: is 'tall', expected a number above 0 m"),
-    (["--height", "nan"], "argument --height: is 'nan', expected a number above 0 m"),
+    (["--height", "0"], "--height is '0', expected a number above 0 m"),
+    (["--height", "tall"], "--height is 'tall', expected a number above 0 m"),
+    (["--height", "nan"], "--height is 'nan', expected a number above 0 m"),
     (
         ["--friction-angle", "90"],
-        "argument --friction-angle: is '90', expected a number at least 0 and below 90 degrees",
+        "--friction-angle is '90', expected a number at least 0 and below 90 degrees",
     ),
-    (["--ppc", "2"], "argument --ppc: is '2', expected one of 1, 3, 10"),
-    (["--steps", "0"], "argument --steps: is '0', expected a whole number from 1 on"),
-    (["--steps", "1.5"], "argument --steps: is '1.5', expected a whole number from 1 on"),
-    (["--mesh", "square"], "argument --mesh: is 'square', expected one of crossed, gmsh"),
+    (["--ppc", "2"], "--ppc is '2', expected one of 1, 3, 10"),
+    (["--steps", "0"], "--steps is '0', expected a whole number from 1 on"),
+    (["--steps", "1.5"], "--steps is '1.5', expected a whole number from 1 on"),
+    (["--mesh", "square"], "--mesh is 'square', expected one of crossed, gmsh"),
     (["--hight", "1"], "--hight"),
 ]
 

@@ -59,7 +59,7 @@ def test_a_law_of_ones_own(tmp_path):
 
 @pytest.mark.parametrize(
     "options, named",
-    [(["--material", "marble"], "--material: is 'marble', expected one of"), (["--poisson", "0.6"], "--poisson: is '0.6'"),
+    [(["--material", "marble"], "--material is 'marble', expected one of"), (["--poisson", "0.6"], "--poisson is '0.6'"),
      (["--material", "cam-clay", "--swelling-slope", "0.2"], "compression = 0.1"), (["--python-law", "no.py:X"], "no.py:X"),
      (["--umat", "no.so"], "no.so")],
 )  # fmt: skip

@@ -26,12 +26,12 @@ def read(text, folder):
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("conductivity = 1e-8", "conductivity = 0.0", "soils.core: conductivity: got 0.0"),
+        ("conductivity = 1e-8", "conductivity = 0.0", "soils.core: conductivity is 0.0"),
         ("conductivity = 1e-8", "permeability = 1e-8", "soils.core: unknown key 'permeability'"),
         ("n = 1.4, ", "", "soils.core: .*missing.*'n'"),
         ("[soils.core]", "[soils.clay]", "no cell has the name 'clay'"),
         ("reservoir = 0.0", 'reservoir = "full"', "boundaries.downstream: reservoir is 'full'"),
-        ("reservoir = 0.0", "level = 0.0", "boundaries.downstream: has .*expected one of head, reservoir"),
+        ("reservoir = 0.0", "level = 0.0", "boundaries.downstream has .*expected one of head, reservoir"),
         ("rain = 0.0", "rain = -1.0", "rate is -1"),
         ("[15.0, 3.0]", "[5.0, 3.0]", "rising times"),
         ('mesh = "dam.geo"', 'mesh = "no.geo"', "there is no file"),

@@ -91,10 +91,10 @@ def test_a_site_may_be_a_half_section(tmp_path):
     ("old", "new", "message"),
     [
         ("cell_size = 0.5", "cell_size = 0.5\naxisymmetric = 1", "axisymmetric is 1, expected true or false"),
-        ("unit_weight = 18e3", "", "soils.upper: has no unit_weight"),
+        ("unit_weight = 18e3", "", "soils.upper has no unit_weight"),
         ("cohesion = 9e3", "cohesionn = 9e3", "soils.upper: unknown key 'cohesionn'"),
         ("cohesion = 9e3", "cohesion = -1.0", "soils.upper: cohesion is '-1.0', expected a number at least 0"),
-        ("top = 2.0", "bottom = 2.0", "soils.lower: got .* expected {value = , per_metre = , top = }"),
+        ("top = 2.0", "bottom = 2.0", "soils.lower: shear_strength is .* expected {value = , per_metre = , top = }"),
         ('mesh = "block.geo"', "", "has no 'mesh'"),
         ("[soils.upper]", "[soils.sand]", "no cell has the name 'sand'"),
         ('"tresca"', '"clay"', "soils.lower: material is 'clay', expected one of"),

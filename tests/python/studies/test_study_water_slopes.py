@@ -38,8 +38,8 @@ def run(name, path, folder, options):
     "old, new, words",
     [
         ("cohesion = 4e3", "cohesion = -4e3", "soils.bank.*cohesion"),
-        ("conductivity = 3e-7", "conductivity = 0.0", "soils.bank: conductivity: got 0.0"),
-        ("unit_weight = 20e3  # N/m3, saturated\n", "", "soils.bank: has no unit_weight"),
+        ("conductivity = 3e-7", "conductivity = 0.0", "soils.bank: conductivity is 0.0"),
+        ("unit_weight = 20e3  # N/m3, saturated\n", "", "soils.bank has no unit_weight"),
         ("[soils.bank]", "[soils.levee]", "levee"),
         ("[boundaries.face]", "[boundaries.front]", "front"),
         ("reservoir = [[0.0, 7.0], [3.0, 1.0]]", "rain = 1.0", "no boundary has reservoir"),

@@ -149,11 +149,11 @@ def test_refuses_what_cannot_be_placed():
     model = _model(_ground(rows=5), water.Element.STABILISED)
     with pytest.raises(mpm.InputError, match="off: no soil with water is left"):
         model.reconfigure(off=[CLAY, SECOND])
-    with pytest.raises(mpm.InputError, match="duration: got -1.0 s"):
+    with pytest.raises(mpm.InputError, match="duration is -1.0 s"):
         model.reconfigure(duration=-1.0)
     with pytest.raises(mpm.InputError, match="off"):
         model.reconfigure(off=["peat"])
-    with pytest.raises(mpm.InputError, match="pore_pressure: got shape"):
+    with pytest.raises(mpm.InputError, match="pore_pressure has shape"):
         model.reconfigure(pore_pressure=lambda x: x)
 
 

@@ -180,13 +180,13 @@ def make(**options):
 @pytest.mark.parametrize(
     "options, words",
     [
-        ({"element": 2}, "element: got 2, expected one of Element.TAYLOR_HOOD"),
-        ({"nmd": True}, "nmd: averages strains of .* Element.STABILISED, got element=Element.TAYLOR_HOOD"),
+        ({"element": 2}, "element is 2, expected one of Element.TAYLOR_HOOD"),
+        ({"nmd": True}, "nmd is True, expected False with element=Element.TAYLOR_HOOD"),
         ({"boundary": [water.Reservoir(9, 1.0)]}, "no facet has the tag 9"),
         ({"boundary": [water.Head(TOP, np.nan)]}, "level is nan"),
         ({"soil": 1e-7}, "expected a PorousSoil"),
-        ({"unit_weight": 0.0}, "unit_weight: got 0.0"),
-        ({"water_modulus": -1.0}, "water_modulus: got -1.0 Pa"),
+        ({"unit_weight": 0.0}, "unit_weight is 0.0"),
+        ({"water_modulus": -1.0}, "water_modulus is -1.0 Pa"),
         (
             {
                 "boundary": [water.Flux(TOP, 1e-8)],
@@ -205,12 +205,12 @@ def test_bad_arguments_are_named(options, words):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda model: model.advance(0.0), "dt: got 0.0 s"),
-        (lambda model: model.run(-1.0, 1.0), "until: got -1.0 s"),
-        (lambda model: model.run(1.0, 0.0), "first_step: got 0.0 s"),
-        (lambda model: model.run(1.0, 0.1, growth=0.5), "growth: got 0.5"),
-        (lambda model: model.initialise(stress=np.zeros((1, 4))), "stress: got shape"),
-        (lambda model: model.initialise(pore_pressure=lambda x: np.nan), "pore_pressure: .*expected finite"),
+        (lambda model: model.advance(0.0), "dt is 0.0 s"),
+        (lambda model: model.run(-1.0, 1.0), "until is -1.0 s"),
+        (lambda model: model.run(1.0, 0.0), "first_step is 0.0 s"),
+        (lambda model: model.run(1.0, 0.1, growth=0.5), "growth is 0.5"),
+        (lambda model: model.initialise(stress=np.zeros((1, 4))), "stress has shape"),
+        (lambda model: model.initialise(pore_pressure=lambda x: np.nan), "pore_pressure has shape .*expected finite"),
     ],
 )
 def test_bad_calls_are_named(call, words):

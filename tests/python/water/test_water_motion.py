@@ -146,13 +146,13 @@ def test_saturated_soil_in_free_fall_has_no_pressure_and_no_flow(element):
 
 
 def test_mistakes_are_named():
-    with pytest.raises(bridge.InputError, match=r"beta: got 0.25, expected \(gamma \+ 1/2\)\^2 / 4 = 0.3025"):
+    with pytest.raises(bridge.InputError, match=r"beta is 0.25, expected \(gamma \+ 1/2\)\^2 / 4 = 0.3025"):
         water.Newmark(beta=0.25, gamma=0.6)
-    with pytest.raises(bridge.InputError, match="gamma: got 0.4, expected 0.5 or more"):
+    with pytest.raises(bridge.InputError, match="gamma is 0.4, expected 0.5 or more"):
         water.Newmark(gamma=0.4)
-    with pytest.raises(bridge.InputError, match="density: got -1.0 kg/m3"):
+    with pytest.raises(bridge.InputError, match="density is -1.0 kg/m3"):
         water.PorousSoil(1e-6, density=-1.0)
-    with pytest.raises(bridge.InputError, match="inertia: got True, expected a Newmark"):
+    with pytest.raises(bridge.InputError, match="inertia is True, expected a Newmark"):
         column(water.Element.STABILISED, 2, method=True)
     domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 2))
     with pytest.raises(bridge.InputError, match="has no density, expected one for steps with inertia"):
@@ -160,5 +160,5 @@ def test_mistakes_are_named():
             domain, SOIL, water.PorousSoil(1e-6), facet_tags, [bridge.fixed(BASE)], [], inertia=TRAPEZOIDAL
         )
     model = column(water.Element.STABILISED, 2)
-    with pytest.raises(bridge.InputError, match=r"velocity: got shape \(3,\)"):
+    with pytest.raises(bridge.InputError, match=r"velocity has shape \(3,\)"):
         model.motion.set_velocity((1.0, 2.0, 3.0))

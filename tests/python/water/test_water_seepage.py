@@ -111,7 +111,7 @@ def test_strata_that_dip_conduct_along_and_across_themselves():
     assert tensor @ [1, 0, 0] == pytest.approx([5e-6, 0, 0]) and tensor @ [0, *across] == pytest.approx(
         1e-7 * np.array([0, *across])
     )
-    with pytest.raises(InputError, match="across: got 0.0 m/s, expected a positive number"):
+    with pytest.raises(InputError, match="across is 0.0 m/s, expected a positive number"):
         water.dipping(1e-6, 0.0, 30.0)
 
 
@@ -245,19 +245,19 @@ def test_pore_pressures_reach_points_inside_and_outside_of_the_soil():
 @pytest.mark.parametrize(
     "make, words",
     [
-        (lambda: water.PorousSoil(0.0), "conductivity: got 0.0"),
+        (lambda: water.PorousSoil(0.0), "conductivity is 0.0"),
         (lambda: water.PorousSoil(-1e-5), "conductivity"),
         (lambda: water.PorousSoil([[1.0, 2.0], [2.0, 1.0]]), "positive principal values"),
-        (lambda: water.PorousSoil(1e-5, porosity=1.0), "porosity: got 1.0"),
-        (lambda: water.VanGenuchten(1e-4, 1.0), "n: got 1.0"),
-        (lambda: water.VanGenuchten(1e-4, 2.0, residual=1.0), "residual: got 1.0"),
-        (lambda: water.Gardner(float("nan")), "alpha: got nan"),
+        (lambda: water.PorousSoil(1e-5, porosity=1.0), "porosity is 1.0"),
+        (lambda: water.VanGenuchten(1e-4, 1.0), "n is 1.0"),
+        (lambda: water.VanGenuchten(1e-4, 2.0, residual=1.0), "residual is 1.0"),
+        (lambda: water.Gardner(float("nan")), "alpha is nan"),
         (
             lambda: water.Tabulated((0, 10, 20), (1, 0.4, 0.5), (1, 0.1, 0.05)),
-            "saturation_values: rises from 0.4 to 0.5",
+            "saturation_values rises from 0.4 to 0.5",
         ),
         (lambda: water.Tabulated((0, 10, 5), (1, 0.5, 0.4), (1, 0.1, 0.05)), "suction"),
-        (lambda: water.FreeSurface(fringe=0.0), "fringe: got 0.0"),
+        (lambda: water.FreeSurface(fringe=0.0), "fringe is 0.0"),
     ],
 )
 def test_wrong_soils_are_named(make, words):
@@ -321,7 +321,7 @@ def test_curves_of_ones_own_that_are_not_possible_are_refused(saturation, permea
 def test_a_step_needs_a_length(dt):
     domain, facet_tags = box((1.0, 1.0), (2, 2))
     flow = water.Seepage(domain, water.PorousSoil(1e-6), facet_tags, [water.Head(LEFT, 1.0)])
-    with pytest.raises(InputError, match=f"dt: got {dt}.*expected a positive number"):
+    with pytest.raises(InputError, match=f"dt is {dt}.*expected a positive number"):
         flow.advance(dt)
 
 

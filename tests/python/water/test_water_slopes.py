@@ -83,7 +83,7 @@ def test_standing_water_is_that_above_the_ground():
     points = np.array([[1.0, 0.5], [2.5, 0.1], [2.5, 1.5], [3.75, 0.1]])  # the slope goes from (2, 2) to (4, 0)
     assert at(points, 0.0) == pytest.approx(WEIGHT * np.array([0.0, 1.5, 1.5, 2.75]))
     assert at(points, 10.0) == pytest.approx(WEIGHT * np.array([0.0, 0.0, 0.0, 0.75]), abs=1e-9)
-    with pytest.raises(mpm.InputError, match="boundary: has no Reservoir"):
+    with pytest.raises(mpm.InputError, match="boundary has no Reservoir"):
         water.standing_water(domain, facet_tags, [water.Rain(bridge.SLOPE, 0.0)])
 
 
