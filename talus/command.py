@@ -16,6 +16,9 @@ from talus.begin import begin
 from talus.completion import SCRIPTS
 from talus.launch import run
 
+NEEDED = ("dolfinx", "h5py", "matplotlib", "PIL", "tqdm", "jinja2")
+"""Modules without which a study ends while it is imported"""
+
 
 def parser() -> argparse.ArgumentParser:
     """Parser of all commands."""
@@ -81,11 +84,10 @@ def run_study(words: list[str]) -> int:
         hint = f"did you mean {' or '.join(near)}? `talus list` lists all" if near else \
             f"expected one of these, or the path of a script:\n{listed()}"  # fmt: skip
         raise ValueError(f"there is no study '{words[0]}'; {hint}")
-    for name in ("dolfinx", "h5py"):
-        if importlib.util.find_spec(name) is None:
-            raise ValueError(
-                f"{sys.executable} cannot import {name}, which studies need; see docs/guide/installation.md"
-            )
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ValueError(f"{sys.executable} cannot import {', '.join(missing)}, which studies need: dolfinx and h5py come with "
+                         "DOLFINx, the others with `pip install '.[studies]'` (docs/guide/installation.md)")  # fmt: skip
     return run(script, words[1:], ranks)
 
 

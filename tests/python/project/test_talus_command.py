@@ -138,6 +138,15 @@ def test_info_names_what_is_missing_or_cannot_be_loaded(tmp_path):
     assert lines["h5py"] == "not loaded: no numpy.core"
 
 
+def test_a_study_is_not_started_without_what_it_imports(tmp_path):
+    """As where talus is installed without the extra `studies`."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['jinja2'] = sys.modules['tqdm'] = None\n")
+    path = os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])
+    done = talus(tmp_path, "run", "slope", "--help", PYTHONPATH=path)
+    assert done.returncode == 2 and "cannot import tqdm, jinja2, which studies need" in done.stderr
+    assert "pip install '.[studies]'" in done.stderr
+
+
 def test_a_reader_may_end_before_the_list(tmp_path):
     script = f"{sys.executable} -m talus list | head -n 1"
     done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, env=ENVIRONMENT)
