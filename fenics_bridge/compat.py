@@ -33,16 +33,13 @@ SHAPE = {2: "triangle", 3: "tetrahedron"}
 
 
 def create_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.int64], dim: int) -> mesh.Mesh:
-    """Mesh of linear simplices, with a new partition, each rank keeping the neighbours of its cells as ghosts.
+    """Mesh of linear simplices, with a new partition, each rank keeping the neighbours of its cells as ghosts. Collective.
 
     Args:
         comm: the ranks that share the mesh.
         points: this rank's part of the nodes [m], shape (n, dim); nodes are numbered through in order of rank.
         cells: this rank's part of the cells, by those numbers, shape (m, dim + 1).
         dim: 2 for triangles, 3 for tetrahedra.
-
-    Note:
-        Collective.
     """
     # PT-SCOTCH 7 takes all cores of the machine for each rank, and its threads cut a mesh differently each time.
     os.environ.setdefault("SCOTCH_PTHREAD_NUMBER", "1")
@@ -64,7 +61,7 @@ def _partitioner() -> Any:
 
 
 def tags_from_nodes(domain: mesh.Mesh, dim: int, entities: NDArray[np.int64], values: NDArray[np.int32]) -> MeshTags:
-    """Mesh tags on the entities of dimension `dim` that have the given nodes, wherever these entities live.
+    """Mesh tags on the entities of dimension `dim` that have the given nodes, wherever these entities live. Collective.
 
     Ghost entities receive their tag too.
 
@@ -73,9 +70,6 @@ def tags_from_nodes(domain: mesh.Mesh, dim: int, entities: NDArray[np.int64], va
         dim: dimension of the entities.
         entities: node numbers of the entities as they were given to `create_mesh`, on any rank, shape (k, dim + 1).
         values: their tags, shape (k,).
-
-    Note:
-        Collective.
     """
     entities = np.ascontiguousarray(entities, dtype=np.int64).reshape(-1, dim + 1)
     values = np.ascontiguousarray(values, dtype=np.int32)

@@ -13,7 +13,7 @@ __all__ = ["InputError", "agree", "is_finite"]
 
 
 def agree(comm: MPI.Comm, message: str | None) -> None:
-    """Raise an error on all ranks if there is one on any.
+    """Raise an error on all ranks if there is one on any. Collective.
 
     Call it before communication that would hang or crash if one rank had left.
 
@@ -23,9 +23,6 @@ def agree(comm: MPI.Comm, message: str | None) -> None:
 
     Raises:
         InputError: with the message of the lowest rank that gives one.
-
-    Note:
-        Collective.
     """
     first = next((text for text in comm.allgather(message) if text is not None), None)
     if first is not None:

@@ -53,7 +53,7 @@ def background_arrays(
 
 
 def background_mesh(domain: Mesh, cell_tags: MeshTags | None = None, facet_tags: MeshTags | None = None) -> mpm.Mesh:
-    """The background mesh of particles that a DOLFINx mesh stands for, with its tags, their names, and its partition.
+    """The background mesh of particles that a DOLFINx mesh stands for, with its tags, their names, and its partition. Collective.
 
     Args:
         domain: mesh of triangles or tetrahedra.
@@ -62,9 +62,6 @@ def background_mesh(domain: Mesh, cell_tags: MeshTags | None = None, facet_tags:
 
     Returns:
         The mesh; its attribute `domain` is the mesh of DOLFINx.
-
-    Note:
-        Collective.
     """
     arrays = background_arrays(domain, cell_tags, facet_tags)
     mesh = mpm.Mesh(**arrays, cell_names=names_of(cell_tags), facet_names=names_of(facet_tags), comm=domain.comm)

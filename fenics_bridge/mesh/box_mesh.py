@@ -28,6 +28,8 @@ def box_mesh(
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Background mesh of a box with its lower corner at the origin: squares or cubes, each divided into D! simplices (Kuhn 1960).
 
+    Collective.
+
     Args:
         comm: the ranks that share the mesh.
         lengths: lengths of the box along the axes [m], shape (D,) with D = 2 or 3.
@@ -41,9 +43,6 @@ def box_mesh(
 
     Raises:
         InputError: lengths or counts are not positive or not as many, or diagonals has another value. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     dim = len(np.atleast_1d(lengths))
     result = on_first_rank(comm, lambda: _arrays(lengths, counts, diagonals, body))

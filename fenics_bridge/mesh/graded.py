@@ -22,7 +22,7 @@ def graded_tags(
     value_of: OfPosition,
     classes: int = 20,
 ) -> tuple[MeshTags, dict[int, float]]:
-    """Sort the cells of a soil into classes by a function of position, each with a tag of its own.
+    """Sort the cells of a soil into classes by a function of position, each with a tag of its own. Collective.
 
     Classes are equally wide between the least and the largest value at the cells' centroids, so a parameter that is
     linear in the value is off by at most half a class. The soil's name then stands for all of its classes.
@@ -39,9 +39,6 @@ def graded_tags(
 
     Raises:
         InputError: no cell has the soil's tag, classes is below 1, or a value is not finite. Raised on all ranks alike.
-
-    Note:
-        Collective.
 
     Example:
         >>> tags, depths = bridge.graded_tags(domain, cell_tags, "clay", lambda x: 3.0 - x[:, 1])

@@ -34,7 +34,7 @@ def read_mesh(
     memory_limit: float | None = None,
     allow_commands: bool = False,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Read a mesh and its tags from a file of gmsh; rank 0 reads, DOLFINx partitions.
+    """Read a mesh and its tags from a file of gmsh; rank 0 reads, DOLFINx partitions. Collective.
 
     Tags are gmsh's physical groups, whose names stand for them wherever a tag is asked for. When the file has physical
     groups of dimension `dim`, only their cells belong to the mesh, as when gmsh saves a mesh; otherwise all do, untagged.
@@ -57,9 +57,6 @@ def read_mesh(
             quadrilaterals or hexahedra, with curved (second-order) elements, with cells that do not meet node to node, or with
             tags that do not fit into 32 bits; one that runs commands, or that takes more time or memory than it may. Raised on
             all ranks alike.
-
-    Note:
-        Collective.
     """
     _check_arguments(comm, path, dim, parameters)
     limits = Limits(time_limit, memory_limit, allow_commands)

@@ -58,7 +58,7 @@ def described(tags: Any, known: Iterable[int]) -> str:
 def tag_numbers(
     comm: MPI.Comm, tags: MeshTags | None, given: Tag, argument: str, entity: str = "facet"
 ) -> tuple[int, ...]:
-    """The tags that a number, a name, or a sequence of them stands for.
+    """The tags that a number, a name, or a sequence of them stands for. Collective.
 
     Args:
         comm: the ranks that share the mesh.
@@ -72,9 +72,6 @@ def tag_numbers(
 
     Raises:
         InputError: one of them does not exist on any rank. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     known, names, found = known_tags(comm, tags), names_of(tags), []
     for one in given if isinstance(given, (list, tuple, set, np.ndarray)) else [given]:
@@ -90,7 +87,7 @@ def tag_numbers(
 def by_number(
     comm: MPI.Comm, tags: MeshTags | None, given: Mapping[Any, Any], argument: str, entity: str = "facet"
 ) -> dict[Any, Any]:
-    """A dictionary by tags or names as one by tags alone; None as a key stays.
+    """A dictionary by tags or names as one by tags alone; None as a key stays. Collective.
 
     Args:
         comm: the ranks that share the mesh.
@@ -104,9 +101,6 @@ def by_number(
 
     Raises:
         InputError: a tag does not exist, or is given twice. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     result = {}
     for key, value in given.items():

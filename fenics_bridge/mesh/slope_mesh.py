@@ -41,7 +41,7 @@ def slope_mesh(
     headroom: float | None = None,
     depth: float = 0.0,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Background mesh of a slope, with the soil before failure tagged.
+    """Background mesh of a slope, with the soil before failure tagged. Collective.
 
     The soil has the corners (0, 0), (base, 0), (crest, height) and (0, height), base = crest + height / tan(angle).
     The background reaches from x = 0 to base + runout and from y = -depth to height + headroom; the ground below y = 0 is soil
@@ -65,9 +65,6 @@ def slope_mesh(
 
     Raises:
         InputError: dimensions that are out of range or do not fit, or another kind. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     headroom = cell_size if headroom is None else headroom
 

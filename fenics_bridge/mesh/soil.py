@@ -22,7 +22,7 @@ def soil_mesh(
     """Mesh of the cells of one tag or several, with a partition of its own, so that the work is distributed over all ranks.
 
     Soils of several tags are one body: they share the nodes of their borders. (DOLFINx's `create_submesh` keeps the
-    partition and is not reliable on several ranks before 0.8.)
+    partition and is not reliable on several ranks before 0.8.) Collective.
 
     Args:
         domain: background mesh of DOLFINx.
@@ -36,9 +36,6 @@ def soil_mesh(
 
     Raises:
         InputError: no cell has a tag. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     dim = domain.topology.dim
     numbers = tag_numbers(domain.comm, cell_tags, tag, "tag", "cell")

@@ -14,15 +14,12 @@ from fenics_bridge.terrain.raster import Raster
 
 
 class SlideMaps:
-    """Thickness and speed of a slide on a grid, whose greatest values are kept over time.
+    """Thickness and speed of a slide on a grid, whose greatest values are kept over time. Collective.
 
     Args:
         model: model of a slide in three dimensions.
         ground: raster whose points are the centres of the map's cells.
         least: thickness below which a cell counts as untouched [m].
-
-    Note:
-        Collective.
     """
 
     def __init__(self, model: mpm.Model, ground: Raster, least: float = 0.01) -> None:
@@ -38,11 +35,7 @@ class SlideMaps:
             yield (row + up, column + across), part
 
     def thickness(self) -> NDArray[np.float64]:
-        """Volume of the particles over area [m], shape (ny, nx): each gives it to the four points around it.
-
-        Note:
-            Collective.
-        """
+        """Volume of the particles over area [m], shape (ny, nx): each gives it to the four points around it. Collective."""
         found = np.zeros(self.ground.values.shape)
         for places, part in self._around():
             np.add.at(found, places, part * self.model.particles.volume / self.ground.spacing**2)
@@ -50,11 +43,7 @@ class SlideMaps:
         return found
 
     def record(self) -> None:
-        """Include the present state in the greatest values.
-
-        Note:
-            Collective.
-        """
+        """Include the present state in the greatest values. Collective."""
         speed = np.linalg.norm(self.model.particles.velocity, axis=1)
         fastest = np.zeros(self.ground.values.shape)
         for places, part in self._around():
@@ -64,14 +53,11 @@ class SlideMaps:
         self._most = np.maximum(self._most, self.thickness())
 
     def maps(self) -> dict[str, Raster]:
-        """The maps by name.
+        """The maps by name. Collective.
 
         Returns:
             `deposit` (thickness now) [m], `most` (largest thickness) [m] and `speed` (largest) [m/s], with gaps where the slide
             has not been, and `reached`: 1 where it has been, else 0.
-
-        Note:
-            Collective.
         """
         deposit, reached = self.thickness(), self._most >= self.least
         values = {

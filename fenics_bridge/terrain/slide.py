@@ -24,7 +24,7 @@ def seed_slide(
     adhesion: float = 0.0,
     material: int = 0,
 ) -> tuple[Any, float]:
-    """Fill the space between two rasters with particles, and let them touch the ground that is left.
+    """Fill the space between two rasters with particles, and let them touch the ground that is left. Collective.
 
     The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow
     they are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
@@ -44,9 +44,6 @@ def seed_slide(
 
     Raises:
         InputError: the rasters have other coordinate references, or no soil is between them. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     surface = rupture.triangles()
     found = on_first_rank(model.comm, lambda: _points(before, rupture, surface, spacing))

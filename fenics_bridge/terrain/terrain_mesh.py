@@ -31,7 +31,7 @@ def terrain_mesh(
     coarse_size: float | None = None,
     depth: float | None = None,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Tetrahedra over ground: gmsh makes triangles in plan, which are extruded in layers parallel to the ground.
+    """Tetrahedra over ground: gmsh makes triangles in plan, which are extruded in layers parallel to the ground. Collective.
 
     Args:
         comm: the ranks that share the mesh.
@@ -47,9 +47,6 @@ def terrain_mesh(
 
     Raises:
         InputError: sizes that do not fit. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     coarse = 4 * cell_size if coarse_size is None else coarse_size
     below = 1.5 * cell_size if depth is None else depth

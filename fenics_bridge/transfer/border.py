@@ -31,7 +31,7 @@ class Facets(NamedTuple):
 
 
 def facets_of_space(space: Any, facets: NDArray[np.int32]) -> Facets:
-    """Facets on the border of the body of a Lagrange space, with its nodes on them.
+    """Facets on the border of the body of a Lagrange space, with its nodes on them. Collective.
 
     Args:
         space: Lagrange space of displacements of any degree.
@@ -39,9 +39,6 @@ def facets_of_space(space: Any, facets: NDArray[np.int32]) -> Facets:
 
     Raises:
         InputError: a facet inside of the body. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     domain: Mesh = space.mesh
     dim = domain.topology.dim

@@ -30,7 +30,7 @@ class Difference:
 def compare(
     fem: QuasiStatic | ElasticSolution, model: mpm.Model, smooth: bool = False, places: ArrayLike | None = None
 ) -> dict[str, Difference]:
-    """Differences in displacement and stress at the particles' material points.
+    """Differences in displacement and stress at the particles' material points. Collective.
 
     A particle is compared with the finite elements at the place where it started, by which both know a material point;
     they are evaluated there (a consistent transfer: values are kept, sums need not be).
@@ -48,9 +48,6 @@ def compare(
     Raises:
         InputError: the place of a particle is outside the finite elements' mesh (the message names the particle), or the
             geometries differ. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     require_same_geometry(model, fem)
     particles = model.particles

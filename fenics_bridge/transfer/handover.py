@@ -65,7 +65,7 @@ def initialise(
     nmd: bool | None = None,
     integration: mpm.Integration = mpm.Integration.PARTICLES,
 ) -> Handover:
-    """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values).
+    """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values). Collective.
 
     Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
     to the yield surface should it be outside, and loses its velocity. The model's gravity must be that of the
@@ -103,9 +103,6 @@ def initialise(
     Raises:
         InputError: a particle is outside the finite elements' mesh or, moved, outside the background mesh, laws or geometries do
             not match, or the finite elements did not converge. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     particles = model.particles
     _require_usable(model, fem, move)

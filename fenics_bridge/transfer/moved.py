@@ -38,7 +38,7 @@ def cell_gradient(function: fem.Function) -> fem.Function:
 
 
 def held_volumes(domain: Mesh, displacement: fem.Function, geometry: Geometry | None = None) -> NDArray[np.float64]:
-    """Volume of the moved body in each cell of another mesh that this rank owns.
+    """Volume of the moved body in each cell of another mesh that this rank owns. Collective.
 
     Sampled in the cells of the finite elements, each sample moved by the displacement. Parts of the body outside of
     the other mesh are left out.
@@ -50,9 +50,6 @@ def held_volumes(domain: Mesh, displacement: fem.Function, geometry: Geometry | 
 
     Returns:
         Shape (m,) [m^D].
-
-    Note:
-        Collective.
     """
     body, volumes = displacement.function_space.mesh, body_volumes(domain, geometry)
     own = cell_volumes(body)

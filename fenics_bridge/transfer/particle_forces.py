@@ -15,7 +15,7 @@ from mpm_core import Geometry
 
 
 def boundary_forces(model: mpm.Model, tag: int, pressure: float) -> NDArray[np.float64]:
-    """Force on each particle by a pressure on the boundary with a tag.
+    """Force on each particle by a pressure on the boundary with a tag. Collective.
 
     A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it.
 
@@ -29,9 +29,6 @@ def boundary_forces(model: mpm.Model, tag: int, pressure: float) -> NDArray[np.f
 
     Raises:
         InputError: no soil lies at the boundary. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     mesh = model.mesh
     force, pressed = _surface_forces(model, mesh._core.facet_tags == tag, np.full(len(mesh.points), float(pressure)))
@@ -40,7 +37,7 @@ def boundary_forces(model: mpm.Model, tag: int, pressure: float) -> NDArray[np.f
 
 
 def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.float64]:
-    """Force -V grad p of the pore water on each particle, p being linear in each cell.
+    """Force -V grad p of the pore water on each particle, p being linear in each cell. Collective.
 
     As for the finite elements, water presses on the surface where it stands on it, and suction does not pull at it.
 
@@ -53,9 +50,6 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
 
     Raises:
         InputError: a pore pressure is not finite. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     mesh, cells = model.mesh, model.particles.cell
     p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
@@ -70,7 +64,7 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
 
 
 def _surface_forces(model: mpm.Model, chosen: Any, pressure: Any) -> tuple[NDArray[np.float64], Any]:
-    """Forces by a pressure on those chosen facets of cells beyond which there are no particles.
+    """Forces by a pressure on those chosen facets of cells beyond which there are no particles. Collective.
 
     Args:
         model: the particles.
@@ -79,9 +73,6 @@ def _surface_forces(model: mpm.Model, chosen: Any, pressure: Any) -> tuple[NDArr
 
     Returns:
         The forces, and the number of chosen facets at cells with particles, over all ranks.
-
-    Note:
-        Collective.
     """
     mesh, p, dim = model.mesh, model.particles, model.mesh.dim
     cells, position = p.cell, p.position

@@ -71,7 +71,7 @@ def particle_safety(
     """Factor by which the strength of the particles can be divided before they no longer come to rest under their weight.
 
     The particles move as far as they settle: for the factor of the undeformed body Young's moduli must be large enough for
-    settlements to be small against the cells. Strength, not stiffness, decides on the factor.
+    settlements to be small against the cells. Strength, not stiffness, decides on the factor. Collective.
 
     Args:
         model_of: function of the factor that returns a new `mpm_core.Model` with its particles, supports and gravity, whose laws
@@ -90,9 +90,6 @@ def particle_safety(
     Raises:
         InputError: an argument out of range, a model without gravity, or soil that does not rest at `start`. Raised on all ranks
             alike.
-
-    Note:
-        Collective.
     """
     _check(start=start, first_step=first_step, tolerance=tolerance, damping=damping, rest=rest)
     models, curve = {}, []

@@ -16,7 +16,7 @@ from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forc
 
 
 class ParticleSite:
-    """Particles that are placed and removed in stages, see `Stage` and `carry_out`; equilibrium is quasi-static.
+    """Particles that are placed and removed in stages, see `Stage` and `carry_out`; equilibrium is quasi-static. Collective.
 
     Soils and boundaries are the tags of the model's mesh. A stage places particles in the cells of a soil, or removes those
     that lie in them.
@@ -33,9 +33,6 @@ class ParticleSite:
     Raises:
         InputError: the model has particles, a support prescribes a displacement, or a soil or boundary does not exist. Raised on
             all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -75,7 +72,7 @@ class ParticleSite:
         return f"<ParticleSite: after stage {self.number}; {self.model!r}>"
 
     def carry_out(self, stage: Stage) -> StageReport:
-        """Bring the particles to equilibrium after a stage's changes.
+        """Bring the particles to equilibrium after a stage's changes. Collective.
 
         Args:
             stage: the changes.
@@ -87,9 +84,6 @@ class ParticleSite:
             InputError: the stage has an unknown soil or boundary, or a law that the model was not made with. Raised on all ranks
                 alike.
             StageError: there is no equilibrium; the particles are then in the last equilibrium of the stage.
-
-        Note:
-            Collective.
         """
         model = self.model
         state, fill, excavate = self.state.after(stage)
@@ -118,7 +112,7 @@ class ParticleSite:
         )
 
     def rows_of(self, soil: int | str) -> NDArray[np.bool_]:
-        """Whether each particle of this rank is of a soil.
+        """Whether each particle of this rank is of a soil. Collective.
 
         Args:
             soil: name or number of the soil's tag.
@@ -128,9 +122,6 @@ class ParticleSite:
 
         Raises:
             InputError: no cell has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         tags, ids = _tags(self.model, "cell", soil, "soil"), self.model.particles.id
         rows = np.zeros(len(ids), dtype=bool)
@@ -193,7 +184,7 @@ class ParticleSite:
 
 
 def apply_supports(model: mpm.Model, supports: Sequence[Support]) -> None:
-    """Give particles the supports of finite elements, in place of their earlier boundary conditions.
+    """Give particles the supports of finite elements, in place of their earlier boundary conditions. Collective.
 
     Args:
         model: the particles.
@@ -201,9 +192,6 @@ def apply_supports(model: mpm.Model, supports: Sequence[Support]) -> None:
 
     Raises:
         InputError: a support prescribes a displacement, or a boundary does not exist. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     for support in supports:
         if any(support.displacement or ()):

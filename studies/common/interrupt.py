@@ -57,11 +57,7 @@ class Interrupt:
                 os.write(2, f"\ninterrupted: {text}\n".encode())
 
     def requested(self) -> bool:
-        """Whether the run should end; true on all ranks once a signal came on any.
-
-        Note:
-            Collective.
-        """
+        """Whether the run should end; true on all ranks once a signal came on any. Collective."""
         self._agreed = self._comm.allreduce(self._caught, op=MPI.MAX)
         return self._agreed != 0
 

@@ -14,11 +14,10 @@ from .parameters import Parameter, ParameterError, plain_values
 def checkpoint_notes(path: Path, study: str, comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
     """The notes in a checkpoint of a study: ``options`` by name, ``restarts``, ``start``; and its ``time`` [s] and ``steps``.
 
+    Collective.
+
     Raises:
         ParameterError: on all ranks: the file cannot be read, or no run of this study saved it.
-
-    Note:
-        Collective.
     """
     import mpm_core as mpm
 

@@ -58,16 +58,13 @@ def add_picture_options(parser: argparse.ArgumentParser) -> None:
 
 
 def check_frames(model: mpm.Model, options: argparse.Namespace, folder: Path) -> None:
-    """Refuse more frames than the machine's memory, or the disk of the results folder, can take.
+    """Refuse more frames than the machine's memory, or the disk of the results folder, can take. Collective.
 
     Args:
         options: with ``frames``, ``fields``, ``float64`` and ``compression``.
 
     Raises:
         InputError: on all ranks alike, with the bytes that they would take and those that there are.
-
-    Note:
-        Collective.
     """
     comm = model.comm
     particles, frames = comm.allreduce(len(model.particles)), options.frames

@@ -34,7 +34,7 @@ _locks: dict[Path, TextIO] = {}
 
 
 def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: bool = False) -> Path:
-    """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it.
+    """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it. Collective.
 
     Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that
     holds a run, ``results/NAME-2`` and so on. A folder named by ``--output`` that holds results is refused, unless
@@ -47,9 +47,6 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
 
     Raises:
         OutputError: on all ranks: the folder cannot be written to, holds results, or another run writes to it.
-
-    Note:
-        Collective.
     """
     NOT_WRITTEN.clear()
 

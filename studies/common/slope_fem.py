@@ -88,14 +88,11 @@ def slope_fem(
     dilation_angle: float | None = None,
     depth: float = 0.0,
 ) -> bridge.QuasiStatic:
-    """Finite elements of the slope, unloaded: rollers at the sides, fixed base.
+    """Finite elements of the slope, unloaded: rollers at the sides, fixed base. Collective.
 
     Args:
         dilation_angle: [degrees], instead of that in the options.
         depth: of the ground below the toe [m].
-
-    Note:
-        Collective.
     """
     a = options
     if depth > 0:

@@ -68,7 +68,7 @@ def _text(description: dict[str, Any], notes: Mapping[str, Any] | None) -> str:
 
 
 def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
-    """Description in a checkpoint, read without a model.
+    """Description in a checkpoint, read without a model. Collective.
 
     Args:
         path: the file.
@@ -79,9 +79,6 @@ def checkpoint_description(path: str | os.PathLike[str], comm: MPI.Comm = MPI.CO
 
     Raises:
         RunError: on all ranks, with path and reason, as `Model.restore`.
-
-    Note:
-        Collective.
     """
     name = os.fspath(path)
     with CheckpointFile(name, comm) as file:

@@ -25,7 +25,7 @@ _MAY_LACK = ("drag_work", "friction_work", "energy_", "order_", "converted_", "g
 
 
 def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str, Arrays]) -> None:
-    """Write a checkpoint aside, wait until it is on the disk, and rename it; an older file stays until then.
+    """Write a checkpoint aside, wait until it is on the disk, and rename it; an older file stays until then. Collective.
 
     Args:
         path: of the checkpoint, the same on all ranks.
@@ -36,9 +36,6 @@ def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str,
     Raises:
         InputError: on all ranks: the path is not the same on all of them.
         RunError: on all ranks, with path and reason; nothing is left behind.
-
-    Note:
-        Collective.
     """
     check_same_path(comm, path)
     aside = f"{path}.part"

@@ -162,7 +162,7 @@ class RigidContact:
 
         One of them is a `Disc` or a `Sphere`, the other any surface; one of them at least is a `FreeBody`. Where they touch,
         impulses keep them apart: with friction bodies roll or slide, with restitution they bounce until they rest. Momentum is
-        kept to round-off, and no impulse adds energy (docs/contact.md). Other bodies count as prescribed.
+        kept to round-off, and no impulse adds energy (docs/contact.md). Other bodies count as prescribed. Collective.
 
         Args:
             other: another surface of the model, apart from this one.
@@ -172,9 +172,6 @@ class RigidContact:
         Raises:
             InputError: an argument out of its range, bodies that overlap, with the depth, that collide already, of which none is
                 round or none moves freely, or of another model.
-
-        Note:
-            Collective.
 
         Example:
             >>> boulder.add_collision(ground, friction=0.5, restitution=0.3)

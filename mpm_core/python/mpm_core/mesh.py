@@ -55,7 +55,7 @@ def floats(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
 
 
 class Mesh:
-    """Background mesh of triangles (plane strain) or tetrahedra, given by arrays.
+    """Background mesh of triangles (plane strain) or tetrahedra, given by arrays. Collective.
 
     Each rank gives the cells that it owns, then its ghost cells (those that share a facet with an owned one).
 
@@ -74,9 +74,6 @@ class Mesh:
     Raises:
         InputError: wrong shape, dtype or number; a cell without area or volume; overlapping (inverted) cells; a tagged
             facet that is no facet of a cell. Raised on every rank alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(

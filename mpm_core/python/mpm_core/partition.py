@@ -94,7 +94,7 @@ def take_mesh(body: Body, mesh: Mesh, ranks: NDArray) -> None:
 
 
 def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
-    """The same mesh on other ranks, with the cells across the facets of owned ones as ghosts.
+    """The same mesh on other ranks, with the cells across the facets of owned ones as ghosts. Collective.
 
     Cells of a rank are in the given order, ghosts by their numbers, and nodes as these cells name them: what a rank has
     depends only on which cells it owns, and in which order.
@@ -103,9 +103,6 @@ def redistributed(mesh: Mesh, ranks: NDArray, order: NDArray) -> Mesh:
         mesh: the mesh as it is distributed now.
         ranks: new owner of each cell that this rank owns now.
         order: place of the cell among those of its new owner: the lower number comes first.
-
-    Note:
-        Collective.
     """
     n, d, comm = mesh.owned_cells, mesh.dim, mesh.comm
     ghosted = mesh._core.with_ghost_values(np.asarray(ranks, np.float64), MPI._addressof(comm)).astype(np.int64)

@@ -62,7 +62,7 @@ def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
 
 
 def nearest_particle(model: Model, place: ArrayLike) -> int:
-    """Number of the particle that started nearest to a point; the highest number of several at the same distance.
+    """Number of the particle that started nearest to a point; the highest number of several at the same distance. Collective.
 
     Args:
         model: the model, seeded.
@@ -70,9 +70,6 @@ def nearest_particle(model: Model, place: ArrayLike) -> int:
 
     Raises:
         InputError: a point of another shape, or a model without particles.
-
-    Note:
-        Collective.
     """
     point = collectively(model.comm, lambda: floats("place", place, (model.mesh.dim,)))
     distance = np.linalg.norm(model.particles.initial_position - point, axis=1)

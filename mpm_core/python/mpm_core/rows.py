@@ -14,13 +14,12 @@ from . import _core
 def exchange_rows(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArray, NDArray]:
     """Send each row to a rank; returns the rows that came, by rising rank and in the order of that rank, and their ranks.
 
+    Collective.
+
     Args:
         comm: the ranks that take part.
         ranks: where each row goes, shape (n,).
         rows: shape (n, k), of int64 or float64.
-
-    Note:
-        Collective.
     """
     width, kind = rows.shape[1], rows.dtype.char
     sent = np.bincount(ranks, minlength=comm.size)
@@ -33,16 +32,13 @@ def exchange_rows(comm: MPI.Comm, ranks: NDArray, rows: NDArray) -> tuple[NDArra
 
 
 def request_rows(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Callable[[NDArray], NDArray]) -> NDArray:
-    """Send each rank its requests, a row each; returns its replies, a row each, in the order of the requests.
+    """Send each rank its requests, a row each; returns its replies, a row each, in the order of the requests. Collective.
 
     Args:
         comm: the ranks that take part.
         ranks: ranks that the requests go to, shape (n,).
         requests: shape (n, k).
         reply: function that returns a row for each row of requests.
-
-    Note:
-        Collective.
     """
     came, senders = exchange_rows(comm, ranks, requests)
     replies, _ = exchange_rows(comm, senders, reply(came))
@@ -52,7 +48,7 @@ def request_rows(comm: MPI.Comm, ranks: NDArray, requests: NDArray, reply: Calla
 
 
 def find_items(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray) -> tuple[NDArray, NDArray]:
-    """Find items by their global numbers; the core keeps the directory.
+    """Find items by their global numbers; the core keeps the directory. Collective.
 
     Args:
         comm: the ranks that take part.
@@ -62,9 +58,6 @@ def find_items(comm: MPI.Comm, numbers: NDArray, rows: NDArray, wanted: NDArray)
 
     Returns:
         Ranks and rows of these items, shape (m,) each; -1 for items that no rank has.
-
-    Note:
-        Collective.
     """
     whole = (np.ascontiguousarray(one, np.int64) for one in (numbers, rows, wanted))
     ranks, places = _core.first_holders(*whole, MPI._addressof(comm)).T

@@ -31,7 +31,7 @@ REWRITING = 0.005
 
 
 class Series:
-    """The file ``PATH.xdmf``, and beside it the folder ``PATH`` with an HDF5 file for each frame.
+    """The file ``PATH.xdmf``, and beside it the folder ``PATH`` with an HDF5 file for each frame. Collective.
 
     The XDMF file is written aside and renamed for each frame, so that it is whole and names whole files only, whenever it is
     read or the run is killed. When it is long, several frames may share a rewriting; `close` names the last ones.
@@ -49,9 +49,6 @@ class Series:
     Raises:
         InputError: another level of compression, or a path that is not the same on all ranks.
         RunError: on all ranks, with path and reason.
-
-    Note:
-        Collective.
     """
 
     def __init__(

@@ -39,8 +39,7 @@ class Space(NamedTuple):
 def space(model: Model) -> Space:
     """Volume of the particles, and the volume of the mesh that they fill. Where particles crowd, the latter is smaller.
 
-    Note:
-        Collective.
+    Collective.
     """
     p, mesh = model.particles, model.mesh
     held = np.bincount(p.cell, p.volume, minlength=mesh.owned_cells)
@@ -54,10 +53,7 @@ def swollen(model: Model) -> str:
 
     Where a surface cuts off a corner of a cell, a node beyond it has hardly any mass, and the few particles there, at the apex of
     their strength, expand without resistance. Pressed together again they resist with the volume that they have reached, which
-    generates energy.
-
-    Note:
-        Collective.
+    generates energy. Collective.
     """
     p = model.particles
     largest = float(np.max(p.volume / model.cell_volumes[p.cell], initial=0.0))
