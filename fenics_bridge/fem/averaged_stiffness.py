@@ -13,13 +13,10 @@ from fenics_bridge.fem.averaged_strain import AveragedStrain, compressed, matrix
 
 
 class AssembledStiffness:
-    """The stiffness as a matrix of PETSc.
+    """The stiffness as a matrix of PETSc. Collective.
 
     Args:
         strain: the averaged strain.
-
-    Note:
-        Collective.
     """
 
     def __init__(self, strain: AveragedStrain) -> None:
@@ -43,15 +40,12 @@ class AssembledStiffness:
     def with_tangent(
         self, tangent: NDArray[np.float64], held: NDArray[np.integer], more: PETSc.Mat | None = None
     ) -> PETSc.Mat:
-        """The matrix of a tangent.
+        """The matrix of a tangent. Collective.
 
         Args:
             tangent: tangent of the cells (n, S, S) [Pa].
             held: places of the prescribed dofs among this rank's own ones, whose rows and columns are those of the identity.
             more: matrix that is added; None for none.
-
-        Note:
-            Collective.
         """
         self._follow()
         weighted = self._strain.volumes[:, None, None] * tangent
@@ -101,15 +95,13 @@ class FactoredStiffness:
     """The stiffness as an operator that is not multiplied out, preconditioned by the stiffness of strains without averages.
 
     The preconditioner is stiffer, and takes some two to three times as many iterations as that of the matrix itself would.
+    Collective.
 
     Args:
         strain: the averaged strain.
         held: places of the supported dofs among this rank's own ones.
         plain: finite elements of the same space without averages, `Kinematics`.
         tangent: tangent of the cells (n, S, S) [Pa].
-
-    Note:
-        Collective.
     """
 
     def __init__(

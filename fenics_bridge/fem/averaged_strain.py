@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 
 class AveragedStrain:
-    """The strain of `AveragedKinematics` as an operator on displacements, and forces by its transpose.
+    """The strain of `AveragedKinematics` as an operator on displacements, and forces by its transpose. Collective.
 
     It is B + m f (M - 1) m^T B / d, with the plain strain B, the ones m of the d normal components, the fractions f by which
     cells are averaged, and the means M over nodes, weighted by f V, and back over cells. With these weights a uniform strain or
@@ -27,9 +27,6 @@ class AveragedStrain:
         volumes: volumes of the cells, those of one radian in an axisymmetric body, (n,).
         radii: radii of the centroids [m] in an axisymmetric body, (n,), else None.
         present: whether a cell is there, (n,); others take no part in the means.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -66,14 +63,13 @@ class AveragedStrain:
     def weights(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Weights of the mean over the cells around a node: the volume of each cell in it, and one over their sum per own node.
 
+        Collective.
+
         Args:
             fractions: by which the cells are averaged, (n,).
 
         Returns:
             Shapes (n,) [m^D] and (nodes,) [1/m^D]; the second is zero where no cell around a node is averaged.
-
-        Note:
-            Collective.
         """
         volumes = fractions * self.volumes * self._present
         around = self.corners * self._to_nodes(volumes)

@@ -67,6 +67,8 @@ def collapse_load(
 ) -> Collapse:
     """Raise a load until there is no equilibrium: steps double while they converge easily, and are bisected below a failure.
 
+    Collective.
+
     Args:
         model: finite elements in equilibrium under `load_of(start)`, e.g. fresh and unloaded.
         load_of: function of a number, the load's value, that returns the load.
@@ -80,9 +82,6 @@ def collapse_load(
 
     Raises:
         InputError: not even the first steps find equilibrium. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     warn_of_locking_at_failure(model)
     return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
@@ -98,7 +97,7 @@ def factor_of_safety(
     unreduced: Collection[int | str] = (),
     reduce: Callable[[Laws, float, Collection[int | str]], Laws] = reduced_strength,
 ) -> Collapse:
-    """Factor by which the strength can be divided before equilibrium under a load is lost.
+    """Factor by which the strength can be divided before equilibrium under a load is lost. Collective.
 
     The model has the reduced laws afterwards.
 
@@ -117,9 +116,6 @@ def factor_of_safety(
 
     Raises:
         InputError: the load is not carried at the start. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     warn_of_locking_at_failure(model)
     law = model.law

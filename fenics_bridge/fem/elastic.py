@@ -57,25 +57,18 @@ class ElasticSolution:
         return body_text("ElasticSolution", self.displacement.function_space.mesh, geometry=self.geometry)
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
-        """The stress as a function.
+        """The stress as a function. Collective.
 
         Args:
             smooth: average the stress of the cells at the nodes, which makes it continuous.
 
         Returns:
             The stress [Pa], polynomial in each cell, or continuous if `smooth`.
-
-        Note:
-            Collective.
         """
         return nodal_average(self.stress, self._radius) if smooth else self.stress
 
     def deviatoric_strain_function(self) -> fem.Function:
-        """sqrt(2/3 e : e) of the strain's deviator e [-], as a function that is constant in each cell.
-
-        Note:
-            Collective.
-        """
+        """sqrt(2/3 e : e) of the strain's deviator e [-], as a function that is constant in each cell. Collective."""
         components = strain(self.displacement, self._radius)
         mean = (components[0] + components[1] + components[2]) / 3
         normal = sum((components[k] - mean) ** 2 for k in range(3))
@@ -84,7 +77,7 @@ class ElasticSolution:
         return cell_function(self.displacement.function_space.mesh, size, 0, "deviatoric_strain")
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
-        """Values at points; the points and their cells may be on different ranks.
+        """Values at points; the points and their cells may be on different ranks. Collective.
 
         Args:
             points: positions [m], shape (n, D).
@@ -95,9 +88,6 @@ class ElasticSolution:
 
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return evaluate_at(points, displacement=self.displacement, stress=self.stress_function(smooth))
 
@@ -116,6 +106,8 @@ def solve_elastic(
     geometry: Geometry | None = None,
 ) -> ElasticSolution:
     """Small-strain equilibrium of a linear elastic body (plane strain, axisymmetric or 3D) under its weight and its supports.
+
+    Collective.
 
     Args:
         domain: mesh of the body.
@@ -138,9 +130,6 @@ def solve_elastic(
         InputError: an argument out of range, an unknown tag, or a geometry that does not go with the mesh. Raised on all ranks
             alike.
         RuntimeError: the linear solver failed.
-
-    Note:
-        Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, degree))
     geometry = geometry_of(domain, geometry)
@@ -175,7 +164,7 @@ def solve_nearly_incompressible(
     options_prefix: str = "mixed_",
     geometry: Geometry | None = None,
 ) -> ElasticSolution:
-    """Elastic equilibrium by Taylor-Hood elements, which do not lock as Poisson's ratio approaches 0.5.
+    """Elastic equilibrium by Taylor-Hood elements, which do not lock as Poisson's ratio approaches 0.5. Collective.
 
     Displacement is quadratic, pressure linear. The system is indefinite: by default MUMPS solves it.
 
@@ -196,9 +185,6 @@ def solve_nearly_incompressible(
     Raises:
         InputError: as for `solve_elastic`. Raised on all ranks alike.
         RuntimeError: the linear solver failed.
-
-    Note:
-        Collective.
     """
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
     agree(domain.comm, None if poisson > 0 else f"poisson is {poisson!r}, expected more than 0")

@@ -71,7 +71,7 @@ class EquilibriumReport:
 def find_equilibrium(
     body: Body, laws: Sequence[Law], external: Any, before: Any, displacement: float, solver: Solver
 ) -> EquilibriumReport:
-    """Bring a body to equilibrium under a load, from its last equilibrium on; without equilibrium it does not change.
+    """Bring a body to equilibrium under a load, from its last equilibrium on; without equilibrium it does not change. Collective.
 
     `body.increment` is the displacement of the whole step.
 
@@ -82,9 +82,6 @@ def find_equilibrium(
         before: nodal forces of the load before it.
         displacement: fraction of the displacements that the supports prescribe [-].
         solver: tolerances.
-
-    Note:
-        Collective.
     """
     step = EquilibriumStep(body, laws, external, before, displacement)
     patience = PATIENCE if solver.relaxation else None

@@ -17,7 +17,7 @@ _TOLERANCE = 1e-9
 
 
 class PointSearch:
-    """Points of each rank, found in the cells of a mesh wherever those are owned.
+    """Points of each rank, found in the cells of a mesh wherever those are owned. Collective.
 
     The constructor searches the cells; `values` then evaluates any number of functions.
 
@@ -27,9 +27,6 @@ class PointSearch:
 
     Raises:
         InputError: points has another shape or a value that is not finite. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(self, domain: Mesh, points: ArrayLike) -> None:
@@ -54,16 +51,13 @@ class PointSearch:
         self.found[self._rows[self._there]] = True
 
     def require_all(self, argument: str = "points") -> None:
-        """Require that all points lie in the mesh.
+        """Require that all points lie in the mesh. Collective.
 
         Args:
             argument: name of the points in the message.
 
         Raises:
             InputError: a point is outside the mesh; the message names the first one. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         lost = np.flatnonzero(~self.found)
         message = None
@@ -79,16 +73,13 @@ class PointSearch:
         return f"<PointSearch: {len(self.points)} points of this rank, {len(self._cells)} points found in its cells>"
 
     def values(self, function: fem.Function) -> NDArray[np.float64]:
-        """Values of a function at the points.
+        """Values of a function at the points. Collective.
 
         Args:
             function: function on the mesh.
 
         Returns:
             Shape (n, components); NaN at points outside the mesh.
-
-        Note:
-            Collective.
         """
         size = int(np.prod(function.ufl_shape)) if function.ufl_shape else 1
         values = np.full((len(self._inside), size), np.nan)
@@ -99,7 +90,7 @@ class PointSearch:
         return result
 
     def cell_sums(self, amounts: NDArray[np.float64]) -> NDArray:
-        """Sums over the points in each cell that this rank owns; a point outside the mesh counts nowhere.
+        """Sums over the points in each cell that this rank owns; a point outside the mesh counts nowhere. Collective.
 
         (A conservative transfer: it keeps the total.)
 
@@ -108,9 +99,6 @@ class PointSearch:
 
         Returns:
             Shape (m,), by the owned cells.
-
-        Note:
-            Collective.
         """
         rank_of = np.full(len(self.points), -1)
         rank_of[self._rows[self._there]] = self._ranks[self._there]
@@ -124,7 +112,7 @@ class PointSearch:
 
 
 def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArray[np.float64]]:
-    """Values of several functions of one mesh at points; the points and their cells may be on different ranks.
+    """Values of several functions of one mesh at points; the points and their cells may be on different ranks. Collective.
 
     Args:
         points: positions of this rank's points [m], shape (n, D).
@@ -135,9 +123,6 @@ def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArr
 
     Raises:
         InputError: a point is outside the mesh; the message names it. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     domain = next(iter(functions.values())).function_space.mesh
     search = PointSearch(domain, points)

@@ -18,7 +18,7 @@ from fenics_bridge.mesh.names import known_tags, label, tag_numbers
 
 
 class FemSite:
-    """A body of finite elements that is built and excavated in stages, see `Stage` and `carry_out`.
+    """A body of finite elements that is built and excavated in stages, see `Stage` and `carry_out`. Collective.
 
     Args:
         fem: finite elements, new and unloaded, of the soils of all stages, with a law for each; at first none is placed.
@@ -28,9 +28,6 @@ class FemSite:
 
     Raises:
         InputError: fem has no cell tags, or is loaded already. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -67,7 +64,7 @@ class FemSite:
         return f"<FemSite: after stage {self.number}; {self.fem!r}>"
 
     def carry_out(self, stage: Stage) -> StageReport:
-        """Bring the body to equilibrium after a stage's changes.
+        """Bring the body to equilibrium after a stage's changes. Collective.
 
         Args:
             stage: the changes.
@@ -78,9 +75,6 @@ class FemSite:
         Raises:
             InputError: the stage has an unknown soil or boundary; nothing has been changed. Raised on all ranks alike.
             StageError: there is no equilibrium.
-
-        Note:
-            Collective.
         """
         fem = self.fem
         state, _, _ = self.state.after(stage)
@@ -100,11 +94,7 @@ class FemSite:
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
 
     def largest_displacement(self) -> float:
-        """Largest displacement of a node of the present soil, since displacements count [m].
-
-        Note:
-            Collective.
-        """
+        """Largest displacement of a node of the present soil, since displacements count [m]. Collective."""
         size = np.linalg.norm(self.fem.displacement.x.array.reshape(-1, self.fem.domain.geometry.dim), axis=1)
         points, space = self.fem.points, self.fem.displacement.function_space
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()

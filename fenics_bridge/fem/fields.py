@@ -95,7 +95,7 @@ class SupportedBody:
         raise NotImplementedError
 
     def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
-        """Force of the body, including its pore water, on its support at the facets of a tag, summed over them.
+        """Force of the body, including its pore water, on its support at the facets of a tag, summed over them. Collective.
 
         Args:
             facet_tag: number or name of the tag.
@@ -105,9 +105,6 @@ class SupportedBody:
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         space, forces, facet_tags = self._nodal_reactions()
         dim = space.mesh.geometry.dim
@@ -118,7 +115,7 @@ class SupportedBody:
 
 
 def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
-    """Average a function at the nodes, by the volume of the cells around each of them.
+    """Average a function at the nodes, by the volume of the cells around each of them. Collective.
 
     (The lumped L2 projection; it smooths stresses that jump between cells.)
 
@@ -128,9 +125,6 @@ def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
 
     Returns:
         Continuous, piecewise linear function.
-
-    Note:
-        Collective.
     """
     domain = function.function_space.mesh
     size = function.ufl_shape[0]

@@ -22,7 +22,7 @@ from mpm_core import Geometry
 
 
 def geometry_of(domain: Mesh, given: Geometry | None = None) -> Geometry:
-    """The geometry of a mesh: the one that is given, or that of its dimension.
+    """The geometry of a mesh: the one that is given, or that of its dimension. Collective.
 
     Args:
         domain: mesh of the body.
@@ -30,9 +30,6 @@ def geometry_of(domain: Mesh, given: Geometry | None = None) -> Geometry:
 
     Raises:
         InputError: the geometry does not go with the dimension, or radii are below zero. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     dim = domain.geometry.dim
     usual = Geometry.PLANE_STRAIN if dim == 2 else Geometry.SOLID
@@ -65,12 +62,14 @@ def body_volumes(domain: Mesh, geometry: Geometry | None) -> NDArray[np.float64]
 def require_same_geometry(model: Any, fem: Any) -> None:
     """Raise InputError, on all ranks, unless particles and finite elements have the same geometry. Collective."""
     same = model.geometry == fem.geometry
-    problem = f"the geometry of the finite elements is {fem.geometry.name}, that of the particles is {model.geometry.name}"
+    problem = (
+        f"the geometry of the finite elements is {fem.geometry.name}, that of the particles is {model.geometry.name}"
+    )
     agree(model.comm, None if same else problem)
 
 
 def require_axis_held(space: Any, geometry: Geometry, constraints: Any) -> None:
-    """Require that nodes on the axis of an axisymmetric body are fixed along the radius.
+    """Require that nodes on the axis of an axisymmetric body are fixed along the radius. Collective.
 
     Args:
         space: space of the displacement, or that part of a mixed space.
@@ -79,9 +78,6 @@ def require_axis_held(space: Any, geometry: Geometry, constraints: Any) -> None:
 
     Raises:
         InputError: a node on the axis may move along the radius. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     if geometry != Geometry.AXISYMMETRIC:
         return

@@ -88,7 +88,7 @@ class LinearSolver:
         return chosen in FACTORISING
 
     def solve(self, matrix: PETSc.Mat | FactoredStiffness, residual: Any, increment: fem.Function) -> str:
-        """Solve a linear system.
+        """Solve a linear system. Collective.
 
         Args:
             matrix: matrix of the system, for an iterative solver perhaps in factors; it may be changed.
@@ -97,9 +97,6 @@ class LinearSolver:
 
         Returns:
             The reason of a failure in words, or an empty text.
-
-        Note:
-            Collective.
         """
         solution, right = matrix.createVecs()
         right.array[:] = residual.array[: self._n_owned]

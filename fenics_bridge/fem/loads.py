@@ -158,7 +158,7 @@ class LoadVectors:
         self._traction: dict[int, list[NDArray[np.float64]]] = {}
 
     def forces(self, load: Load) -> NDArray[np.float64]:
-        """External forces of a load, ghosts up to date.
+        """External forces of a load, ghosts up to date. Collective.
 
         Args:
             load: the load.
@@ -169,9 +169,6 @@ class LoadVectors:
         Raises:
             InputError: a tag does not exist, a value is not finite, or a traction has not D components. Raised on all ranks
                 alike.
-
-        Note:
-            Collective.
         """
         require_finite(self._space.mesh.comm, load)
         load = self.resolved(load)
@@ -188,16 +185,13 @@ class LoadVectors:
         return forces + self.constant + load.held * self.held
 
     def resolved(self, load: Load) -> Load:
-        """The load with numbers for the names of tags.
+        """The load with numbers for the names of tags. Collective.
 
         Args:
             load: the load.
 
         Raises:
             InputError: a tag does not exist. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         comm, weight = self._space.mesh.comm, load.unit_weight
         if isinstance(weight, dict):
@@ -261,7 +255,7 @@ def elastic_load(
     body_force: Callable[[NDArray[np.float64]], ArrayLike] | None = None,
     radius: Any = None,
 ) -> Any:
-    """Work of weight, tractions and a body force on a test displacement, as a UFL form.
+    """Work of weight, tractions and a body force on a test displacement, as a UFL form. Collective.
 
     Args:
         test: test displacement.
@@ -274,9 +268,6 @@ def elastic_load(
 
     Raises:
         InputError: a facet tag does not exist. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
     work = weighted(ufl.inner(fem.Constant(domain, np.array(down)), test), radius) * ufl.dx

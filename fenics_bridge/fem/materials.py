@@ -12,7 +12,7 @@ from fenics_bridge.types import Law, Laws, MeshTags
 
 
 class Materials:
-    """One law for the whole body, or one for each cell tag.
+    """One law for the whole body, or one for each cell tag. Collective.
 
     Args:
         domain: mesh of the body.
@@ -21,9 +21,6 @@ class Materials:
 
     Raises:
         InputError: a tag has no law, or a law is given for an unknown tag. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(self, domain: Mesh, law: Laws, cell_tags: MeshTags | None) -> None:
@@ -49,16 +46,13 @@ class Materials:
             self.number[values == tag] = number
 
     def laws(self, law: Laws) -> list[Law]:
-        """The laws in their order.
+        """The laws in their order. Collective.
 
         Args:
             law: law, or laws by cell tag or name, for the same tags as at the start.
 
         Raises:
             InputError: laws for other tags. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         named = isinstance(law, dict) and self.tags != (None,)
         given = by_number(self._comm, self._cell_tags, law, "law", "cell") if named else {None: law}

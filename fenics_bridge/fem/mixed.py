@@ -34,7 +34,7 @@ from mpm_core import Geometry
 
 
 class MixedQuasiStatic(SupportedBody):
-    """Small-strain equilibrium of undrained soil: quadratic displacement, linear pressure (Taylor-Hood).
+    """Small-strain equilibrium of undrained soil: quadratic displacement, linear pressure (Taylor-Hood). Collective.
 
     The law gives the deviatoric stress of the deviatoric strain; the pressure p = -K div u is an unknown of its own. That
     is exact for laws whose deviatoric stress does not depend on the mean stress: elastic, or of friction angle zero.
@@ -51,9 +51,6 @@ class MixedQuasiStatic(SupportedBody):
 
     Raises:
         InputError: another law, an unknown tag, or a geometry that does not go with the mesh. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -113,7 +110,7 @@ class MixedQuasiStatic(SupportedBody):
     def equilibrate(
         self, load: Load, law: mpm.LinearElastic | mpm.MohrCoulomb | None = None, **options: Any
     ) -> EquilibriumReport:
-        """Find the equilibrium under a load, with a law, in one step; without equilibrium nothing changes.
+        """Find the equilibrium under a load, with a law, in one step; without equilibrium nothing changes. Collective.
 
         Args:
             load: load at the end of the step.
@@ -125,9 +122,6 @@ class MixedQuasiStatic(SupportedBody):
 
         Raises:
             InputError: a law or load that is not possible. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
@@ -145,7 +139,7 @@ class MixedQuasiStatic(SupportedBody):
         tolerance: float = 1e-3,
         progress: Callable[[LoadStep], Any] | None = None,
     ) -> list[LoadStep]:
-        """Raise the load from the present one to the given one, in steps that adapt; as `QuasiStatic.solve`.
+        """Raise the load from the present one to the given one, in steps that adapt; as `QuasiStatic.solve`. Collective.
 
         Args:
             load: load at the end.
@@ -156,9 +150,6 @@ class MixedQuasiStatic(SupportedBody):
         Returns:
             All steps. `converged` says whether the load was reached; if not, there is a warning, and `load` is the last one in
             equilibrium.
-
-        Note:
-            Collective.
         """
         return raise_load(self, load, first_step, tolerance, progress)
 
@@ -169,7 +160,7 @@ class MixedQuasiStatic(SupportedBody):
         return space, forces[dofs], self._facet_tags
 
     def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Pressure at points, compression positive; the points and their cells may be on different ranks.
+        """Pressure at points, compression positive; the points and their cells may be on different ranks. Collective.
 
         Args:
             points: positions [m], shape (n, D).
@@ -179,15 +170,12 @@ class MixedQuasiStatic(SupportedBody):
 
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         pressure = self._body.solution.sub(1).collapse()
         return self._kinematics.scale * evaluate_at(points, pressure=pressure)["pressure"][:, 0]
 
     def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Values at points; the points and their cells may be on different ranks.
+        """Values at points; the points and their cells may be on different ranks. Collective.
 
         Args:
             points: positions [m], shape (n, D).
@@ -197,9 +185,6 @@ class MixedQuasiStatic(SupportedBody):
 
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return evaluate_at(points, displacement=self.displacement)
 

@@ -42,7 +42,7 @@ from mpm_core import Geometry
 class QuasiStatic(SupportedBody, PointFunctions):
     """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
-    Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium.
+    Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium. Collective.
 
     Args:
         domain: mesh of the body.
@@ -62,9 +62,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
     Raises:
         InputError: an unknown tag, cells without a law, or another argument out of range. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -158,7 +155,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         stress: OfPosition | None = None,
         law: Laws | None = None,
     ) -> None:
-        """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces.
+        """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces. Collective.
 
         For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
         active start without stress and state, or with the given stress. Afterwards `load.held` is 1, and the body is
@@ -173,9 +170,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: an unknown tag, or values of another shape or not finite. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         reconfigure(self, off, supports, pore_pressure, stress, law)
 
@@ -192,8 +186,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
     def law_by_tag(self) -> dict[Any, Law]:
         """The laws in force by cell tag; where one law holds for the whole body, it is given for each tag of its cells.
 
-        Note:
-            Collective.
+        Collective.
         """
         laws, tags = self.laws, self.soils
         if tags == (None,):
@@ -207,7 +200,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return self._body.solver.iterations
 
     def set_initial_stress(self, stress: ArrayLike, load: Load) -> None:
-        """Start from a given stress, meant for the given load, undeformed.
+        """Start from a given stress, meant for the given load, undeformed. Collective.
 
         Call `equilibrate(load)` afterwards, which moves the body by the out-of-balance part of the stress.
 
@@ -217,9 +210,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: stress has another shape or a value that is not finite. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         shape = self.points.stress.shape
         good = np.shape(stress) == shape and np.all(np.isfinite(stress))
@@ -230,7 +220,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.load = load
 
     def set_parameter(self, name: str, values: Field | dict[int | str, float]) -> None:
-        """Give the points their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
+        """Give the points their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it. Collective.
 
         Where the law of a point changes, the point keeps its values. They go to the particles at the hand-over.
 
@@ -241,9 +231,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: a parameter that varies in no law, or values out of its range. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         set_parameter(self, name, values)
 
@@ -256,7 +243,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
     def equilibrate(
         self, load: Load, law: Laws | None = None, duration: float = np.inf, **options: Any
     ) -> EquilibriumReport:
-        """Find the equilibrium under a load, with a law or laws, in one step; without equilibrium nothing changes.
+        """Find the equilibrium under a load, with a law or laws, in one step; without equilibrium nothing changes. Collective.
 
         Newton's method is tried first. If it does not converge, the body relaxes with a viscosity until it rests or
         flows (`relaxation`).
@@ -272,9 +259,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: a load or laws that are not possible, or an unknown tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         law = law or self.law
         forces = self._loads.forces(load), self._loads.forces(self.load)
@@ -304,7 +288,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         tolerance: float = 1e-3,
         progress: Callable[[LoadStep], Any] | None = None,
     ) -> list[LoadStep]:
-        """Raise the load from the present one to the given one, in steps that adapt.
+        """Raise the load from the present one to the given one, in steps that adapt. Collective.
 
         Two easy steps in a row double the step, a step without equilibrium halves it.
 
@@ -320,9 +304,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: an unknown tag, or a load that is not finite. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         load = self._loads.resolved(load)
         warn_of_weight(self.domain.comm, load)
@@ -333,16 +314,13 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return self.displacement.function_space, out_of_balance, self.facet_tags
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
-        """The stress as a function.
+        """The stress as a function. Collective.
 
         Args:
             smooth: linear in each cell, through or near its points, or averaged at the nodes (degree 1).
 
         Returns:
             Stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
-
-        Note:
-            Collective.
         """
         if smooth and self.degree > 1:
             return self.points.cell_function(self.points.stress, "stress", 1)
@@ -350,7 +328,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return nodal_average(mean, self.radius) if smooth else mean
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
-        """Values at points; the points and their cells may be on different ranks.
+        """Values at points; the points and their cells may be on different ranks. Collective.
 
         The cells' mean stress is admissible; the smooth one may exceed the strength.
 
@@ -363,9 +341,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return evaluate_at(
             points, displacement=self.displacement, stress=self.stress_function(smooth), state=self.state_function()

@@ -94,7 +94,7 @@ def relax(
     solver: Solver,
     reference: float,
 ) -> Relaxation:
-    """Relax a body under a load, from its present state.
+    """Relax a body under a load, from its present state. Collective.
 
     The body stays in the state in which the relaxation ended, whatever the outcome.
 
@@ -107,9 +107,6 @@ def relax(
         solver: tolerances at which the body counts as at rest, and the largest number of steps of pseudo-time.
         reference: displacement at the start [m]; the growth must exceed it, and some times the elastic displacement of the
             change of load besides, before it counts as failure.
-
-    Note:
-        Collective.
     """
     result, theta, scale = Relaxation(), FIRST, None
     tolerance = solver.relaxed_tolerance

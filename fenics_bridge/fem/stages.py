@@ -117,7 +117,7 @@ def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
 
 
 def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator[StageReport]:
-    """Carry out stages one after the other.
+    """Carry out stages one after the other. Collective.
 
     Args:
         site: finite elements or particles, in the state to which earlier stages have brought them.
@@ -129,9 +129,6 @@ def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator
     Raises:
         InputError: a stage names a soil or boundary that does not exist. Raised on all ranks alike.
         StageError: a stage has no equilibrium.
-
-    Note:
-        Collective.
 
     Example:
         >>> stages = [
@@ -182,7 +179,7 @@ class SiteState:
         """Function of positions that returns pore pressures [Pa]"""
 
     def after(self, stage: Stage) -> tuple[SiteState, tuple[int, ...], tuple[int, ...]]:
-        """The state that a stage leads to.
+        """The state that a stage leads to. Collective.
 
         Args:
             stage: the changes.
@@ -192,9 +189,6 @@ class SiteState:
 
         Raises:
             InputError: the stage has an unknown soil or boundary, or a value out of range. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         new = object.__new__(SiteState)
         new.__dict__.update(self.__dict__)

@@ -10,14 +10,11 @@ from petsc4py import PETSc
 
 
 class Stiffness:
-    """A bilinear form on a space and itself as a PETSc matrix, without the rows and columns of the supports.
+    """A bilinear form on a space and itself as a PETSc matrix, without the rows and columns of the supports. Collective.
 
     Args:
         form: UFL form.
         constraints: the boundary conditions.
-
-    Note:
-        Collective.
     """
 
     def __init__(self, form: Any, constraints: Any) -> None:

@@ -72,7 +72,7 @@ def prescribed(facet_tag: int | str, displacement: Sequence[float | None]) -> Su
 
 
 class Constraints:
-    """The supports of a body on the degrees of freedom of a displacement space.
+    """The supports of a body on the degrees of freedom of a displacement space. Collective.
 
     Where supports meet, the later one holds.
 
@@ -84,9 +84,6 @@ class Constraints:
 
     Raises:
         InputError: an unknown tag, or displacements of another shape or not finite. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -128,7 +125,7 @@ class Constraints:
 
 
 def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[float, ...] | None:
-    """The axis to which all facets of a tag are at right angles.
+    """The axis to which all facets of a tag are at right angles. Collective.
 
     Args:
         domain: mesh of DOLFINx.
@@ -140,9 +137,6 @@ def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[flo
 
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
     corners = domain.geometry.x[facet_nodes(domain, facets)][:, :, : domain.geometry.dim]

@@ -56,7 +56,7 @@ class AppliedBoundary:
         """The conditions where they hold"""
 
     def take(self, boundary: Sequence[WaterBoundary]) -> bool:
-        """Check a list of conditions and find where they hold.
+        """Check a list of conditions and find where they hold. Collective.
 
         Args:
             boundary: the conditions.
@@ -66,9 +66,6 @@ class AppliedBoundary:
 
         Raises:
             InputError: values out of range, or unknown tags. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         held = [one.condition for one in self.held]
         if len(held) == len(boundary) and all(a is b for a, b in zip(held, boundary)):
@@ -131,6 +128,8 @@ class AppliedBoundary:
     def inflow(self, facet_tag: int | str | None, reaction: NDArray[np.float64]) -> float:
         """Water that enters through the facets of a tag; a node where several conditions meet counts for the first of them.
 
+        Collective.
+
         Args:
             facet_tag: number or name of the tag; None for all conditions together.
             reaction: inflow at the dofs beside the prescribed rates [m3/s], shape (m,).
@@ -140,9 +139,6 @@ class AppliedBoundary:
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         comm = self._space.mesh.comm
         numbers = None if facet_tag is None else tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")

@@ -44,7 +44,7 @@ class BoundedProblem:
     def solve(
         self, fixed: NDArray[np.bool_], values: NDArray[np.float64], upper: NDArray[np.float64], scale: float
     ) -> str | None:
-        """Solve from the unknown's present values.
+        """Solve from the unknown's present values. Collective.
 
         Args:
             fixed: which dofs of this rank are fixed, shape (m,).
@@ -54,9 +54,6 @@ class BoundedProblem:
 
         Returns:
             Why it failed, in words; None where it did not.
-
-        Note:
-            Collective.
         """
         self._fixed, self._values, self._scale = fixed[: self._n], values, scale
         start = self.unknown.x.array.copy()

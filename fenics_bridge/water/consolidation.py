@@ -53,6 +53,8 @@ from mpm_core import Geometry
 class Consolidation(ConsolidationResults):
     """Deformation of soil, quasi-static or with inertia, coupled with the flow of its water: displacement u, pore pressure p.
 
+    Collective.
+
     Args:
         domain: mesh of the body.
         law: law of `mpm_core` for effective stresses, or laws by cell tag or name.
@@ -80,9 +82,6 @@ class Consolidation(ConsolidationResults):
 
     Raises:
         InputError: an unknown tag, cells without law or soil, or another argument out of range. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -232,6 +231,8 @@ class Consolidation(ConsolidationResults):
     ) -> None:
         """Begin with effective stresses and pore pressures, undeformed; what is out of balance is released in the first step.
 
+        Collective.
+
         Args:
             stress: effective stress [Pa] at `points.coordinates()`, shape (n, S), or a QuasiStatic on the same mesh with elements
                 of the same degree and the same laws, of which the state is taken too; None for none.
@@ -239,9 +240,6 @@ class Consolidation(ConsolidationResults):
 
         Raises:
             InputError: values of another shape or not finite. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         set_initial_state(self, stress, pore_pressure)
 
@@ -254,7 +252,7 @@ class Consolidation(ConsolidationResults):
         law: Laws | None = None,
         duration: float = 0.0,
     ) -> None:
-        """Place and remove soil, or change laws and supports, between steps.
+        """Place and remove soil, or change laws and supports, between steps. Collective.
 
         The steps that follow release what is then out of balance, such as the weight of soil that is placed, while the water
         flows: in equal parts per time over `duration`, or in the next step. `load` and `boundary` hold for the soil that is
@@ -272,16 +270,13 @@ class Consolidation(ConsolidationResults):
 
         Raises:
             InputError: an unknown tag, or a value out of range. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         reconfigure(self, off, supports, pore_pressure, stress, law, duration)
 
     # --- steps -------------------------------------------------------------------------------------------------------
 
     def advance(self, dt: float) -> ConsolidationReport:
-        """Make a step of backward Euler.
+        """Make a step of backward Euler. Collective.
 
         Args:
             dt: length of the step [s].
@@ -292,9 +287,6 @@ class Consolidation(ConsolidationResults):
 
         Raises:
             InputError: dt is not positive, or a load or boundary condition is not possible. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
@@ -330,7 +322,7 @@ class Consolidation(ConsolidationResults):
         longest: float = np.inf,
         progress: Callable[[ConsolidationReport], Any] | None = None,
     ) -> list[ConsolidationReport]:
-        """Make steps up to a time, each longer than the one before, as long as Newton's method takes them easily.
+        """Make steps up to a time, each longer than the one before, as long as Newton's method takes them easily. Collective.
 
         A step that fails is halved.
 
@@ -346,9 +338,6 @@ class Consolidation(ConsolidationResults):
 
         Raises:
             InputError: an argument out of range. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return run(self, until, first_step, growth, longest, progress)
 
@@ -387,13 +376,10 @@ class Consolidation(ConsolidationResults):
         return solve_step(step, self._body.constraints, bounds, self._active, state, self.solver)
 
     def _step_state(self, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Pressures and inflows of the step under trial.
+        """Pressures and inflows of the step under trial. Collective.
 
         Returns:
             Pressures over their unit [-], and inflows beside the prescribed rates [m3/s], both of shape (m,).
-
-        Note:
-            Collective.
         """
         body, dofs = self._body, self._pressures[1]
         internal = body.kinematics.internal_forces(self.points.trial_stress).array[dofs]

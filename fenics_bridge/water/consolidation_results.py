@@ -44,16 +44,13 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         return part_of(self._body.solution, self._displacements, "displacement")
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
-        """Effective stress as a function.
+        """Effective stress as a function. Collective.
 
         Args:
             smooth: average the stress of the cells at the nodes, which makes it continuous.
 
         Returns:
             Effective stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
-
-        Note:
-            Collective.
         """
         mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
         return nodal_average(mean, self.radius) if smooth else mean
@@ -64,7 +61,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         return self._laws
 
     def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Values at points, whichever ranks have the points and their cells.
+        """Values at points, whichever ranks have the points and their cells. Collective.
 
         Args:
             points: positions [m], shape (n, D).
@@ -74,9 +71,6 @@ class ConsolidationResults(SupportedBody, PointFunctions):
 
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return evaluate_at(
             points, displacement=self.displacement, pressure=self.pressure, stress=self.stress_function()
@@ -85,15 +79,14 @@ class ConsolidationResults(SupportedBody, PointFunctions):
     def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
         """The pore pressure as a function of positions, for stages, collapse loads and factors of safety, as of `Seepage`.
 
+        Collective.
+
         Args:
             suction: False for zero where it is negative; True for the suction there times the effective saturation at the nodes.
             outside: function of positions (n, D) [m] for points outside the body; None for zero there.
 
         Returns:
             Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
-
-        Note:
-            Collective.
         """
         acting = fem.Function(self.pressure.function_space, name="pore_pressure")
         acting.x.array[:] = np.maximum(self.pressure.x.array, 0.0)
@@ -103,15 +96,11 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         return at_positions(acting, outside)
 
     def stored_water(self) -> float:
-        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure.
-
-        Note:
-            Collective.
-        """
+        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure. Collective."""
         return self.domain.comm.allreduce(fem.assemble_scalar(self._terms.content))
 
     def inflow(self, facet_tag: int | str | None) -> float:
-        """Water that entered through the facets of a tag in the last step; as for `Seepage`.
+        """Water that entered through the facets of a tag in the last step; as for `Seepage`. Collective.
 
         Args:
             facet_tag: number or name of the tag; None for all boundary conditions together.
@@ -121,9 +110,6 @@ class ConsolidationResults(SupportedBody, PointFunctions):
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return self._applied.inflow(facet_tag, self._inflow)
 

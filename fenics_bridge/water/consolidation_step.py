@@ -118,7 +118,7 @@ def solve_step(
     state_of: Callable[[], tuple[NDArray[np.float64], NDArray[np.float64]]],
     solver: Solver,
 ) -> tuple[Any, NDArray[np.bool_], int, str]:
-    """Solve a step where pressures p <= upper are bounded: inflow is nil below the bound and at most nil at it.
+    """Solve a step where pressures p <= upper are bounded: inflow is nil below the bound and at most nil at it. Collective.
 
     Guesses which pressures are at their bound until the guess is right (primal-dual active set method, Hintermueller, Ito and
     Kunisch 2002).
@@ -133,9 +133,6 @@ def solve_step(
 
     Returns:
         Report of Newton's method, the pressures at their bound, iterations in all, and why it failed (empty if it did not).
-
-    Note:
-        Collective.
     """
     comm, (fixed, values, upper) = constraints.comm, bounds
     bounded, iterations = np.isfinite(upper) & ~fixed, 0

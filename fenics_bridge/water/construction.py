@@ -46,16 +46,13 @@ def reconfigure(
 
 
 def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Degrees of freedom of nodes without soil, of the displacement, and without wet soil, of the pressure.
+    """Degrees of freedom of nodes without soil, of the displacement, and without wet soil, of the pressure. Collective.
 
     Args:
         model: the Consolidation.
 
     Returns:
         Those of the mixed space, shape (m, D), and of the pressure's own space, shape (k,), ghosts included.
-
-    Note:
-        Collective.
     """
     (displacements, dofs), dim = model._displacements, model.domain.geometry.dim
     return dofs.reshape(-1, dim)[lonely_nodes(displacements, model._there)], lonely_nodes(

@@ -74,16 +74,13 @@ class Motion:
         self._carried.x.array[:] = -self.acceleration.x.array / self._factor.value
 
     def set_velocity(self, velocity: OfPosition | ArrayLike) -> None:
-        """Begin with a velocity.
+        """Begin with a velocity. Collective.
 
         Args:
             velocity: function of positions (n, D) [m] that returns (n, D) [m/s], or one vector (D,).
 
         Raises:
             InputError: values of another shape or not finite. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         dim = self._space.mesh.geometry.dim
         x = self._space.tabulate_dof_coordinates()[:, :dim]

@@ -10,7 +10,7 @@ from fenics_bridge.water.boundary import Reservoir, WaterBoundary, value_at
 
 
 def apply_reservoirs(model: mpm.Model, boundary: Iterable[WaterBoundary], time: float) -> None:
-    """Let reservoirs stand against the soil of particles, with the levels that they have at a time.
+    """Let reservoirs stand against the soil of particles, with the levels that they have at a time. Collective.
 
     Their water has hydrostatic pressure below the level, in the pores and on the soil. Above the level the pressure is zero, so
     that water may enter there, which finite elements do not allow: keep the boundary under water, or wet.
@@ -22,9 +22,6 @@ def apply_reservoirs(model: mpm.Model, boundary: Iterable[WaterBoundary], time: 
 
     Raises:
         InputError: another boundary condition, particles without water, or an unknown tag. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     conditions = list(boundary)
     reservoirs = [one for one in conditions if isinstance(one, Reservoir)]

@@ -44,7 +44,7 @@ _SHORTER = (
 
 
 class Seepage:
-    """Flow of water through a body of soil.
+    """Flow of water through a body of soil. Collective.
 
     Args:
         domain: mesh of the body.
@@ -62,9 +62,6 @@ class Seepage:
 
     Raises:
         InputError: an unknown tag, cells without a soil, or another argument out of range. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
 
     def __init__(
@@ -136,14 +133,11 @@ class Seepage:
     # --- solving -----------------------------------------------------------------------------------------------------
 
     def solve(self) -> None:
-        """Find the steady flow under the boundary conditions at the present time.
+        """Find the steady flow under the boundary conditions at the present time. Collective.
 
         Raises:
             InputError: no boundary condition determines the pressure, or one is not possible. Raised on all ranks alike.
             RuntimeError: no steady flow was found.
-
-        Note:
-            Collective.
         """
         heads = any(isinstance(c, (Head, Reservoir, SeepageFace, Rain)) for c in self.boundary)
         missing = "boundary: no head, reservoir, seepage face or rain; without one the steady pressure is undetermined"
@@ -179,7 +173,7 @@ class Seepage:
         return f"{failure or 'the continuation was too slow'}, with retention curves stretched {10**-done:.3g} times"
 
     def advance(self, dt: float) -> bool:
-        """Make a step of backward Euler.
+        """Make a step of backward Euler. Collective.
 
         Args:
             dt: length of the step [s].
@@ -189,9 +183,6 @@ class Seepage:
 
         Raises:
             InputError: dt is not positive, or a boundary condition is not possible. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
@@ -268,7 +259,7 @@ class Seepage:
     # --- results -----------------------------------------------------------------------------------------------------
 
     def inflow(self, facet_tag: int | str | None) -> float:
-        """Water that enters through the facets of a tag.
+        """Water that enters through the facets of a tag. Collective.
 
         It follows from the equilibrium of the nodes, so that the inflows of all tags balance to the tolerance of the solution.
         A node where several conditions meet counts for the first of them.
@@ -281,18 +272,11 @@ class Seepage:
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
-
-        Note:
-            Collective.
         """
         return self._applied.inflow(facet_tag, self._reaction)
 
     def stored_water(self) -> float:
-        """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure.
-
-        Note:
-            Collective.
-        """
+        """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
         if self._stored is None:
             content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._soils]
             self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))

@@ -104,7 +104,7 @@ def dipping(along: float, across: float, dip: float, direction: float | None = N
 def soils_by_tag(
     domain: Mesh, soil: Any, cell_tags: MeshTags | None, dry: bool = False
 ) -> tuple[list[PorousSoil], list[Any], list[NDArray[np.int32]]]:
-    """The soils, the measure over the cells of each, and these cells, ghosts too.
+    """The soils, the measure over the cells of each, and these cells, ghosts too. Collective.
 
     Args:
         domain: mesh of the body.
@@ -114,9 +114,6 @@ def soils_by_tag(
 
     Raises:
         InputError: a tag does not exist or has no soil, or a conductivity is of another dimension. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     comm, dim = domain.comm, domain.geometry.dim
     by_tag: dict[Any, PorousSoil] = {None: soil} if not isinstance(soil, dict) else soil

@@ -20,7 +20,7 @@ from fenics_bridge.water.soils import WATER_WEIGHT
 def standing_water(
     domain: Mesh, facet_tags: MeshTags, boundary: Sequence[WaterBoundary], unit_weight: float = WATER_WEIGHT
 ) -> Callable[[NDArray[np.float64], float], NDArray[np.float64]]:
-    """Pressure of the reservoirs on the ground above each point, for `loading` of `Seepage`, in plane sections.
+    """Pressure of the reservoirs on the ground above each point, for `loading` of `Seepage`, in plane sections. Collective.
 
     Args:
         domain: mesh of the body.
@@ -33,9 +33,6 @@ def standing_water(
 
     Raises:
         InputError: the mesh has not two dimensions, a tag is unknown, or there is no reservoir. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     dim = domain.geometry.dim
     agree(domain.comm, None if dim == 2 else f"domain has {dim} dimensions, expected a plane section")
@@ -58,7 +55,7 @@ def standing_water(
 
 
 def ground_line(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The surface at the facets of a tag as a line, in a plane section.
+    """The surface at the facets of a tag as a line, in a plane section. Collective.
 
     Args:
         domain: mesh of the body.
@@ -70,9 +67,6 @@ def ground_line(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[NDA
 
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
-
-    Note:
-        Collective.
     """
     facets = tagged_facets(domain.comm, facet_tags, tag, "boundary")
     nodes = domain.geometry.x[facet_nodes(domain, facets).ravel()][:, :2]
