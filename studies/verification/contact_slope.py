@@ -178,7 +178,8 @@ def run(quick: bool, folder) -> Result:
 
     if comm.rank == 0:
         friction = np.linspace(0.0, 0.55, 60)
-        save_comparison(folder / "way.png", computed, {"g (sin θ - μ cos θ)": (friction, way(sliding(30, friction), 1.0))},
-                        ("Friction μ [-]", "Displacement after 1 s on a slope of 30° [m]"),
+        exact = {"exact, a = g (sin θ - μ cos θ)": (friction, way(sliding(30, friction), 1.0))}
+        save_comparison(folder / "way.png", computed, exact,
+                        ("Coefficient of friction μ [-]", "Displacement after 1 s on a slope of 30° [m]"),
                         limits=((0.0, None), (0.0, None)))  # fmt: skip
     return Result(checks, {"way.png": "Displacement of a block on a rigid plane over the coefficient of friction"})
