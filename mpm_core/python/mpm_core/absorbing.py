@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -195,7 +196,7 @@ class AbsorbingSides:
             "sides": sides,
             "nodes": [[node, nodes[node]] for node in sorted(nodes)],
             "incoming": self._incoming,
-            "free_fields": [layers.as_entry() for layers in self._free_fields],
+            "free_fields": [asdict(layers) for layers in self._free_fields],
         }
 
     def _take_absorbing(self, state: dict[str, Any] | None) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -44,9 +44,6 @@ class Layers:
     coupled_mass: list[float]
     normal: list[float]
     time: float
-
-    def as_entry(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass(frozen=True)
