@@ -221,13 +221,15 @@ def test_another_geometry_is_named():
     elements = cylinder_fem(2, law=ELASTIC, degree=1)
     for call in (lambda: bridge.initialise(plane, elements), lambda: bridge.compare(elements, plane)):
         with pytest.raises(
-            bridge.InputError, match="the geometry of the finite elements is AXISYMMETRIC, that of the particles is PLANE_STRAIN"
+            bridge.InputError,
+            match="the geometry of the finite elements is AXISYMMETRIC, that of the particles is PLANE_STRAIN",
         ):
             call()
     domain, _, facet_tags = cylinder_mesh(2)
     solution = bridge.solve_elastic(domain, facet_tags, [bridge.fixed(BASE)], 1e6, 0.3, 1e3)
     with pytest.raises(
-        bridge.InputError, match="the geometry of the finite elements is PLANE_STRAIN, that of the particles is AXISYMMETRIC"
+        bridge.InputError,
+        match="the geometry of the finite elements is PLANE_STRAIN, that of the particles is AXISYMMETRIC",
     ):
         bridge.initialise(cylinder_particles(2, law=ELASTIC), solution)
 

@@ -283,5 +283,7 @@ def test_what_a_model_refuses():
         far.attach(empty, 1)
     round_body = mpm.Model(empty.mesh, SOIL, geometry=mpm.Geometry.AXISYMMETRIC)
     round_body.seed(density=DENSITY, per_cell=3)
-    with pytest.raises(mpm.InputError, match="geometry of the finite elements is PLANE_STRAIN, that of the particles is AXISYMMETRIC"):
+    with pytest.raises(
+        mpm.InputError, match="geometry of the finite elements is PLANE_STRAIN, that of the particles is AXISYMMETRIC"
+    ):
         far.attach(round_body, 1)
