@@ -17,8 +17,7 @@ LOGGER.addHandler(logging.NullHandler())
 
 
 class _CompilerLines(logging.Filter):
-    """Takes the several lines for a form: those of FFCx, and those that distutils, by which older versions of it call the
-    compiler, writes to the root logger."""
+    """Replaces the lines that FFCx and distutils, by which older versions of it call the compiler, log for a form by one."""
 
     said = False
 

@@ -65,8 +65,8 @@ def parser() -> ArgumentParser:
     add_number(p, "--density", 1800.0, "kg/m3", "density of the clay", above=0)
     add_number(p, "--speed", 1e-3, "-", "ratio of the footing's speed to that of elastic waves", above=0, at_most=0.1)
     add_number(p, "--cell-size", 0.02, "m", "size of the cells along the path of the footing's edge", above=0)
-    add_number(p, "--coarsening", 2.5, "-", "ratio of the size of the cells under the footing to that along this path; cells far away "
-               "are four times as large", at_least=1)  # fmt: skip
+    add_number(p, "--coarsening", 2.5, "-", "ratio of the size of the cells under the footing to that along this path; cells far "
+               "away are four times as large", at_least=1)  # fmt: skip
     add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
     return p
 

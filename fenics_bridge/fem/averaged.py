@@ -35,8 +35,8 @@ class AveragedKinematics:
     Soil with friction whose flow dilates less than associated flow is an exception. Forces that are averaged in full do not feel
     pressures that alternate from cell to cell, and where flow does not change the volume a mechanism would pass through the cells
     of low pressure; forces that are not averaged at all let tension alternate instead (docs/fem.md). So in cells of such soil the
-    forces are averaged by the fraction (1 + tan(psi) / tan(phi)) / 2, as those of particles in small displacements. Explicit steps
-    average strains and forces of such soil by half, and so do elements that are handed over to them.
+    forces are averaged by the fraction (1 + tan(psi) / tan(phi)) / 2, as those of particles in small displacements. Explicit
+    steps average strains and forces of such soil by half, and so do elements that are handed over to them.
 
     Args:
         increment: displacement function of degree 1 whose strain is taken.
@@ -138,8 +138,8 @@ class AveragedKinematics:
             axisymmetric: whether the body is.
 
         Returns:
-            Global dofs (m, D + 1, D), global nodes (m, D + 1), gradients (m, D + 1, D) [1/m], volumes (m,), those of one radian in
-            an axisymmetric body, and the radii (m,) of the centroids in such a body, else None.
+            Global dofs (m, D + 1, D), global nodes (m, D + 1), gradients (m, D + 1, D) [1/m], volumes (m,), those of one radian
+            in an axisymmetric body, and the radii (m,) of the centroids in such a body, else None.
         """
         dim, block = space.mesh.geometry.dim, self._space.dofmap.index_map_bs
         local = compat.cell_dofs(space)[self._points.cells]

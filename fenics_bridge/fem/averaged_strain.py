@@ -128,7 +128,7 @@ def _strain_rows(gradients: NDArray[np.float64], radii: NDArray[np.float64] | No
 
 
 def matrix(comm: MPI.Comm, local_size: Any, columns: NDArray[np.integer], values: Any) -> Any:
-    """Sparse matrix of this rank's rows, each with up to k entries that are not zero: global columns and values, both (rows, k)."""
+    """Sparse matrix of this rank's rows, each with up to k nonzero entries: global columns and values, both (rows, k)."""
     made = PETSc.Mat().create(comm)
     made.setSizes([(n, None) for n in local_size])
     made.setType("aij")

@@ -25,7 +25,7 @@ def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
 def carry_out(
     site: Site, degree: int, folder: Path, comm: MPI.Comm
 ) -> tuple[bridge.FemSite, list[dict], list, str | None]:
-    """Carry out all stages; returns the site, a row and a picture for each stage, and why it ended early if it did. Collective."""
+    """Carry out all stages; returns the site, a row and a picture for each stage, and the reason of an early end. Collective."""
     staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree)), [], [], None
     with StageFiles(staged, folder / "stages", comm) as files:
         for stage in site.stages:
