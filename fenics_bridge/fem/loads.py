@@ -158,7 +158,7 @@ class LoadVectors:
         self._traction: dict[int, list[NDArray[np.float64]]] = {}
 
     def forces(self, load: Load) -> NDArray[np.float64]:
-        """External forces of a load, ghosts up to date. Collective.
+        """External forces of a load, ghosts up to date.
 
         Args:
             load: the load.
@@ -169,6 +169,9 @@ class LoadVectors:
         Raises:
             InputError: a tag does not exist, a value is not finite, or a traction has not D components. Raised on all ranks
                 alike.
+
+        Note:
+            Collective.
         """
         require_finite(self._space.mesh.comm, load)
         load = self.resolved(load)
@@ -185,13 +188,16 @@ class LoadVectors:
         return forces + self.constant + load.held * self.held
 
     def resolved(self, load: Load) -> Load:
-        """The load with numbers for the names of tags. Collective.
+        """The load with numbers for the names of tags.
 
         Args:
             load: the load.
 
         Raises:
             InputError: a tag does not exist. Raised on all ranks alike.
+
+        Note:
+            Collective.
         """
         comm, weight = self._space.mesh.comm, load.unit_weight
         if isinstance(weight, dict):
@@ -255,7 +261,7 @@ def elastic_load(
     body_force: Callable[[NDArray[np.float64]], ArrayLike] | None = None,
     radius: Any = None,
 ) -> Any:
-    """Work of weight, tractions and a body force on a test displacement, as a UFL form. Collective.
+    """Work of weight, tractions and a body force on a test displacement, as a UFL form.
 
     Args:
         test: test displacement.
@@ -268,6 +274,9 @@ def elastic_load(
 
     Raises:
         InputError: a facet tag does not exist. Raised on all ranks alike.
+
+    Note:
+        Collective.
     """
     down = [0.0] * (domain.geometry.dim - 1) + [-float(unit_weight)]
     work = weighted(ufl.inner(fem.Constant(domain, np.array(down)), test), radius) * ufl.dx
