@@ -5,11 +5,19 @@ Newmark (1965), Effects of earthquakes on dams and embankments, Géotechnique 15
 
 from __future__ import annotations
 
+import cmath
+import math
+
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import differential_evolution
+
+import mpm_core as mpm
 
 SAMPLES = 400
 """Points on a slip line"""
+
+IMPOSSIBLE = 1e3
+"""Coefficient of acceleration of a spiral that leaves the soil"""
 
 
 def sliding_block(
@@ -75,48 +83,78 @@ def yield_acceleration(
         cohesion: [Pa]; friction_angle: above 0 [degrees].
         unit_weight: [N/m3].
         gravity: [m/s2].
-        depth: of the soil below the toe [m], which spirals do not leave; under inertia those in weak soil reach deep.
+        depth: of the soil below the toe [m], which spirals do not leave; inf where the worst spiral is known to be a shallow one.
+
+    Raises:
+        InputError: depth is inf, and the slope would yield at more than g tan(friction_angle). At that acceleration soil of unlimited
+            depth slides as a whole, so that there is no worst spiral: those that reach deeper are always worse.
     """
     slope, friction = np.radians(angle), np.radians(friction_angle)
 
-    def coefficient(ends: np.ndarray) -> float:
-        start, end = ends
-        if not 0.0 < start < end - 0.05 < np.pi - 0.1:
-            return 1e3
-        return _coefficient(start, end, height, slope, cohesion, friction, unit_weight, depth)
+    def begin(start: float) -> np.ndarray:
+        return np.array([height / np.tan(slope) + height * np.exp(start), height])
 
-    trials = [(start, end) for start in np.radians(np.arange(5, 90, 5)) for end in np.radians(np.arange(40, 170, 5))]
-    first = min(trials, key=lambda ends: coefficient(np.array(ends)))
-    return gravity * float(
-        minimize(coefficient, first, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9}).fun
+    def coefficient(start: float, turn: float) -> float:
+        return _coefficient(begin(start), turn, slope, cohesion, friction, unit_weight)
+
+    # Deep and shallow spirals have a minimum each, deep ones where they touch the bottom, at the end of the range of turns.
+    starts, parts = np.linspace(*np.log([1e-3, 1e3]), 70), np.linspace(0.0, 1.0, 41)[1:]
+    largest = [_largest_turn(begin(start), friction, depth) for start in starts]
+    trials = [(start, part, most) for start, most in zip(starts, largest) for part in parts]
+    best = np.array(min(trials, key=lambda trial: coefficient(trial[0], trial[1] * trial[2]))[:2])
+    around = np.array([starts[1] - starts[0], parts[1] - parts[0]])
+    box = np.transpose([best - around, np.minimum(best + around, (np.inf, 1.0))])
+    worst = differential_evolution(
+        lambda where: coefficient(where[0], where[1] * _largest_turn(begin(where[0]), friction, depth)),
+        box,
+        tol=1e-8,
+        seed=1,
+        polish=False,
     )
+    if not np.isfinite(depth) and worst.fun > np.tan(friction):
+        raise mpm.InputError(
+            f"depth is inf, expected the depth of the soil below the toe: soil of unlimited depth slides as a whole at "
+            f"g tan(friction_angle) = {gravity * np.tan(friction):.3g} m/s2, before a slope of this strength yields"
+        )
+    return gravity * float(worst.fun)
+
+
+def _spiral(begin: np.ndarray, turn: float, friction: float) -> tuple[complex, float]:
+    """First radius, as a complex number whose argument is its angle below the horizontal, and last angle of the spiral that turns by
+    an angle from a point to the toe, which is the origin."""
+    ray = -complex(begin[0], -begin[1]) / (cmath.exp(turn * (math.tan(friction) + 1j)) - 1)
+    return ray, cmath.phase(ray) + turn
+
+
+def _largest_turn(begin: np.ndarray, friction: float, depth: float) -> float:
+    """Turn of the spiral to the toe that begins and ends at the horizontal of its centre at most, or reaches a depth below the toe."""
+    lowest = 0.5 * math.pi + friction
+    least, most = 0.0, math.pi
+    for _ in range(40):
+        turn = 0.5 * (least + most)
+        ray, end = _spiral(begin, turn, friction)
+        start = end - turn
+        reaches = abs(ray) * (
+            math.exp((lowest - start) * math.tan(friction)) * math.sin(lowest)
+            - math.exp(turn * math.tan(friction)) * math.sin(end)
+        )
+        fits = 0.0 < start and end < math.pi and (end < lowest or reaches < depth)
+        least, most = (turn, most) if fits else (least, turn)
+    return least
 
 
 def _coefficient(
-    start: float,
-    end: float,
-    height: float,
-    slope: float,
-    cohesion: float,
-    friction: float,
-    unit_weight: float,
-    depth: float,
+    begin: np.ndarray, turn: float, slope: float, cohesion: float, friction: float, unit_weight: float
 ) -> float:
-    """Horizontal over vertical acceleration by the spiral from an angle to another, below the horizontal of its centre."""
-    turn = np.linspace(start, end, SAMPLES)
-    spiral = np.exp((turn - start) * np.tan(friction))  # radii over the first
-    x, y = spiral * np.cos(turn), -spiral * np.sin(turn)  # from the centre; the slope descends to the left
-    size = height / (y[0] - y[-1]) if y[0] > y[-1] else np.nan  # the first radius
-    if not size > 0:
-        return 1e3
-    x, y = size * x, size * y
-    crest = np.array([x[-1] + height / np.tan(slope), y[0]])
-    if crest[0] > x[0] or np.any(y[1:-1] > np.minimum(y[0], y[-1] + np.tan(slope) * (x[1:-1] - x[-1])) + 1e-9 * height):
-        return 1e3  # the spiral begins before the crest, or leaves the soil
-    if y.min() < y[-1] - depth:
-        return 1e3
-    area, centroid = _polygon(np.append(x, crest[0]), np.append(y, crest[1]))
-    dissipation = cohesion * size**2 * (spiral[-1] ** 2 - 1) / (2 * np.tan(friction))
+    """Horizontal over vertical acceleration by the spiral that turns by an angle from a point on the crest to the toe, the origin."""
+    ray, end = _spiral(begin, turn, friction)
+    spiral = ray * np.exp(np.linspace(0.0, turn, SAMPLES) * (np.tan(friction) + 1j))
+    x, y = spiral.real, -spiral.imag  # from the centre; the slope descends to the left
+    height = begin[1]
+    if np.any(y[1:-1] > np.minimum(y[0], y[-1] + np.tan(slope) * (x[1:-1] - x[-1])) + 1e-9 * height):
+        return IMPOSSIBLE
+    area, centroid = _polygon(np.append(x, x[-1] + height / np.tan(slope)), np.append(y, y[0]))
+    dissipation = cohesion * (abs(spiral[-1]) ** 2 - abs(ray) ** 2) / (2 * np.tan(friction))
     # the mass turns to the left and downwards: its weight acts on the arm x, horizontal inertia to the left on the arm -y
     return float((dissipation / (unit_weight * area) - centroid[0]) / -centroid[1])
 

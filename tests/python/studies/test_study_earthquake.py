@@ -36,17 +36,26 @@ def test_a_slope_with_its_strength_over_its_factor_of_safety_yields_at_once(angl
     assert factor > 1.1
     reduced = np.degrees(np.arctan(np.tan(np.radians(friction)) / factor))
     assert yield_acceleration(10.0, angle, cohesion / factor, reduced, 19e3) == pytest.approx(0.0, abs=2e-3)
-    assert yield_acceleration(10.0, angle, cohesion, friction, 19e3) > 0.5
+    assert yield_acceleration(10.0, angle, cohesion, friction, 19e3, depth=10.0) > 0.5
     assert yield_acceleration(10.0, angle, 0.8 * cohesion / factor, reduced, 19e3) < 0
 
 
-def test_a_stiff_layer_below_the_toe_keeps_weak_soil_from_yielding_deep():
-    # A layer of thickness D on a rigid base slides as a whole at tan(phi) + c / (gamma D) of gravity, so that without a stiff layer
-    # the worst spirals are hundreds of metres deep. A layer in the way stops these, the more the higher it is.
-    slope = 10.0, 35.0, 30e3, 3.0, 19e3
-    yields = [yield_acceleration(*slope, 9.81, depth) for depth in (1.0, 10.0, np.inf)]
-    assert yields[0] > 1.02 * yields[1] > 1.1 * yields[2] > 1.1 * 9.81 * np.tan(np.radians(3.0))
-    # Where the spiral stays above the layer, the layer changes nothing.
+@pytest.mark.parametrize(
+    "slope", [(10.0, 35.0, 30e3, 3.0, 19e3), (1.0, 45.0, 5e3, 25.0, 20e3), (10.0, 20.0, 30e3, 10.0, 20e3)]
+)
+def test_deeper_soil_yields_earlier_and_never_before_it_slides_as_a_whole(slope):
+    # Spirals in deeper soil include those in shallower soil. A layer of any depth holds tan(phi) of gravity.
+    height, _, _, friction, _ = slope
+    whole = 9.81 * np.tan(np.radians(friction))
+    depths = height * np.array([0.0, 4.0, 8.0, 50.0])
+    yields = np.array([yield_acceleration(*slope, 9.81, depth) for depth in depths])
+    assert np.all(np.diff(yields) < 1e-6 * yields[:-1])
+    assert yields[0] > 1.4 * yields[-1] > 1.4 * whole
+    with pytest.raises(mpm.InputError, match=f"depth is inf, expected the depth of the soil .* = {whole:.3g} m/s2"):
+        yield_acceleration(*slope)
+
+
+def test_a_stiff_layer_below_the_worst_spiral_changes_nothing():
     steep = 10.0, 45.0, 20e3, 25.0, 19e3
     assert yield_acceleration(*steep, 9.81, 5.0) == pytest.approx(yield_acceleration(*steep), abs=1e-6)
 
