@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+
+from mpm_core.setup_warnings import dilates, keeps_volume, locks_at_failure
 
 import mpm_core as mpm
 
@@ -57,6 +59,13 @@ def stable_integration(per_cell: int, cohesive: bool) -> str:
     """Name of the integration whose runs keep their energy: mixed, but for few particles in a cell and for dry grains, which
     loosen (docs/integration.md)."""
     return "mixed" if cohesive and per_cell >= LEAST_FOR_MIXED else "particles"
+
+
+def averages_strains(scheme: str, laws: Sequence[object]) -> bool:
+    """Whether a run averages strains unless it is told: where linear cells lock in the soil. Implicit steps do not average forces,
+    and lose their equilibrium or generate energy where averaged soil dilates (docs/guide/theory.md): there they do not average.
+    """
+    return keeps_volume(laws) or (locks_at_failure(laws) and (scheme == "explicit" or not dilates(laws)))
 
 
 def add_discretisation(parser: argparse.ArgumentParser, integration: str | None = "particles") -> None:

@@ -93,6 +93,11 @@ def locks_at_failure(laws: Iterable[Any]) -> bool:
     return not keeps_volume(laws) and any(_core.associated_fraction(law) < 1 for law in laws)
 
 
+def dilates(laws: Iterable[Any]) -> bool:
+    """Whether soil of a law dilates as it fails."""
+    return any(_core.associated_fraction(law) > 0 for law in laws)
+
+
 class FailureWatch:
     """Warns once where frictional soil fails that locks only then: its dilation angle is below its friction angle.
 

@@ -36,7 +36,9 @@ def history(folder):
 def test_the_papers_slope_slides_as_far_as_in_an_independent_code(tmp_path):
     # Independent explicit code of the standard method, same data, any time step from 1e-4 to 4e-3 s: 0.11 m at 0.9 s, 0.28 m
     # at 8.7 s, 0.36 m at 17 s, 0.41 to 0.42 m at 34.8 s, rising fast at first and creeping later.
-    result = slope(tmp_path, "--initial", "zero", "--integration", "particles", "--dt", "4e-3", "--frames", "50")
+    result = slope(
+        tmp_path, "--initial", "zero", "--integration", "particles", "--no-nmd", "--dt", "4e-3", "--frames", "50"
+    )
     assert result.returncode == 0, result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["soil_cells"] == 640 and summary["particles"] == 6400 and summary["steps"] == 8700
@@ -65,6 +67,31 @@ def test_a_short_run_writes_all_it_promises(tmp_path):
     assert {"program", "dolfinx", "petsc", "compiler", "git_revision"} <= set(summary["versions"])
     assert summary["parameters"]["unit_weight"] == 80e3 and summary["particle_steps_per_second"] > 0
     assert len(history(tmp_path)["time_s"]) == 4
+
+
+def test_a_slope_that_fails_warns_of_nothing_at_its_defaults(tmp_path):
+    # In half a second without damping it fails. The message is there where strains are not averaged.
+    for name, options in (("default", []), ("plain", ["--no-nmd"])):
+        result = slope(tmp_path / name, "--damping", "0", "--time", "0.5", "--frames", "3", "--no-pictures", *options)
+        assert result.returncode == 0, result.stderr
+        assert ("Warning" in result.stderr) == (name == "plain")
+
+
+@pytest.mark.parametrize(
+    ("options", "averages"),
+    [
+        ([], "true"),
+        (["--dilation-angle", "10"], "true"),
+        (["--dilation-angle", "25"], "false"),
+        (["--scheme", "implicit"], "true"),
+        (["--scheme", "implicit", "--dilation-angle", "10"], "false"),
+        (["--paper"], "false"),
+    ],
+)
+def test_strains_are_averaged_where_soil_locks_as_it_fails(tmp_path, options, averages):
+    result = slope(tmp_path, "--cell-size", "0.25", "--mesh", "fitted", "--time", "1e-3", "--frames", "1", "--no-pictures", *options)
+    assert result.returncode == 0, result.stderr
+    assert f"\nnmd = {averages}  #" in (tmp_path / "parameters.toml").read_text()
 
 
 def test_frames_by_steps_are_for_the_files_alone(tmp_path):
