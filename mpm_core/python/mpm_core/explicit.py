@@ -14,6 +14,7 @@ from ._core import InputError
 from .checks import positive, within
 from .energy import ADVICE, EnergyWatch
 from .partition import keep_balance
+from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
 from .report import Report
 from .setup_warnings import FailureWatch
@@ -112,6 +113,7 @@ def run_explicit(
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or ADVICE)
     failure = FailureWatch(model, options.nmd)
+    penetration = PenetrationWatch(model)
     if model._space_watch is None:
         model._space_watch = SpaceWatch(model)
 
@@ -119,6 +121,7 @@ def run_explicit(
         now = model.report()
         energy.look(now)
         failure.look(now)
+        penetration.look()
         return now
 
     for until in times:

@@ -62,7 +62,7 @@ def swollen(model: Model) -> str:
         return ""
     return (
         f"a particle has {largest:.3g} times the volume of its cell: soil in a corner of a cell has expanded without resistance, and "
-        "resists with that volume when it is pressed together. Take a stiffer contact (penalty=0.5 with courant=0.3), or let rigid "
+        "resists with that volume when it is pressed together. Take a stiffer contact (penalty=1 of add_contact), or let rigid "
         "surfaces follow the sides of cells (docs/howto/limits.md)"
     )
 

@@ -1,5 +1,7 @@
 """Contact with rigid surfaces: when it begins, the friction of a block, momentum, energy, restart, and wrong input."""
 
+import warnings
+
 import numpy as np
 import pytest
 from core_cases import box
@@ -303,3 +305,29 @@ def test_equilibrate_refuses_contacts():
     model.add_contact(plane)
     with pytest.raises(mpm.InputError, match=r"rigid surfaces \(Plane\)"):
         model.equilibrate()
+
+
+@pytest.mark.parametrize("penalty, deep", [(0.2, True), (1.0, False)])
+def test_a_run_says_how_deep_soil_sinks_into_a_soft_contact_and_what_helps(penalty, deep):
+    # At rest the springs of the lowest row carry 16 rows of particles, so that it is 16 g dt_c^2 / beta deep, dt_c being the first
+    # step: 0.28 and 0.06 of a cell.
+    mesh = box((8, 12), (1.0, 1.5))
+    model = mpm.Model(mesh, mpm.LinearElastic(young=2e5, poisson=0.3))
+    side = 1.0 / 16
+    grid = np.indices((16, 16)).reshape(2, -1).T + 0.5
+    model.seed_points(side * grid + (0.0, 0.25), np.full(len(grid), side**2), density=2000.0)
+    for edge in (1, 2):
+        model.roller(edge, normal=(1, 0))
+    model.set_gravity((0.0, -G), ramp=0.5)
+    ground = model.add_contact(mpm.Plane((0, 0.25), normal=(0, 1)), penalty=penalty)
+    first = 0.1 / np.ceil(0.1 / (0.9 * model.critical_time_step()))  # a whole number of steps between reports
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        model.explicit(4.0, every=0.1, damping=0.7, courant=0.9, energy_limit=None).last()
+    depth = ground._state()["penetration"]
+    assert depth == pytest.approx(16 * G * first**2 / penalty, rel=0.02)
+    texts = [str(each.message) for each in told if "cells deep" in str(each.message)]
+    assert len(texts) == deep and (depth > 0.25 / 8) == deep
+    assert all(
+        "rigid surface 0 (Plane)" in text and "penalty=1 of add_contact in place of 0.2" in text for text in texts
+    )
