@@ -2,7 +2,8 @@
 
 The slope is brought to elasto-plastic equilibrium by FEM under a fraction of the unit weight at which it collapses, and its
 stresses are transferred to particles. Then the unit weight is raised at once to its full value and the slope slides, as in
-the study slope. With a fraction of zero the slide starts from zero stress.
+the study slope, with stresses integrated over whole cells and strains averaged where linear cells lock. With a fraction of zero
+the slide starts from zero stress.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from common.page import Page
 from common.plots import save_history
 from common.ranks import run_study
 from common.results import open_results
+from common.schemes import INTEGRATIONS, averages_strains, stable_integration
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope_fem import step_line, weight
 from common.summary import write_summary
@@ -65,10 +67,11 @@ def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
     """Give the particles the equilibrium under a unit weight; None for zero, which needs none."""
     if unit_weight == 0:
         return None
-    case.fem = fem = soil_fem(case)
+    nmd = averages_strains("explicit", case.model.laws)
+    case.fem = fem = soil_fem(case, nmd)
     fem.solve(weight(unit_weight))
     case.model.set_gravity((0.0, -GRAVITY * unit_weight / case.args.unit_weight))
-    report = bridge.initialise(case.model, fem, move=case.args.move)
+    report = bridge.initialise(case.model, fem, move=case.args.move, nmd=nmd)
     case.model.set_gravity((0.0, -GRAVITY))
     return report
 
@@ -77,7 +80,9 @@ def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
     """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]; and frames."""
     a = case.args
     rows, frames = [(0.0, watch.runout(), watch.crest_displacement())], [particle_frame(case.model, 0.0)]
-    for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping):
+    integration = INTEGRATIONS[stable_integration(a.particles_per_cell, a.cohesion > 0)]
+    nmd = averages_strains("explicit", case.model.laws)
+    for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping, nmd=nmd, integration=integration):
         rows.append((report.time, watch.runout(), watch.crest_displacement()))
         frames.append(particle_frame(case.model, report.time))
     return np.array(rows), frames
@@ -139,7 +144,8 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
     folder = open_results(a, comm)
-    fem = soil_fem(build_slope(a, comm))
+    case = build_slope(a, comm)
+    fem = soil_fem(case, averages_strains("explicit", case.model.laws))
     collapse = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse")).value
     runs = [run(a, fraction, fraction * collapse) for fraction in FRACTIONS]
     runouts = [float(run["history"][-1, 1]) for run in runs]
