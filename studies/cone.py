@@ -68,7 +68,7 @@ def parser() -> ArgumentParser:
         p, "--coarsening", 2.0, "-", "ratio of the size of the cells beside this path to that along it", at_least=1
     )
     add_number(p, "--growth", 0.15, "-", "increase of the cell size per length of distance from the path", above=0)
-    add_body_run_options(p, damping=0.0, pic=0.01, nmd=True)
+    add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, integration="particles")
     return p
 
 
