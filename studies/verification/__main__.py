@@ -51,7 +51,7 @@ GROUPS = {
     "Large deformation": ("cantilever",),
     "Locking": ("volumetric_locking",),
     "Integration": ("stress_integration",),
-    "Slides": ("slide_convergence", "extruded_slope", "hand_over"),
+    "Slides": ("slide_convergence", "damped_slide", "extruded_slope", "hand_over"),
     "The paper": ("paper_slope",),
 }
 CASES = tuple(name for names in GROUPS.values() for name in names)
