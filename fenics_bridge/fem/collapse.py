@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.load_steps import LoadStep, advance
 from fenics_bridge.fem.loads import Load
-from fenics_bridge.fem.locking import warn_of_locking_at_failure
+from fenics_bridge.fem.locking import warn_of_few_cells, warn_of_locking_at_failure
 from fenics_bridge.fem.mixed import MixedQuasiStatic
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.strength import reduced_strength
@@ -84,7 +84,9 @@ def collapse_load(
         InputError: not even the first steps find equilibrium. Raised on all ranks alike.
     """
     warn_of_locking_at_failure(model)
-    return _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
+    found = _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
+    warn_of_few_cells(model, found.mechanism)
+    return found
 
 
 def factor_of_safety(
@@ -126,7 +128,9 @@ def factor_of_safety(
     def weaken(factor: float) -> Any:
         return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
-    return _follow(model, weaken, start, first_step, tolerance, progress)
+    found = _follow(model, weaken, start, first_step, tolerance, progress)
+    warn_of_few_cells(model, found.mechanism)
+    return found
 
 
 def _not_carried(start: float, steps: list[LoadStep]) -> str:

@@ -1,5 +1,6 @@
 """Linear elements without averaged strains say that they lock, and only where they do."""
 
+import re
 import warnings
 
 import pytest
@@ -28,7 +29,9 @@ def said(law, to_collapse=False, **options):
         if to_collapse:
             caught.clear()
             bridge.collapse_load(fem, lambda weight: bridge.Load(unit_weight=weight), 20e3, tolerance=0.3)
-    return [str(each.message) for each in caught if "linear" in str(each.message)]
+    return [
+        str(each.message) for each in caught if "linear" in str(each.message) and "cells high" not in str(each.message)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -50,3 +53,22 @@ def test_a_soil_that_keeps_its_volume_as_it_fails_is_named_before_its_collapse()
     assert "dilation angle" in text
     for dilation_angle, options in ((20.0, {"degree": 1}), (0.0, {"degree": 1, "nmd": True})):
         assert said(sand(dilation_angle), to_collapse=True, **options) == []
+
+
+@pytest.mark.parametrize("cell, options, few", [(1.0, {"degree": 1, "nmd": True}, True), (0.5, {"degree": 1, "nmd": True}, False),
+                                                (1.0, {"degree": 2}, False)])  # fmt: skip
+def test_a_mechanism_of_few_cells_with_averages_is_named(cell, options, few):
+    # The bank of docs/fem.md, without its foundation, three and six cells high.
+    domain, cells, facets = bridge.slope_mesh(
+        MPI.COMM_SELF, height=3.0, angle=26.565, crest=6.0, cell_size=cell, kind="fitted", runout=1.0
+    )
+    body, _, facets = bridge.soil_mesh(domain, cells, facets, tag=bridge.SOIL)
+    soil = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=2e3, friction_angle=34.0, dilation_angle=5.0)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fem = bridge.QuasiStatic(body, soil, facets, SUPPORTS, **options)
+        bridge.factor_of_safety(fem, bridge.Load(unit_weight=20e3), start=1.0, first_step=0.3, tolerance=0.02)
+    texts = [str(each.message) for each in caught if "cells high" in str(each.message)]
+    assert len(texts) == few
+    if few:
+        assert 1.0 < float(re.search(r"is ([\d.]+) cells high", texts[0]).group(1)) < 3.0
