@@ -16,7 +16,7 @@ from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
-from .setup_warnings import FailureWatch
+from .setup_warnings import FailureWatch, dilates
 from .solution import Solution
 from .space import swollen
 from .step_control import StepControl
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 LEAST_EULER_STEPS = 4
 """Steps of backward Euler after which a warning may give the energy that a run dissipates"""
+
+AVERAGED = "implicit steps with nmd=True generate energy where soil dilates, since they do not average its forces: take nmd=False"
+"""Advice for implicit runs that average strains of soil that dilates"""
 
 FADING = 0.1
 """Factor on the ghost penalty between steps that only redistribute stresses"""
@@ -197,7 +200,9 @@ def run_implicit(
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
     advice, least_steps = _energy_check(options)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice, least_steps)
+    averages = options.nmd and not options.average_stress and dilates(model.laws)
+    advise = (lambda: f"{AVERAGED}; {advice}") if averages else (lambda: swollen(model) or advice)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, advise, least_steps)
     failure = FailureWatch(model, options.nmd)
 
     def report() -> ImplicitReport:

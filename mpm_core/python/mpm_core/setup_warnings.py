@@ -94,8 +94,9 @@ def locks_at_failure(laws: Iterable[Any]) -> bool:
 
 
 def dilates(laws: Iterable[Any]) -> bool:
-    """Whether soil of a law dilates as it fails."""
-    return any(_core.associated_fraction(law) > 0 for law in laws)
+    """Whether soil of a law with friction dilates as it fails."""
+    yields = [law for law in laws if not isinstance(law, _core.LinearElastic) and not keeps_volume([law])]
+    return any(_core.associated_fraction(law) > 0 for law in yields)
 
 
 class FailureWatch:

@@ -53,3 +53,16 @@ def test_explicit_steps_overshoot_a_sudden_load_as_in_closed_form_and_long_impli
 def test_both_end_in_the_same_place_when_the_load_rises_slowly():
     ends = [strain_at_rest(scheme, 20 * PERIOD) for scheme in ("explicit", "implicit")]
     assert ends == pytest.approx([LOAD, LOAD], rel=0.01)
+
+
+@pytest.mark.parametrize("dilation_angle, nmd, told", [(10.0, True, True), (0.0, True, False), (10.0, False, False)])
+def test_advice_on_energy_names_averaged_strains_where_soil_dilates(dilation_angle, nmd, told):
+    # Backward Euler dissipates the waves of a sudden load, so that any of these runs passes the limit of 2 %.
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0, dilation_angle=dilation_angle)
+    model = mpm.Model(box((4, 4)), soil)
+    model.seed(density=2000.0, per_cell=6)
+    model.fix(3)
+    model.set_gravity((0.0, -9.81))
+    with pytest.raises(mpm.RunError, match="above energy_limit, 2 %") as error:
+        model.implicit(1.0, dt=0.02, nmd=nmd, energy_limit=0.02).last()
+    assert ("nmd=True generate energy where soil dilates" in str(error.value)) == told
