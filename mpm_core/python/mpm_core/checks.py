@@ -27,6 +27,21 @@ def within(name: str, value: float, low: float, high: float, *, open_above: bool
     return float(value)
 
 
+def member(name: str, value: Any, kind: Any) -> Any:
+    """A member of an enumeration, such as Integration.MIXED."""
+    if not isinstance(value, kind):
+        expected = ", ".join(f"{kind.__name__}.{each}" for each in kind.__members__)
+        raise InputError(f"{name} is {value!r}, expected one of {expected}")
+    return value
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False; text, of which any that is not empty would count as True, is refused."""
+    if not isinstance(value, (bool, np.bool_)) and not (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        raise InputError(f"{name} is {value!r}, expected True or False")
+    return bool(value)
+
+
 def renamed(old: str, new: str) -> Any:
     """A property under the old name of an attribute, which warns and returns the new one; kept for one version."""
 

@@ -10,8 +10,8 @@ import numpy as np
 from mpi4py import MPI
 
 from . import _core
-from ._core import InputError
-from .checks import positive, within
+from ._core import InputError, Integration, StressUpdate, Transfer
+from .checks import flag, member, positive, within
 from .energy import ADVICE, EnergyWatch
 from .partition import keep_balance
 from .penetration import PenetrationWatch
@@ -36,11 +36,11 @@ def explicit_options(
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
-    options.nmd = bool(nmd)
-    options.transfer = transfer
-    options.integration = integration
-    options.stress_update = stress_update
-    options.reproducible = bool(reproducible)
+    options.nmd = flag("nmd", nmd)
+    options.transfer = member("transfer", transfer, Transfer)
+    options.integration = member("integration", integration, Integration)
+    options.stress_update = member("stress_update", stress_update, StressUpdate)
+    options.reproducible = flag("reproducible", reproducible)
     options.rayleigh = rayleigh._as_core()
     return options
 
@@ -53,7 +53,7 @@ def run_options(dt: float | None, courant: float, pic: float, allow_unstable: bo
         raise InputError(f"courant is {courant}, expected 0 < courant <= 1")
     run.courant = courant
     run.pic = within("pic", pic, 0, 1)
-    run.allow_unstable = bool(allow_unstable)
+    run.allow_unstable = flag("allow_unstable", allow_unstable)
     return run
 
 

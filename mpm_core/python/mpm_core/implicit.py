@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from ._core import InputError, Integration, RunError
-from .checks import positive, within
+from .checks import flag, member, positive, within
 from .energy import ADVICE, LEAST_STEPS, EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
@@ -49,11 +49,11 @@ def implicit_options(
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic = within("pic", pic, 0, 1)
-    options.nmd = bool(nmd)
-    if integration == Integration.DUAL_DOMAIN:
+    options.nmd = flag("nmd", nmd)
+    if member("integration", integration, Integration) == Integration.DUAL_DOMAIN:
         raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")
     options.integration = integration
-    options.quasi_static = bool(quasi_static)
+    options.quasi_static = flag("quasi_static", quasi_static)
     if second_order and quasi_static:
         raise InputError("second_order is True, expected False where quasi_static is True: there is no inertia")
     if second_order and damping:
@@ -61,11 +61,11 @@ def implicit_options(
             f"second_order is True with damping {damping:g}, expected damping 0: such steps do not bring a body to rest; those of "
             "backward Euler (second_order False) do"
         )
-    options.second_order = bool(second_order)
+    options.second_order = flag("second_order", second_order)
     options.ghost = (ghost or GhostPenalty()).options()
     if small_displacements and not quasi_static:
         raise InputError("small_displacements is True, expected False unless quasi_static is True")
-    options.hold_positions = bool(small_displacements)
+    options.hold_positions = flag("small_displacements", small_displacements)
     options.average_stress = bool(nmd and (small_displacements or averaged_forces))
     options.as_elements = bool(nmd and small_displacements)
     return options

@@ -10,7 +10,7 @@ from . import checkpoint
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .absorbing import refuse_absorbing
 from .body import Body
-from .checks import positive
+from .checks import flag, member, positive
 from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies
 from .contact_methods import ContactMethods
@@ -137,7 +137,7 @@ class Model(ContactMethods, Body):
             integration: how stresses become forces in the steps that are meant; see `Integration`.
         """
         g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
-        return self._core.out_of_balance(g, integration, bool(nmd))
+        return self._core.out_of_balance(g, member("integration", integration, Integration), flag("nmd", nmd))
 
     def report(self) -> Report:
         """State of the run at the present time."""
@@ -216,7 +216,6 @@ class Model(ContactMethods, Body):
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
             )
-        begin_two_phases(self, integration, stress_update, damped)
         options, run, times, threshold, steps, limit = collectively(
             self.comm,
             lambda: (
@@ -228,6 +227,7 @@ class Model(ContactMethods, Body):
                 checked_energy_limit(energy_limit),
             ),
         )
+        begin_two_phases(self, integration, stress_update, damped)
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)

@@ -176,11 +176,30 @@ def test_bad_supports_and_loads(model, call, words):
         ({"until": -1.0}, "until is -1.0"),
         ({"until": np.inf}, "until is inf"),
         ({"until": np.nan}, "until is nan"),
+        ({"integration": "MIXED"}, "integration is 'MIXED', expected one of Integration.PARTICLES, Integration.MIXED"),
+        ({"transfer": "AFFINE"}, "transfer is 'AFFINE', expected one of Transfer.FLIP, Transfer.AFFINE"),
+        ({"stress_update": 0}, "stress_update is 0, expected one of StressUpdate"),
+        ({"nmd": "no"}, "nmd is 'no', expected True or False"),
+        ({"reproducible": 2}, "reproducible is 2, expected True or False"),
     ],
 )
 def test_bad_run_options(model, change, words):
     with pytest.raises(mpm.InputError, match=words):
         run(model, **({"until": 1.0} | change))
+    assert (model.time, model.report().steps) == (0.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"integration": "MIXED"}, "integration is 'MIXED', expected one of Integration"),
+        ({"quasi_static": "yes"}, "quasi_static is 'yes', expected True or False"),
+        ({"nmd": None}, "nmd is None, expected True or False"),
+    ],
+)
+def test_bad_options_of_implicit_runs(model, change, words):
+    with pytest.raises(mpm.InputError, match=words):
+        model.implicit(1.0, dt=0.1, **change)
     assert (model.time, model.report().steps) == (0.0, 0)
 
 
