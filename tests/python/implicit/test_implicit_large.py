@@ -46,6 +46,22 @@ def test_rigid_rotation_turns_stresses_and_keeps_their_size():
     assert np.abs(model.particles.stress - expected).max() < 1e-9
 
 
+def test_a_body_that_spins_grows_by_half_the_square_of_the_angle_of_a_step():
+    """1 + a W lengthens all arms by sqrt(1 + a^2), which is no strain: the known limit of docs/howto/limits.md."""
+    model = mpm.Model(box([6, 6], (6.0, 6.0), body=((2.0, 2.0), (4.0, 4.0))), mpm.LinearElastic(young=1e9, poisson=0.3))
+    model.seed(density=1.0, per_cell=6, cell_tag=1)
+    arm = model.particles.position - 3.0
+    model.particles.set("velocity", 0.2 * np.c_[-arm[:, 1], arm[:, 0]])
+    list(model.implicit(1.0, dt=1.0))
+    order = np.argsort(model.particles.id)
+    moved = (model.particles.position - model.particles.displacement - 3.0)[order]
+    gradient = np.linalg.lstsq(moved, model.particles.position[order] - 3.0, rcond=None)[0].T
+    angle = 0.5 * (gradient[1, 0] - gradient[0, 1])  # less than 0.2, as masses are lumped
+    assert 0.1 < angle < 0.2
+    np.testing.assert_allclose(gradient, [[1.0, -angle], [angle, 1.0]], atol=1e-6)
+    assert np.linalg.norm(gradient[:, 0]) == pytest.approx(np.sqrt(1 + angle**2), rel=1e-6)
+
+
 # Tip displacement of the inextensible elastica by its length, across and along, at P L^2 / (E I).
 ELASTICA = {1: (0.30172, 0.05643), 2: (0.49346, 0.16064)}
 
