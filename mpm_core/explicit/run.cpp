@@ -61,6 +61,14 @@ std::string failure_text(const Model<G>& model, const Failure<D>& failure)
 
 namespace
 {
+/// What else to say where a run has failed.
+std::string advice_on(const ExplicitOptions& options)
+{
+  if (options.stress_update != StressUpdate::last)
+    return "";
+  return "; with stress_update LAST particles near nodes of little mass are thrown out, expected MODIFIED_LAST";
+}
+
 /// @throws InputError integration that the geometry, several velocity fields or resting cells do not have
 template <class G>
 void require_integration(const Model<G>& model, const ExplicitOptions& options)
@@ -152,7 +160,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   }
   update_resting_rows(model);
   if (model.failure)
-    throw RunError(failure_text(model, *model.failure));
+    throw RunError(failure_text(model, *model.failure) + advice_on(options));
   make_resting_cells(model.mesh, model.particles, model.fields.front()); // as a run that goes on from a file begins
   if (run.until - model.time <= closeness)
     model.time = run.until;
