@@ -50,6 +50,8 @@ class Collapse:
     """Every load step that was tried"""
 
     def __repr__(self) -> str:
+        if math.isinf(self.failed_at):
+            return f"<Collapse: no failure, in equilibrium at every value up to {self.value:.6g}; {len(self.steps)} load steps>"
         above = "failure shown" if self.failed else "no equilibrium found, failure not shown,"
         return (
             f"<Collapse: {self.value:.6g} at the last equilibrium, {above} at {self.failed_at:.6g}; "

@@ -28,6 +28,13 @@ class LogSpiral:
     curve: _Array
     """Slip surface from the crest to the toe, to the slope above it or to the ground before it [m], shape (k, 2)"""
 
+    def __repr__(self) -> str:
+        (x0, y0), (x1, y1) = self.curve[0], self.curve[-1]
+        return (
+            f"<LogSpiral: collapse at {self.unit_weight:.6g} N/m3, from ({x0:.4g}, {y0:.4g}) to ({x1:.4g}, {y1:.4g}) m about "
+            f"({self.pole[0]:.4g}, {self.pole[1]:.4g}) m>"
+        )
+
 
 def log_spiral(
     height: float,

@@ -51,6 +51,10 @@ def test_particle_that_started_outside_is_named():
 def test_log_spiral_gives_the_stability_numbers_of_the_literature(angle, friction_angle, number):
     """gamma H / c after Chen (1975), table 9.1."""
     spiral = bridge.log_spiral(2.0, angle, 1e3, friction_angle, crest=1.0)
+    assert (
+        repr(spiral).startswith(f"<LogSpiral: collapse at {spiral.unit_weight:.6g} N/m3, from (")
+        and len(repr(spiral)) < 150
+    )
     assert spiral.unit_weight * 2.0 / 1e3 == pytest.approx(number, rel=2e-3)
     run = 2.0 / np.tan(np.radians(angle))
     assert np.allclose(spiral.curve[-1], (1.0 + run, 0.0)) and spiral.curve[0, 1] == pytest.approx(2.0)
