@@ -1,7 +1,8 @@
-"""Messages about a step without equilibrium: its load, place and soil, and possible remedies."""
+"""Messages about a step without equilibrium: its load, place and soil, and possible remedies; and about one that cannot be meant."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,30 @@ def explained(fem: Any, reason: str, load: Any) -> str:
         f"{reason}; under {_in_words(fem, load)}; most moved {name}near ({place}) m, which follows the law {law.name}. "
         f"{advice(reason, free_motions(fem), law, tension)}"
     )
+
+
+def warn_of_motion(fem: Any) -> None:
+    """Warn of an equilibrium of a body that nothing holds, or whose displacements are larger than it is. Collective."""
+    if not fem.converged:
+        return
+    domain, dim, free = fem.domain, fem.domain.geometry.dim, free_motions(fem)
+    x, u = domain.geometry.x[:, :dim], np.linalg.norm(fem.displacement.x.array.reshape(-1, dim), axis=1)
+    high = domain.comm.allreduce(x.max(axis=0, initial=-np.inf), np.maximum)
+    low = domain.comm.allreduce(x.min(axis=0, initial=np.inf), np.minimum)
+    size, largest = float(np.max(high - low)), max(domain.comm.allgather(float(u.max(initial=0.0))))
+    text = ""
+    if free:
+        text = (
+            f"nothing holds the body against moving {' and '.join(free)}, so that its displacement is not determined: give it "
+            "supports"
+        )
+    elif largest > size:
+        text = (
+            f"the largest displacement is {largest:.3g} m, more than the size of the body, {size:.3g} m; displacements are taken to "
+            "be small. Moduli are in Pa"
+        )
+    if text and domain.comm.rank == 0:
+        warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
 def advice(reason: str, free: list[str], law: Any, tension: bool) -> str:

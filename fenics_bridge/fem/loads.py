@@ -76,10 +76,18 @@ def require_finite(comm: MPI.Comm, load: Load) -> None:
     problem = None
     for name in ("unit_weight", "pressure", "traction", "displacement", "held"):
         value = getattr(load, name)
-        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not np.isfinite(v).all()]
+        if name in ("pressure", "traction") and not isinstance(value, dict):
+            problem = f"{name} is {value!r}, expected a dictionary by facet tag or name"
+            continue
+        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not _is_finite(v)]
         if wrong:
-            problem = f"{name} is {wrong[0]}, expected finite numbers"
+            problem = f"{name} is {wrong[0]!r}, expected finite numbers"
     agree(comm, problem)
+
+
+def _is_finite(value: Any) -> bool:
+    numbers = np.asarray(value)
+    return numbers.dtype.kind in "iuf" and bool(np.isfinite(numbers).all())
 
 
 def _arrays(tractions: Any) -> Any:
@@ -87,9 +95,17 @@ def _arrays(tractions: Any) -> Any:
 
 
 def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
-    """Warn of a unit weight that no soil has, such as one in kN/m3; none is fine."""
+    """Warn of a unit weight that no soil has, such as one in kN/m3 or one that acts upwards; none is fine."""
     weights = [float(weight) for weight in _weight_by_tag(load.unit_weight).values()]
     odd = [weight for weight in weights if weight and not UNIT_WEIGHTS[0] <= abs(weight) <= UNIT_WEIGHTS[1]]
+    upwards = [weight for weight in weights if weight < 0]
+    if upwards and comm.rank == 0:
+        warnings.warn(
+            f"the unit weight is {upwards[0]:.4g} N/m3, so that it acts upwards, expected a number from 0 on: a positive one acts "
+            "against the last axis",
+            RuntimeWarning,
+            stacklevel=3,
+        )
     if odd and comm.rank == 0:
         warnings.warn(
             f"the unit weight is {odd[0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
@@ -173,7 +189,6 @@ class LoadVectors:
         Note:
             Collective.
         """
-        require_finite(self._space.mesh.comm, load)
         load = self.resolved(load)
         by_tag = _weight_by_tag(load.unit_weight)
         elsewhere = by_tag.get(None, 0.0)
@@ -194,16 +209,19 @@ class LoadVectors:
             load: the load.
 
         Raises:
-            InputError: a tag does not exist. Raised on all ranks alike.
+            InputError: as for `forces`. Raised on all ranks alike.
 
         Note:
             Collective.
         """
         comm, weight = self._space.mesh.comm, load.unit_weight
+        require_finite(comm, load)
         if isinstance(weight, dict):
             weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
         pressure = by_number(comm, self._facet_tags, load.pressure, "pressure")
         traction = by_number(comm, self._facet_tags, load.traction, "traction")
+        for vector in traction.values():
+            self._vector(vector)
         return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
 
     def _vector(self, traction: Any) -> Any:

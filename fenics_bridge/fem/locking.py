@@ -1,4 +1,4 @@
-"""Warnings of linear elements without averaged strains in soil that keeps its volume."""
+"""Warnings of laws: friction angles in radians, and linear elements that lock in soil that keeps its volume."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes
 from mpm_core.mesh import cell_sizes
-from mpm_core.setup_warnings import locking, locks_at_failure
+from mpm_core.setup_warnings import angles_in_radians, locking, locks_at_failure
 
 if TYPE_CHECKING:
     from dolfinx import fem
@@ -23,11 +23,13 @@ FEWEST = 3
 the bank of docs/fem.md with cells of a third of its height; with 4.2, cells of a sixth, they are right to 4 %"""
 
 
-def warn_of_locking(model: QuasiStatic | Consolidation, instead: str = "elements of degree=2 or 4 hardly lock") -> None:
-    """Warn where the laws of a new model keep the volume of the soil whatever happens. Collective."""
-    text = locking(model.laws) if _is_plain(model) else ""  # on all ranks, since `laws` is collective
-    if text and model.domain.comm.rank == 0:
-        warnings.warn(f"{text}; {instead}", RuntimeWarning, stacklevel=3)
+def warn_of_laws(model: QuasiStatic | Consolidation, instead: str = "elements of degree=2 or 4 hardly lock") -> None:
+    """Warn where the laws of a new model have angles in radians, or keep the volume of the soil whatever happens. Collective."""
+    laws = model.laws  # on all ranks, since it is collective
+    locks = locking(laws) if _is_plain(model) else ""
+    for text in (angles_in_radians(laws), f"{locks}; {instead}" if locks else ""):
+        if text and model.domain.comm.rank == 0:
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 def warn_of_locking_at_failure(model: Any) -> None:

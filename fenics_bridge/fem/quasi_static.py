@@ -19,14 +19,14 @@ from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
-from fenics_bridge.fem.failure import explained
+from fenics_bridge.fem.failure import explained, warn_of_motion
 from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
-from fenics_bridge.fem.locking import warn_of_locking
+from fenics_bridge.fem.locking import warn_of_laws
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
@@ -127,7 +127,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.solver = solver or Solver()
         """Tolerances of the solution"""
         self._assemble(constraints)
-        warn_of_locking(self)
+        warn_of_laws(self)
 
     def __repr__(self) -> str:
         return body_text(
@@ -307,7 +307,9 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """
         load = self._loads.resolved(load)
         warn_of_weight(self.domain.comm, load)
-        return raise_load(self, load, first_step, tolerance, progress)
+        steps = raise_load(self, load, first_step, tolerance, progress)
+        warn_of_motion(self)
+        return steps
 
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array

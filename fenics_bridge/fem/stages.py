@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 from mpm_core.checks import renamed
+from mpm_core.setup_warnings import warn_of_water_weight
 
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.fem.k0 import Surface, surface_height
@@ -113,6 +114,7 @@ def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
     """
     if not (np.isfinite(unit_weight) and unit_weight >= 0):
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a number from 0 on")
+    warn_of_water_weight(MPI.COMM_WORLD, unit_weight)
     return lambda x: unit_weight * np.maximum(surface_height(level, x) - x[:, -1], 0.0)
 
 

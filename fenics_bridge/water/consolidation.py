@@ -9,6 +9,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpm_core.setup_warnings import warn_of_water_weight
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -20,7 +21,7 @@ from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
 from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.loads import Load, LoadVectors
-from fenics_bridge.fem.locking import warn_of_locking
+from fenics_bridge.fem.locking import warn_of_laws
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -104,6 +105,7 @@ class Consolidation(ConsolidationResults):
         inertia: Newmark | None = None,
     ) -> None:
         agree(domain.comm, _first_mistake(element, nmd, soil, unit_weight, water_modulus, geometry, inertia))
+        warn_of_water_weight(domain.comm, unit_weight)
         self.domain = domain
         """Mesh of the body"""
         self.geometry = geometry_of(domain, geometry)
@@ -149,7 +151,7 @@ class Consolidation(ConsolidationResults):
         """Velocity and acceleration; None in quasi-static steps"""
         self._assemble(options_prefix, inertia)
         self._external = self._loads.forces(Load())
-        warn_of_locking(self, "Element.TAYLOR_HOOD hardly locks")
+        warn_of_laws(self, "Element.TAYLOR_HOOD hardly locks")
 
     def __repr__(self) -> str:
         laws = map(repr, self._laws)

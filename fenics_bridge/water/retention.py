@@ -11,17 +11,22 @@ suction, which take numbers, NumPy arrays and UFL expressions alike:
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from fenics_bridge.errors import InputError
 
 LEAST_PERMEABILITY = 1e-8
 """Relative permeability that is left in the driest soil, so that the equations keep one solution."""
+
+LARGEST_ALPHA = 0.01
+"""Inverse of a suction [1/Pa] above which it is probably in another unit; that of gravel is below 0.002"""
 
 _SMALL = 1e-9
 """Suction, over the one by which a curve is scaled, below which soil counts as saturated: slopes of curves stay finite."""
@@ -79,6 +84,7 @@ class VanGenuchten(_Curve):
 
     def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
+        _warn_of_alpha(self.alpha)
         if not (np.isfinite(self.n) and self.n > 1):
             raise InputError(f"n is {self.n!r}, expected more than 1")
         _check_residual(self.residual)
@@ -131,6 +137,7 @@ class Gardner(_Curve):
 
     def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
+        _warn_of_alpha(self.alpha)
         _check_residual(self.residual)
 
     def effective(self, suction: Any) -> Any:
@@ -302,6 +309,16 @@ def _joined(x: Any, places: Any, values: Any) -> Any:
 def _check_positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0):
         raise InputError(f"{name} is {value!r} {unit}, expected a positive number")
+
+
+def _warn_of_alpha(alpha: float) -> None:
+    if alpha > LARGEST_ALPHA and MPI.COMM_WORLD.rank == 0:
+        warnings.warn(
+            f"alpha is {alpha:g} 1/Pa, so that soil dries at a suction of {1 / alpha:.2g} Pa; a value in 1/m is divided by the unit "
+            f"weight of water ({alpha / 9810:.3g} 1/Pa), one in 1/kPa by 1000",
+            RuntimeWarning,
+            stacklevel=4,
+        )
 
 
 def _check_residual(value: float) -> None:

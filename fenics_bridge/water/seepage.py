@@ -20,6 +20,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.setup_warnings import warn_of_water_weight
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -83,6 +84,7 @@ class Seepage:
             if not (np.isfinite(value) and value > 0):
                 problem = f"{name} is {value!r}, expected a positive number"
         agree(comm, problem)
+        warn_of_water_weight(comm, unit_weight)
         self.domain = domain
         """Mesh of the body"""
         self.unit_weight = unit_weight

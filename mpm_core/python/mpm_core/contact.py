@@ -17,6 +17,7 @@ from .collisions import add_collision
 from .mesh import floats
 from .outlines import Outline, mesh_box, outline
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
+from .setup_warnings import warn_of_friction
 from .surfaces import KINDS, Surface, distances
 from .triangles import Triangles
 
@@ -256,6 +257,7 @@ def add_contact(
         }  # fmt: skip
 
     new = collectively(model.comm, entry)
+    warn_of_friction(model.comm, friction)
     gap = smallest_gap(model, surface)
     if gap == np.inf:
         raise InputError("the model has no particles, seed some before surfaces are added")

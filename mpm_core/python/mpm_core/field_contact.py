@@ -13,6 +13,7 @@ from .checks import positive
 from .collective import collectively
 from .contact import checked, described, surface_of
 from .mesh import floats
+from .setup_warnings import warn_of_friction
 from .surfaces import KINDS, Plane, Surface
 from .triangles import Triangles
 
@@ -101,7 +102,9 @@ def add_field_contact(
     surface = cast("Surface", interface) if is_surface else _plane(model, cast("ArrayLike", interface))
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
-    set_field_contacts(model, [*model._field_contacts, collectively(model.comm, entry)])
+    new = collectively(model.comm, entry)
+    warn_of_friction(model.comm, friction)
+    set_field_contacts(model, [*model._field_contacts, new])
     return FieldContact(model, len(model._field_contacts) - 1)
 
 

@@ -18,6 +18,7 @@ from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
+from .setup_warnings import warn_of_water_weight
 
 History: TypeAlias = list[tuple[float, float]]
 """Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
@@ -116,6 +117,7 @@ class PoreWater(Conditions):
         if self.comm.allreduce(len(self.particles)) == 0:
             raise InputError("the model has no particles, expected them before add_water()")
         water, n, k = collectively(self.comm, checked)
+        warn_of_water_weight(self.comm, water.unit_weight)
         self._core.water = water
         self.particles.set("porosity", n)
         self.particles.set("conductivity", k)

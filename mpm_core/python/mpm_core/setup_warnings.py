@@ -19,6 +19,12 @@ UNIT_WEIGHTS = (1e3, 150e3)
 """Bounds of the unit weight of a soil [N/m3]: peat has 10 kN/m3, published slopes have up to 80, and 16 kN/m3 taken for a density
 gives 157"""
 
+RADIANS = (0.1, 1.57)
+"""Friction angles [degrees] that are more probably angles in radians, of soils from 6 to 90 degrees"""
+
+STEEPEST_FRICTION = 2.0
+"""Coefficient of friction, of an angle of 63 degrees, above which it is more probably an angle"""
+
 YIELDS_ABOVE = 0.2
 """Plastic work over the energy at work above which a body counts as one that fails"""
 
@@ -29,7 +35,8 @@ NEARLY_INCOMPRESSIBLE = 0.45
 def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
     locks = "" if nmd else locking(model.laws)
-    found = [text for text in (_nothing_acts(model), _nothing_holds(model), _weight(model), locks) if text]
+    of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
+    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
@@ -69,6 +76,71 @@ def _weight(model: Model) -> str:
         f"the unit weight of particles is {odd:.4g} N/m3, density times gravity, expected from {UNIT_WEIGHTS[0]:g} to "
         f"{UNIT_WEIGHTS[1]:g} N/m3 for a soil: densities are in kg/m3, 2000 for most soils"
     )
+
+
+def _upwards(model: Model) -> str:
+    up = float(model.gravity[-1])
+    if up <= 0:
+        return ""
+    return f"gravity acts upwards, {up:g} m/s2 along the last axis, expected a component below zero there, such as -9.81 m/s2"
+
+
+def _softness(model: Model) -> str:
+    """Soil that its own weight would compress to nothing, because its moduli are not in Pa."""
+    p, gravity = model.particles, np.asarray(model.gravity)
+    size = float(np.linalg.norm(gravity))
+    if size == 0:
+        return ""
+    along = p.position @ (gravity / size)
+    top, base = (model.comm.allreduce(float(x), op) for x, op in (
+        (along.min(initial=np.inf), MPI.MIN), (along.max(initial=-np.inf), MPI.MAX),
+    ))  # fmt: skip
+    mass, volume = (model.comm.allreduce(float(column.sum())) for column in (p.mass, p.volume))
+    stress, modulus = mass / volume * size * (base - top), max(law.p_wave_modulus for law in model.laws)
+    if modulus >= stress:
+        return ""
+    return (
+        f"the soil is so soft that its own weight would compress it to nothing: its oedometric modulus is {modulus:.4g} Pa at most, "
+        f"and the weight above its base {stress:.4g} Pa; moduli are in Pa"
+    )
+
+
+def angles_in_radians(laws: Iterable[Any]) -> str:
+    """What a warning says of a friction angle that is probably in radians; empty where there is none."""
+    angles = {getattr(law, "friction_angle", 0.0) for each in laws for law in with_inner_laws(each)}
+    odd = sorted(angle for angle in angles if isinstance(angle, (int, float)) and RADIANS[0] <= angle <= RADIANS[1])
+    if not odd:
+        return ""
+    return f"the friction angle is {odd[0]:g} degrees; angles are in degrees, and {odd[0]:g} rad are {np.degrees(odd[0]):.1f} degrees"
+
+
+def warn_of_friction(comm: MPI.Comm, friction: float) -> None:
+    """Warn of a coefficient of friction that is probably an angle. Not collective."""
+    if comm.rank == 0 and friction > STEEPEST_FRICTION:
+        warnings.warn(
+            f"friction is {friction:g}, a coefficient of Coulomb friction, which is the tangent of the angle of friction: for an angle "
+            f"of {friction:g} degrees give {np.tan(np.radians(friction)):.4g}",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def warn_of_water_weight(comm: MPI.Comm, unit_weight: float) -> None:
+    """Warn of a unit weight of water that is probably in kN/m3; one of nearly zero is fine. Not collective."""
+    if comm.rank == 0 and 1.0 <= unit_weight <= 100.0:
+        warnings.warn(
+            f"the unit weight of water is {unit_weight:g} N/m3; unit weights are in N/m3, 9810 for water",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+
+
+def with_inner_laws(law: Any) -> Iterator[Any]:
+    """A law and the laws that it is made of."""
+    yield law
+    for inner in ("skeleton", "law", "peak"):
+        if isinstance(getattr(law, inner, None), tuple(_core.law_types)):
+            yield from with_inner_laws(getattr(law, inner))
 
 
 def keeps_volume(laws: Iterable[Any]) -> bool:
@@ -129,13 +201,11 @@ class FailureWatch:
 
 def _reasons_to_lock(law: Any) -> Iterator[str]:
     """Reasons for which a law, or the law within it, keeps the volume of the soil."""
-    for inner in ("skeleton", "law", "peak"):
-        if isinstance(getattr(law, inner, None), tuple(_core.law_types)):
-            yield from _reasons_to_lock(getattr(law, inner))
-    if hasattr(law, "water_modulus"):
-        yield "undrained"
-    poisson, friction = getattr(law, "poisson", None), getattr(law, "friction_angle", None)
-    if isinstance(poisson, (int, float)) and poisson > NEARLY_INCOMPRESSIBLE:
-        yield f"Poisson's ratio {poisson:g}"
-    if isinstance(friction, (int, float)) and friction == 0:
-        yield "friction angle 0"
+    for each in with_inner_laws(law):
+        if hasattr(each, "water_modulus"):
+            yield "undrained"
+        poisson, friction = getattr(each, "poisson", None), getattr(each, "friction_angle", None)
+        if isinstance(poisson, (int, float)) and poisson > NEARLY_INCOMPRESSIBLE:
+            yield f"Poisson's ratio {poisson:g}"
+        if isinstance(friction, (int, float)) and friction == 0:
+            yield "friction angle 0"

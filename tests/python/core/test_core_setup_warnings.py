@@ -46,11 +46,37 @@ def test_a_surface_that_moves_acts_on_the_particles():
         ({"density": 80e6 / 9.81}, "unit weight of particles is 8e.07 N/m3"),
         ({"density": 18e3}, "unit weight of particles is 1.766e.05 N/m3"),  # a unit weight in place of the density
         ({"gravity": 0.0}, "nothing acts on the particles"),
+        ({"gravity": -9.81}, "gravity acts upwards, 9.81 m/s2 along the last axis"),
+        # M = E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 27 Pa, under 2000 x 9.81 Pa from 1 m of soil but for the half cell at each end
+        (
+            {"law": mpm.LinearElastic(young=20.0, poisson=0.3)},
+            "modulus is 26.92 Pa at most, .* base 1.[4-9].*e.04 Pa; moduli are in",
+        ),
+        (
+            {"law": mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=0.52)},
+            "0.52 degrees; angles are in degrees, and 0.52 rad are 29.8 degrees",
+        ),
     ],
 )
 def test_what_has_been_forgotten_or_is_of_the_wrong_size_is_said(options, text):
     (one,) = said(model_of(**options))
     assert re.search(text, one)
+
+
+def test_an_angle_in_place_of_a_coefficient_of_friction_is_said():
+    ground = mpm.Plane((0.0, -0.1), (0.0, 1.0))
+    with pytest.warns(RuntimeWarning, match="friction is 30, .* the tangent .* for an angle of 30 degrees give 0.5774"):
+        model_of().add_contact(ground, friction=30.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model_of().add_contact(ground, friction=1.0)
+
+
+def test_a_unit_weight_of_water_in_kilonewtons_is_said():
+    with pytest.warns(
+        RuntimeWarning, match="unit weight of water is 9.81 N/m3; unit weights are in N/m3, 9810 for water"
+    ):
+        model_of().add_water(porosity=0.4, conductivity=1e-5, unit_weight=9.81)
 
 
 @pytest.mark.parametrize(

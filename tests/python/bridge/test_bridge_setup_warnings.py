@@ -1,0 +1,82 @@
+"""Mistakes of input that finite elements would take in silence: each is said, with the way out."""
+
+import warnings
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
+HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+ELASTIC = mpm.LinearElastic(young=1e7, poisson=0.3)
+
+
+def body(law=ELASTIC, supports=HELD):
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
+    return bridge.QuasiStatic(domain, law, facet_tags, supports)
+
+
+def test_sound_input_says_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        body().solve(bridge.Load(unit_weight=20e3, pressure={TOP: 1e3}))
+        water.VanGenuchten(alpha=15.0 / 9810, n=2.7)  # gravel
+        bridge.hydrostatic(1.0)
+
+
+def test_a_body_that_may_move_along_an_axis_is_named():
+    model = body(supports=[bridge.roller(BASE, (0, 1))])
+    with pytest.warns(RuntimeWarning, match="nothing holds the body against moving along x.*give it supports"):
+        model.solve(bridge.Load(unit_weight=20e3))
+
+
+def test_displacements_larger_than_the_body_are_named():
+    # gamma H^2 / 2 M with M = E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 26.9 Pa in place of MPa
+    with pytest.warns(
+        RuntimeWarning, match="largest displacement is 371 m, more than the size of the body, 2 m.*Moduli are in Pa"
+    ):
+        body(mpm.LinearElastic(young=20.0, poisson=0.3)).solve(bridge.Load(unit_weight=20e3))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: body(mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=0.52)),
+            "friction angle is 0.52 degrees; .* 0.52 rad are 29.8 degrees",
+        ),
+        (lambda: body().solve(bridge.Load(unit_weight=-20e3)), "unit weight is -2e.04 N/m3, so that it acts upwards"),
+        (lambda: bridge.hydrostatic(1.0, 9.81), "unit weight of water is 9.81 N/m3; unit weights are in N/m3"),
+        (lambda: water.VanGenuchten(alpha=1.5, n=2.0), r"alpha is 1.5 1/Pa.* a value in 1/m .*\(0.000153 1/Pa\)"),
+        (lambda: water.Gardner(alpha=0.2), "alpha is 0.2 1/Pa, so that soil dries at a suction of 5 Pa"),
+    ],
+)
+def test_other_units_and_directions_are_named(make, words):
+    with pytest.warns(RuntimeWarning, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [
+        ({"traction": {TOP: 1e3}}, r"traction has shape \(\), expected \(2,\)"),
+        ({"traction": (0.0, 1e3)}, r"traction is \(0.0, 1000.0\), expected a dictionary by facet tag or name"),
+        ({"pressure": 1e3}, "pressure is 1000.0, expected a dictionary by facet tag or name"),
+        ({"unit_weight": "20e3"}, "unit_weight is '20e3', expected finite numbers"),
+        ({"pressure": {TOP: None}}, "pressure is None, expected finite numbers"),
+    ],
+)
+def test_loads_of_another_kind_are_refused(load, words):
+    with pytest.raises(bridge.InputError, match=words):
+        body().solve(bridge.Load(**load))
+
+
+def test_a_factor_of_safety_without_a_limit_says_so():
+    soil = mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=30.0)
+    found = bridge.factor_of_safety(body(soil), bridge.Load(), first_step=1e3)
+    assert np.isinf(found.failed_at) and not found.failed
+    assert repr(found).startswith(f"<Collapse: no failure, in equilibrium at every value up to {found.value:.6g}")
