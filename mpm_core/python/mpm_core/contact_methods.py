@@ -56,8 +56,9 @@ class ContactMethods:
                 (D,). By default the centre of a Disc, Sphere, Box, Cylinder, Cone or Wedge, the middle of the extent of
                 Triangles, and the first point of the other surfaces.
             penalty: stiffness beta of the contact in (0, 1], relative to the largest one that the time step allows; with a
-                larger one particles penetrate less. In implicit steps its stiffness is 50 beta times that of
-                the particles, ten times with 0.2.
+                larger one particles penetrate less. In explicit steps the default yields like some two cells of soil,
+                which is too soft for earth pressure at rest (docs/contact.md). In implicit steps its stiffness is 50 beta
+                times that of the particles, ten times with 0.2.
             bonded: tie the particles that are now within 1.5 of their radii of the surface to it, in tension too.
 
         Returns:
