@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.checks import positive
 from mpm_core.step_control import StepControl
 
+from fenics_bridge.errors import InputError
 from fenics_bridge.fem.equilibration import EquilibriumReport
 from fenics_bridge.fem.loads import Load
 
@@ -62,13 +64,19 @@ def advance(
 
     Returns:
         All steps; the last converged one is the last equilibrium.
+
+    Raises:
+        InputError: first_step is not positive, or tolerance not between 0 and 1.
     """
+    _check_steps(first_step, tolerance)
     steps: list[LoadStep] = []
     value, easy, failed_at, undecided = start, 0, math.inf, False
     control = StepControl(math.inf, min(first_step, end - start))
-    limit = min(end, start + FAR * first_step) if math.isinf(end) else end
+    limit = start + FAR * max(first_step, tolerance * abs(start)) if math.isinf(end) else end
     while value < limit and len(steps) < _MOST_STEPS:
         smallest = tolerance * max(abs(value), first_step)
+        if control.cuts == 0:  # a first step below the tolerance is no reason to end
+            control.length = max(control.length, smallest)
         size = control.length = min(control.length, 0.5 * (failed_at - value))
         if size < smallest:
             break
@@ -92,6 +100,12 @@ def advance(
                 failed_at = target
                 control.length = max(_below_failure(value, target, steps[-1].report.carried), smallest)
     return steps
+
+
+def _check_steps(first_step: Any, tolerance: Any) -> None:
+    positive("first_step", first_step, "(in the units of the value)")
+    if not 0 < positive("tolerance", tolerance, "(a fraction)") < 1:
+        raise InputError(f"tolerance is {tolerance}, expected a fraction between 0 and 1")
 
 
 def _below_failure(value: float, failed_at: float, carried: float) -> float:

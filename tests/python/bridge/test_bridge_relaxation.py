@@ -269,6 +269,28 @@ def test_steps_grow_again_after_one_that_was_too_large():
     assert len(steps) < 60
 
 
+@pytest.mark.parametrize(("start", "first_step"), [(0.5, 1e-3), (1.0, 1e-3), (3.0, 1e-9), (0.0, 1e-3)])
+def test_a_first_step_below_the_tolerance_does_not_end_the_search(start, first_step):
+    """2e-3 of the value is more than the first step: the search went no further than the start, and took that for the limit."""
+    steps = advance(lambda value: fake("equilibrium" if value < np.pi else "failure"), start, np.inf, first_step, 2e-3)
+    best = max(step.value for step in steps if step.converged)
+    assert np.pi * (1 - 4e-3) < best < np.pi and len(steps) < 50
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"first_step": 0.0}, "first_step is 0.0 .*expected a positive number"),
+        ({"first_step": -1.0}, "first_step is -1.0"),
+        ({"tolerance": 0.0}, "tolerance is 0.0"),
+        ({"tolerance": 2.0}, "tolerance is 2.0, expected a fraction between 0 and 1"),
+    ],
+)
+def test_steps_that_cannot_be_are_named(options, words):
+    with pytest.raises(bridge.InputError, match=words):
+        bridge.collapse_load(slope_model(0.2, "fitted"), lambda w: bridge.Load(w), **{"first_step": 1e3, **options})
+
+
 def test_a_value_that_fails_is_never_passed():
     tried = []
 
