@@ -214,7 +214,9 @@ class LoadVectors:
         Note:
             Collective.
         """
-        comm, weight = self._space.mesh.comm, load.unit_weight
+        comm = self._space.mesh.comm
+        agree(comm, None if isinstance(load, Load) else f"load: got {load!r}, expected a Load")
+        weight = load.unit_weight
         require_finite(comm, load)
         if isinstance(weight, dict):
             weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")

@@ -9,6 +9,10 @@ from fenics_bridge.errors import agree
 from fenics_bridge.mesh.names import by_number, described, label
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 from fenics_bridge.types import Law, Laws, MeshTags
+from mpm_core import law_types
+
+KINDS = tuple(law_types)
+"""The classes of laws"""
 
 
 class Materials:
@@ -27,6 +31,8 @@ class Materials:
         self._comm, self._cell_tags, n_cells = domain.comm, cell_tags, owned_cells(domain)
         self.tags: tuple = (None,)
         """Tags of the laws, in their order; (None,) for a law of the whole body"""
+        wrong = [one for one in (law.values() if isinstance(law, dict) else [law]) if not isinstance(one, KINDS)]
+        agree(self._comm, f"law: got {wrong[0]!r}, expected a law such as MohrCoulomb(...)" if wrong else None)
         if not isinstance(law, dict):
             self.number = np.zeros(n_cells, dtype=np.int32)
             return

@@ -105,8 +105,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """Displacement of the last step [m]"""
         self.cell_tags = cell_tags
         """Tags of the cells"""
-        self.supports: tuple[Support, ...] = tuple(supports)
-        """The boundary conditions in force"""
         self.off: Sequence[int] = ()
         """Tags of the cells that are inactive"""
         agree(
@@ -114,6 +112,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
         )
         self._nmd, self._as_particles, self._options_prefix = nmd, as_particles, options_prefix
         constraints = Constraints(space, facet_tags, supports)
+        self.supports: tuple[Support, ...] = tuple(supports)
+        """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._materials = Materials(domain, law, cell_tags)
         quadrature = max(1, 2 * (degree - 1))

@@ -83,7 +83,10 @@ def mistake_in(condition: WaterBoundary) -> str | None:
         value = getattr(condition, name, 0.0)
         if callable(value):
             continue
-        numbers = np.asarray(value, dtype=float)
+        try:
+            numbers = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            return f"{name} is {value!r}, expected a number, a function of time or a table ((time, value), ...)"
         if not np.all(np.isfinite(numbers)):
             return f"{name} is {value!r}, expected finite numbers"
         table = numbers.ndim > 0

@@ -22,6 +22,8 @@ def positive(name: str, value: float, unit: str, *, zero: bool = False) -> float
 
 def within(name: str, value: float, low: float, high: float, *, open_above: bool = False) -> float:
     """A number between two others, these included; without the upper one where open above."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise InputError(f"{name} is {value!r}, expected a number")
     if not (low <= value < high or (value == high and not open_above)):
         raise InputError(f"{name} is {value}, expected {low} <= {name} {'<' if open_above else '<='} {high}")
     return float(value)

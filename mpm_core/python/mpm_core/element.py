@@ -65,6 +65,8 @@ class ElementTest:
             raise InputError(f"dt is {dt} s, expected at least 0")
         self._dt = dt
         increment = np.array(strain_increment, dtype=float)
+        if increment.shape != self.stress.shape:
+            raise InputError(f"strain_increment has shape {increment.shape}, expected {self.stress.shape}")
         free = np.isnan(increment)
         target = self.stress if stress is None else floats("stress", stress, self.stress.shape)
         # A point that softens may be taken for an elastic one from the first guess, but not from its last increment

@@ -49,7 +49,7 @@ def run_options(dt: float | None, courant: float, pic: float, allow_unstable: bo
     """The core's options of the time step; see `Model.explicit`."""
     run = _core.RunOptions()
     run.dt = None if dt is None else positive("dt", dt, "s")
-    if not 0 < courant <= 1:
+    if not 0 < positive("courant", courant, "(a ratio)") <= 1:
         raise InputError(f"courant is {courant}, expected 0 < courant <= 1")
     run.courant = courant
     run.pic = within("pic", pic, 0, 1)
@@ -65,8 +65,8 @@ def require_particles(model: Model) -> None:
 
 def report_times(model: Model, until: float, every: float | None, since: float | None) -> list[float]:
     """Remaining times at which a run reports [s]; see `Model.explicit`."""
-    if not (np.isfinite(until) and until >= model.time):
-        raise InputError(f"until is {until} s, expected a time not before the present, {model.time} s")
+    if not (isinstance(until, (int, float, np.number)) and np.isfinite(until) and until >= model.time):
+        raise InputError(f"until is {until!r} s, expected a time not before the present, {model.time} s")
     start = model.time if since is None else float(since)
     if not start <= model.time:
         raise InputError(f"since is {since} s, expected a time not after the present, {model.time} s")

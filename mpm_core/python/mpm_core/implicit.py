@@ -62,6 +62,8 @@ def implicit_options(
             "backward Euler (second_order False) do"
         )
     options.second_order = flag("second_order", second_order)
+    if not isinstance(ghost, (GhostPenalty, type(None))):
+        raise InputError(f"ghost is {ghost!r}, expected a GhostPenalty or None")
     options.ghost = (ghost or GhostPenalty()).options()
     if small_displacements and not quasi_static:
         raise InputError("small_displacements is True, expected False unless quasi_static is True")

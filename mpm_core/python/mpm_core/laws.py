@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
+from .checks import member
 from .mesh import floats
 
 
@@ -66,6 +67,7 @@ def matched_drucker_prager(
     soil = MohrCoulomb(
         young=young, poisson=poisson, cohesion=cohesion, friction_angle=friction_angle, dilation_angle=dilation_angle
     )  # names what is wrong with the parameters
+    member("match", match, ConeMatch)
     return DruckerPrager(
         young=young,
         poisson=poisson,

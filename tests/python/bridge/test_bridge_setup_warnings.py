@@ -75,6 +75,28 @@ def test_loads_of_another_kind_are_refused(load, words):
         body().solve(bridge.Load(**load))
 
 
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: body(supports=bridge.fixed(BASE)), r"supports: got Support\(facet_tag=3.*expected a list"),
+        (lambda: body([ELASTIC, ELASTIC]), r"law: got \[.*expected a law such as MohrCoulomb"),
+        (lambda: body("clay"), "law: got 'clay', expected a law"),
+        (lambda: body().solve(20e3), "load: got 20000.0, expected a Load"),
+        (lambda: body().reconfigure(pore_pressure=1e4), "pore_pressure: got 10000.0, expected a function of positions"),
+        (lambda: flow(water.Head(LEFT, 1.0)), r"boundary: got Head\(facet_tag=1.*expected a list of conditions"),
+        (lambda: flow([water.Head(LEFT, "high")]), "level is 'high', expected a number, a function of time or a table"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(call, words):
+    with pytest.raises(bridge.InputError, match=words):
+        call()
+
+
+def flow(boundary):
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
+    return water.Seepage(domain, water.PorousSoil(1e-6), facet_tags, boundary)
+
+
 def test_a_factor_of_safety_without_a_limit_says_so():
     soil = mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=30.0)
     found = bridge.factor_of_safety(body(soil), bridge.Load(), first_step=1e3)

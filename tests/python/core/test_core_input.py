@@ -179,6 +179,10 @@ def test_bad_supports_and_loads(model, call, words):
         ({"integration": "MIXED"}, "integration is 'MIXED', expected one of Integration.PARTICLES, Integration.MIXED"),
         ({"transfer": "AFFINE"}, "transfer is 'AFFINE', expected one of Transfer.FLIP, Transfer.AFFINE"),
         ({"stress_update": 0}, "stress_update is 0, expected one of StressUpdate"),
+        ({"until": "1"}, "until is '1' s, expected a time"),
+        ({"courant": "half"}, "courant is 'half', expected a positive number"),
+        ({"damping": "0.5"}, "damping is '0.5', expected a number"),
+        ({"pic": None}, "pic is None, expected a number"),
         ({"nmd": "no"}, "nmd is 'no', expected True or False"),
         ({"reproducible": 2}, "reproducible is 2, expected True or False"),
     ],
@@ -195,6 +199,7 @@ def test_bad_run_options(model, change, words):
         ({"integration": "MIXED"}, "integration is 'MIXED', expected one of Integration"),
         ({"quasi_static": "yes"}, "quasi_static is 'yes', expected True or False"),
         ({"nmd": None}, "nmd is None, expected True or False"),
+        ({"ghost": 0.1}, "ghost is 0.1, expected a GhostPenalty or None"),
     ],
 )
 def test_bad_options_of_implicit_runs(model, change, words):

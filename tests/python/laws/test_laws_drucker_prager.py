@@ -125,3 +125,10 @@ def test_bad_parameters_are_named_with_value_and_range():
         mpm.von_mises(young=1e6, poisson=0.3, yield_stress=-1.0)
     with pytest.raises(mpm.InputError, match="^friction_angle = 95, "):
         mpm.matched_drucker_prager(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=95.0)
+
+
+def test_arguments_of_another_kind_are_named():
+    with pytest.raises(mpm.InputError, match="match is 'outer', expected one of ConeMatch.OUTER"):
+        mpm.matched_drucker_prager(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=30.0, match="outer")
+    with pytest.raises(mpm.InputError, match=r"strain_increment has shape \(3,\), expected \(4,\)"):
+        mpm.ElementTest(mpm.LinearElastic(young=1e7, poisson=0.3), np.zeros(4)).step([1e-3, 0.0, 0.0])
