@@ -88,8 +88,8 @@ def particle_safety(
         The factor and the evidence of failure above it.
 
     Raises:
-        InputError: an argument out of range, a model without gravity, or soil that does not rest at `start`. Raised on all ranks
-            alike.
+        InputError: an argument out of range, a model without gravity, soil that does not rest at `start`, or that rests at every
+            factor. Raised on all ranks alike.
     """
     _check(start=start, first_step=first_step, tolerance=tolerance, damping=damping, rest=rest)
     models, curve = {}, []
@@ -115,6 +115,11 @@ def particle_safety(
         )
     steps = advance(attempt, start, math.inf, first_step, tolerance, progress)
     above = [step for step in steps if step.value > curve[-1][0]]
+    if not above:
+        raise InputError(
+            f"model_of: the particles come to rest at every factor up to {curve[-1][0]:.6g}; the body may not be able to fail, such as "
+            "level ground between rollers"
+        )
     failures = [step for step in above if step.report.outcome == "failure"]
     end = min(failures or above, key=lambda step: step.value)
     return ParticleSafety(

@@ -83,6 +83,22 @@ def test_the_factor_is_that_of_the_strength():
     assert strong.value == pytest.approx(2 * weak.value, rel=0.01)
 
 
+def test_ground_that_cannot_fail_is_said_so(monkeypatch):
+    monkeypatch.setattr("fenics_bridge.fem.load_steps.FAR", 4)
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 2))
+    mesh = bridge.background_mesh(domain, cell_tags, facet_tags)
+
+    def model_of(factor):
+        model = mpm.Model(mesh, bridge.reduced_strength(soil(), factor))
+        model.seed(density=UNIT_WEIGHT / GRAVITY, per_cell=3)
+        bridge.apply_supports(model, [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)])
+        model.set_gravity((0.0, -GRAVITY))
+        return model
+
+    with pytest.raises(bridge.InputError, match="rest at every factor up to 4.5; the body may not be able to fail"):
+        bridge.particle_safety(model_of, first_step=1.0)
+
+
 def test_wrong_arguments_are_named():
     with pytest.raises(
         bridge.InputError, match="start: with the strength divided by 3.0 the particles do not come to rest: .*flow"
