@@ -115,7 +115,7 @@ class Consolidation(ConsolidationResults):
         self.load = load or Load()
         """The load, or a function of the time [s] that returns one; may be changed between steps, and holds at the end of one"""
         alone = f"boundary: got {boundary!r}, expected a list of conditions"
-        agree(domain.comm, alone if isinstance(boundary, WaterBoundary) else None)
+        agree(domain.comm, alone if hasattr(boundary, "facet_tag") else None)
         self.boundary = list(boundary)
         """Boundary conditions of the water; they may be changed between steps, and hold at the end of a step"""
         self.solver = solver or Solver()
