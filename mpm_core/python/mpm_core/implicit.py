@@ -270,10 +270,12 @@ def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, 
         options.ghost, options.hold_positions = ghost, True
         if model.report().unbalanced_ratio <= tolerance:
             return stepper.report()
-    raise RunError(
+    error = RunError(
         f"out-of-balance ratio is {model.report().unbalanced_ratio:.3g} after {max_steps} steps, of which the last applied "
         f"{applied:.3g} of the loads, expected {tolerance:.3g}"
     )
+    error.applied = applied
+    raise error
 
 
 def _attempt_without_time(stepper: Stepper, model: Model) -> str:
