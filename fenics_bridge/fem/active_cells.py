@@ -119,7 +119,7 @@ def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
     """Pore pressure [Pa] as a function that is linear in each cell; None for none."""
     if pore_pressure is None:
         return None
-    problem = f"pore_pressure: got {pore_pressure!r}, expected a function of positions, such as hydrostatic(2.0)"
+    problem = f"pore_pressure is {pore_pressure!r}, expected a function of positions, such as hydrostatic(2.0)"
     agree(domain.comm, None if callable(pore_pressure) else problem)
     dim = domain.geometry.dim
     p = fem.Function(compat.function_space(domain, "Lagrange", 1), name="pore_pressure")

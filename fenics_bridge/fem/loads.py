@@ -215,7 +215,7 @@ class LoadVectors:
             Collective.
         """
         comm = self._space.mesh.comm
-        agree(comm, None if isinstance(load, Load) else f"load: got {load!r}, expected a Load")
+        agree(comm, None if isinstance(load, Load) else f"load is {load!r}, expected a Load")
         weight = load.unit_weight
         require_finite(comm, load)
         if isinstance(weight, dict):

@@ -32,7 +32,7 @@ class Materials:
         self.tags: tuple = (None,)
         """Tags of the laws, in their order; (None,) for a law of the whole body"""
         wrong = [one for one in (law.values() if isinstance(law, dict) else [law]) if not isinstance(one, KINDS)]
-        agree(self._comm, f"law: got {wrong[0]!r}, expected a law such as MohrCoulomb(...)" if wrong else None)
+        agree(self._comm, f"law is {wrong[0]!r}, expected a law such as MohrCoulomb(...)" if wrong else None)
         if not isinstance(law, dict):
             self.number = np.zeros(n_cells, dtype=np.int32)
             return

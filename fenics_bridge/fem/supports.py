@@ -153,7 +153,7 @@ def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: Tag, argument: str)
 
 def _first_mistake(domain: Mesh, facet_tags: MeshTags, supports: Sequence[Support], dim: int) -> str | None:
     if isinstance(supports, Support) or not all(isinstance(support, Support) for support in supports):
-        return f"supports: got {supports!r}, expected a list of what `fixed`, `roller` and `prescribed` return"
+        return f"supports is {supports!r}, expected a list of what `fixed`, `roller` and `prescribed` return"
     for support in supports:
         tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports")
         displacement = support.displacement

@@ -114,7 +114,7 @@ class Consolidation(ConsolidationResults):
         """Time of the consolidation [s]"""
         self.load = load or Load()
         """The load, or a function of the time [s] that returns one; may be changed between steps, and holds at the end of one"""
-        alone = f"boundary: got {boundary!r}, expected a list of conditions"
+        alone = f"boundary is {boundary!r}, expected a list of conditions"
         agree(domain.comm, alone if hasattr(boundary, "facet_tag") else None)
         self.boundary = list(boundary)
         """Boundary conditions of the water; they may be changed between steps, and hold at the end of a step"""

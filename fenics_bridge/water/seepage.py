@@ -105,7 +105,7 @@ class Seepage:
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
         self._applied = AppliedBoundary(space, facet_tags, self._largest)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
-        alone = f"boundary: got {boundary!r}, expected a list of conditions"
+        alone = f"boundary is {boundary!r}, expected a list of conditions"
         agree(comm, alone if hasattr(boundary, "facet_tag") else None)
         self.boundary = list(boundary)
         """The boundary conditions, which may be changed between steps"""

@@ -78,12 +78,12 @@ def test_loads_of_another_kind_are_refused(load, words):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: body(supports=bridge.fixed(BASE)), r"supports: got Support\(facet_tag=3.*expected a list"),
-        (lambda: body([ELASTIC, ELASTIC]), r"law: got \[.*expected a law such as MohrCoulomb"),
-        (lambda: body("clay"), "law: got 'clay', expected a law"),
-        (lambda: body().solve(20e3), "load: got 20000.0, expected a Load"),
-        (lambda: body().reconfigure(pore_pressure=1e4), "pore_pressure: got 10000.0, expected a function of positions"),
-        (lambda: flow(water.Head(LEFT, 1.0)), r"boundary: got Head\(facet_tag=1.*expected a list of conditions"),
+        (lambda: body(supports=bridge.fixed(BASE)), r"supports is Support\(facet_tag=3.*expected a list"),
+        (lambda: body([ELASTIC, ELASTIC]), r"law is \[.*expected a law such as MohrCoulomb"),
+        (lambda: body("clay"), "law is 'clay', expected a law"),
+        (lambda: body().solve(20e3), "load is 20000.0, expected a Load"),
+        (lambda: body().reconfigure(pore_pressure=1e4), "pore_pressure is 10000.0, expected a function of positions"),
+        (lambda: flow(water.Head(LEFT, 1.0)), r"boundary is Head\(facet_tag=1.*expected a list of conditions"),
         (lambda: flow([water.Head(LEFT, "high")]), "level is 'high', expected a number, a function of time or a table"),
     ],
 )
