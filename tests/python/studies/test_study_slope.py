@@ -89,7 +89,19 @@ def test_a_slope_that_fails_warns_of_nothing_at_its_defaults(tmp_path):
     ],
 )
 def test_strains_are_averaged_where_soil_locks_as_it_fails(tmp_path, options, averages):
-    result = slope(tmp_path, "--cell-size", "0.25", "--mesh", "fitted", "--time", "1e-3", "--frames", "1", "--no-pictures", *options)
+    result = slope(
+        tmp_path,
+        "--cell-size",
+        "0.25",
+        "--mesh",
+        "fitted",
+        "--time",
+        "1e-3",
+        "--frames",
+        "1",
+        "--no-pictures",
+        *options,
+    )
     assert result.returncode == 0, result.stderr
     assert f"\nnmd = {averages}  #" in (tmp_path / "parameters.toml").read_text()
 
