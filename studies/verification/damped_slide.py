@@ -14,7 +14,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from _case import Check, Result, run_alone
+from _case import Check, Result
 from common.options import study_parser
 from common.plots import save_history
 from common.schemes import IMPLICIT_STEP
@@ -68,7 +68,16 @@ def run(quick: bool, folder: Path) -> Result:
                 "m",
                 limit=limit,
             ),
-            Check(f"run-out, load {name}", explicit[-1, 2], source, implicit[-1, 2], 0.1, "m", scale=cell),
+            Check(
+                f"run-out, load {name}",
+                explicit[-1, 2],
+                source,
+                implicit[-1, 2],
+                0.1,
+                "m",
+                scale=cell,
+                over="size of a cell",
+            ),
         ]
         curves |= {f"explicit, {name}": explicit, f"implicit, {name}": implicit}
     if MPI.COMM_WORLD.rank == 0:
@@ -78,7 +87,3 @@ def run(quick: bool, folder: Path) -> Result:
             folder / "crest.png", time, crest, "Displacement of the particle at the crest [m]", limits=(0, 0.5)
         )
     return Result(checks, {"crest.png": "Crest of a damped slide by explicit and by implicit steps"})
-
-
-if __name__ == "__main__":
-    run_alone(run)

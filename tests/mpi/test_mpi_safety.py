@@ -39,7 +39,7 @@ def test_particles_have_the_same_factor_on_all_numbers_of_ranks(geometry):
 
 
 def test_what_is_wrong_with_particles_is_said_on_all_ranks():
-    for options, words in (({"start": 3.0}, "start: .*do not come to rest"), ({"gravity": 0.0}, "no gravity")):
+    for options, words in (({"start": 3.0}, "start: .*do not come to rest"), ({"gravity": 0.0}, "without gravity")):
         with pytest.raises(bridge.InputError, match=words) as error:
             by_particles(COMM, None, **options)
         assert len(set(COMM.allgather(str(error.value)))) == 1
