@@ -184,13 +184,13 @@ void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 template <class G>
 void choose_forces(Model<G>& model, Integration kind, Averages averages)
 {
-  const bool filled = model.water.has_value();                           // its pressure is most of what averages change
-  const bool as_elements = averages == Averages::as_elements && !filled; // elements with water average as steps do
+  const bool two_phases = has_two_phases(model); // then pore pressures are averaged too, and most of what is
+  const bool as_elements = averages == Averages::as_elements && !model.water; // elements with water average as steps do
   const auto fraction = [&](const Law& law)
   {
     if (as_elements)
       return fraction_of_averaged_forces(law);
-    return filled ? 1 : fraction_of_averages(law);
+    return two_phases ? 1 : fraction_of_averages(law);
   };
   for (VelocityField<G>& field : model.fields)
   {

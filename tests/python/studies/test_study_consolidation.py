@@ -61,7 +61,7 @@ def test_particles_take_no_other_water_than_reservoirs(tmp_path):
 @pytest.mark.parametrize("dilation", [0.0, 25.0])
 @pytest.mark.parametrize("nmd", [False, True])
 def test_particles_begin_at_rest(dilation, nmd, tmp_path):
-    """Also where elements average strains only, of soil that does not dilate, and particles their forces as well."""
+    """Also in soil that does not dilate, of which elements and particles average strains and forces by half."""
     from common.consolidation_site import read_consolidation_site
     from common.wet_particles import SmallMotion
 

@@ -86,6 +86,27 @@ def test_dried_soil_is_taken_over_with_its_suction_and_its_lost_weight():
     np.testing.assert_allclose(model.particles.pore_pressure, there, atol=0.01 * 9810)
 
 
+def test_averaged_forces_of_soil_that_does_not_dilate_are_taken_over_in_equilibrium():
+    """By half, as the elements average them, while forces of the pressures are not averaged."""
+    background = bridge.slope_mesh(MPI.COMM_WORLD, height=4.0, angle=30.0, crest=4.0, cell_size=0.8, kind="fitted")
+    domain, _, facet_tags = bridge.soil_mesh(*background, tag=bridge.SOIL)
+    soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=20e3, friction_angle=28.0, dilation_angle=0.0)
+    fem = water.Consolidation(
+        domain, soil, water.PorousSoil(1e-6, porosity=0.4), facet_tags,
+        [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)], [water.Head("crest", 4.0)],
+        load=bridge.Load(unit_weight=WEIGHT), element=water.Element.STABILISED, nmd=True,
+    )  # fmt: skip
+    fem.initialise(pore_pressure=lambda x: 9810.0 * (4.0 - x[:, 1]))
+    assert fem.run(1e4, 1e3, growth=2.0)[-1].converged
+    model = mpm.Model(bridge.background_mesh(*background), soil)
+    model.seed(density=WEIGHT / 9.81, per_cell=3, cell_tag=bridge.SOIL)
+    model.roller(bridge.LEFT, (1, 0))
+    model.fix(bridge.BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-6)
+    assert bridge.initialise(model, fem, equilibrate=False).unbalanced_ratio < 1e-9
+
+
 def test_equilibration_leaves_the_pressures():
     fem, model = consolidating(water.Element.TAYLOR_HOOD)
     wet(model)
