@@ -18,6 +18,7 @@ from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.transfer.dried import balance_dried_soil
 from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
 from fenics_bridge.water.consolidation import Consolidation
 
@@ -75,8 +76,10 @@ def initialise(
     plane strain and 3D with quadratic ones, whose cell means linear test functions cannot distinguish from their stresses.
     In axisymmetric bodies two things differ: the hoop stress acts with the particles at the centre of a cell, which leaves
     some 1e-3 of quadratic elements out of balance; and the weights of nodes are exact for particles at Gauss points of
-    degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size. Soil that has dried leaves more: the
-    weight of its water and its suction are no polynomials, and particles take other points for them.
+    degree 2 (`per_cell` of 3, 12, 48), and with others good to the square of the cell size. The suction of soil that has dried and
+    the weight of its water are no polynomials: particles then take total stresses and moments of the weight from each cell of the
+    elements (`dried.balance_dried_soil`), of which a particle alone in its cell has the sum only. Averaged forces of dried soil
+    leave some 1e-4, since these averages leave out the suction.
 
     Args:
         model: model with particles.
@@ -141,16 +144,17 @@ def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smoo
     if isinstance(fem, (QuasiStatic, Consolidation)):
         values = search.values(fem.state_function())
         state[:, : values.shape[1]] = values
+    if isinstance(fem, Consolidation):
+        particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
+        particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
+        model.saturate()
+        stress = balance_dried_soil(model, fem, search, stress)
     returned = _returned(model.laws, particles.material, stress, state)
     particles.set("stress", stress)
     particles.set("state", state)
     particles.set("deviatoric_strain", search.values(fem.deviatoric_strain_function())[:, 0])
     for name in ("velocity", "velocity_gradient") if model.resting_cells.any() else ("velocity",):
         particles.set(name, np.zeros_like(getattr(particles, name)))
-    if isinstance(fem, Consolidation):
-        particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
-        particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
-        model.saturate()
     return returned
 
 

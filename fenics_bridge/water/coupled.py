@@ -27,6 +27,7 @@ from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.loads import pressing
+from fenics_bridge.mesh.tagged import cell_volumes
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
 from fenics_bridge.water.motion import STANDARD_GRAVITY, Motion
@@ -81,7 +82,7 @@ class WaterTerms:
         there: fem.Function,
         motion: Motion | None = None,
     ) -> None:
-        domain = solution.function_space.mesh
+        self._domain = domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
         self._there, self._motion = there, motion
@@ -102,6 +103,35 @@ class WaterTerms:
         content = lambda s: self._saturation(s, self._p) * self._pores(s)
         self.content = fem.form(self._sum(content, self._storing))
         """Form of the volume of stored water"""
+
+    @property
+    def may_dry(self) -> bool:
+        """Whether some soil has a retention curve."""
+        return any(_may_dry(soil) for soil in self._soils)
+
+    def dried(self) -> tuple[fem.Function, fem.Function]:
+        """What soil that may dry has in each cell, by the integrals of the forces.
+
+        Returns:
+            Part of the pressure that the total stress has [Pa], constant in each cell, and weight of the water that pores have no
+            more [N/m3], linear in it.
+
+        Note:
+            Collective.
+        """
+        dim, volume = self._dim, cell_volumes(self._domain)[:, None]
+        acting, lost = (fem.Function(compat.function_space(self._domain, "DG", degree)) for degree in (0, 1))
+        for function, density in ((acting, self._pressing), (lost, self._lost)):
+            space = function.function_space
+            test = ufl.TestFunction(space)
+            form = fem.form(self._sum(lambda soil: density(soil, self._p) * test))
+            moments = self._unit * assembled(form, space).array
+            dofs = compat.cell_dofs(space)[: len(volume)]
+            of_cells = moments[dofs]
+            if function is lost:  # the inverse of the integrals of N_k N_l
+                of_cells = (dim + 1) * (dim + 2) * (of_cells - of_cells.sum(axis=1, keepdims=True) / (dim + 2))
+            function.x.array[dofs] = of_cells / volume
+        return acting, lost
 
     def forms(self, applied: Any) -> Callable[[Any, Any], tuple[Any, Any]]:
         """Further internal forces and their tangent as a function of test and trial functions, for `Kinematics`."""
@@ -152,10 +182,11 @@ class WaterTerms:
 
     def _missing(self, soil: PorousSoil, pressure: Any, v: Any) -> Any:
         """Weight of the water that pores have no more, times a test function, over the unit of pressure."""
-        if not _may_dry(soil):
-            return 0.0
-        lost = soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
-        return lost * ufl.inner(self._driving, v)
+        return self._lost(soil, pressure) * ufl.inner(self._driving, v) if _may_dry(soil) else 0.0
+
+    def _lost(self, soil: PorousSoil, pressure: Any) -> Any:
+        """Weight of the water that a volume of soil has no more, over the unit of pressure."""
+        return soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
 
     def _pores(self, soil: PorousSoil) -> Any:
         """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""

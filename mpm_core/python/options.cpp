@@ -65,6 +65,13 @@ void bind_pore_water(py::module_& m)
                    wetness_at(water.retention[static_cast<std::size_t>(material[p])], pressure[p]).saturation;
              return saturation;
            })
+      .def("acting",
+           [](const PoreWater& water, const std::vector<Index>& material, std::vector<double> pressure)
+           {
+             for (std::size_t p = 0; p < pressure.size(); ++p)
+               pressure[p] = acting_pressure(water.retention[static_cast<std::size_t>(material[p])], pressure[p]);
+             return pressure;
+           })
       .def("set_conditions",
            [](PoreWater& water, const std::vector<std::tuple<Index, TimeTable, double, bool, bool>>& conditions)
            {
