@@ -16,7 +16,7 @@ from fenics_bridge.types import Law
 from fenics_bridge.water.soils import PorousSoil
 
 MARGIN = 4
-"""Factor of the pressure projection over the least factor that suffices in uniaxial strain"""
+"""Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells cut from cubes"""
 
 
 class PressureProjection:
@@ -28,8 +28,8 @@ class PressureProjection:
     M the oedometric modulus, S = n / K_w, h the longest edge, is the least factor with which layers of simplices cut from cubes
     have, in uniaxial strain, no positive off-diagonal entry in the system of the pressures, so that these obey a maximum
     principle. But the nodes of a layer do not all move alike, which leaves 1 to 3 %. The term is therefore `MARGIN` times as
-    large, and has 3 G for M where that is less (Poisson's ratio above 1/4), as displacements that alternate from node to node
-    shear the soil.
+    large, in flat cells more by their slenderness, and has 3 G for M where that is less (Poisson's ratio above 1/4), as
+    displacements that alternate from node to node shear the soil.
 
     Args:
         domain: mesh of the body.
@@ -60,7 +60,7 @@ class PressureProjection:
             own = own[own < n]
             storage[own], density[own] = soil.porosity / modulus, soil.density or 0.0
             mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / gamma
-        self._moments = MARGIN * (dim + 1) * moments.reshape(n, -1)
+        self._moments = MARGIN * (dim + 1) * (_slenderness(corners, longest)[:, None] * moments.reshape(n, -1))
         self._storage, self._per_second = storage, 6 * mobility / longest
         self._mass = density * longest / (12 * dim)
 
@@ -84,3 +84,11 @@ class PressureProjection:
 def _resisting(law: Law) -> float:
     """Modulus [Pa] with which soil resists displacements that alternate from node to node."""
     return min(law.p_wave_modulus, 3 * law.shear_modulus)
+
+
+def _slenderness(corners: NDArray[np.float64], longest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Longest edge over smallest height of each cell, over that of cells cut from cubes, at least 1: (m,) [-]."""
+    dim = corners.shape[2]
+    inner = np.linalg.inv(corners[:, 1:] - corners[:, :1])  # columns: gradients of the shape functions but the first
+    largest = np.maximum((inner**2).sum(axis=1).max(axis=1), (inner.sum(axis=2) ** 2).sum(axis=1))
+    return np.maximum(1.0, np.sqrt(longest * largest / (2 * dim)))

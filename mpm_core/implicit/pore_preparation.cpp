@@ -13,7 +13,7 @@ namespace mpm::implicit
 {
 namespace
 {
-/// Factor of the pressure projection over the least factor that suffices in uniaxial strain.
+/// Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells cut from cubes.
 constexpr double projection_margin = 4;
 
 /// Modulus with which soil resists a compression, that with which it resists displacements that alternate from node to
@@ -118,12 +118,20 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   }
 }
 
+/// Longest edge over smallest height, over that of cells cut from cubes, at least 1: flat cells need more projection.
+template <int D>
+double slenderness(const CellShape<D>& shape, double edge_squared)
+{
+  return std::max(1.0, std::sqrt(edge_squared / (2 * D)) / smallest_altitude<D>(shape));
+}
+
 /// The projection of a linear pressure has the cell matrix V (delta_kl - 1/(D+1)) / ((D+1) (D+2)), whatever the shape.
 template <int D>
-void add_projection(const PoreSums<D>& sums, double edge_squared, double dt, PoreCell<D>& cell)
+void add_projection(const PoreSums<D>& sums, const CellShape<D>& shape, double edge_squared, double dt,
+                    PoreCell<D>& cell)
 {
   const double margin = 1.5 * sums.swung - 6 * dt * sums.least / edge_squared;
-  const double factor = projection_margin * std::max(0.0, margin) / (D + 2);
+  const double factor = projection_margin * slenderness<D>(shape, edge_squared) * std::max(0.0, margin) / (D + 2);
   for (int k = 0; k <= D; ++k)
     for (int l = 0; l <= D; ++l)
       cell.capacity[k][l] += factor * ((k == l ? 1.0 : 0.0) - 1.0 / (D + 1));
@@ -166,7 +174,7 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const PoreSums<D>& of_cell = sums[static_cast<std::size_t>(c)];
     add<D>(step.dt, of_cell.mobility, cell.flux);
     cell.compliance = of_cell.compliance;
-    add_projection<D>(of_cell, longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
+    add_projection<D>(of_cell, mesh.shapes[c], longest_edge_squared(mesh.points, mesh.cells[c]), step.dt, cell);
   }
   return nodes;
 }

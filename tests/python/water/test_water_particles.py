@@ -59,8 +59,8 @@ def test_a_loaded_column_consolidates_as_terzaghi_has_it(dim, cells, tolerance):
 
 
 @pytest.mark.parametrize("nmd", [False, True])
-@pytest.mark.parametrize("poisson", [0.3, 0.45])
-@pytest.mark.parametrize("cells", [12, 20])  # nearly squares; twice as long as high
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.45])
+@pytest.mark.parametrize("cells", [12, 20, 40])  # nearly squares; two and four times as long as high
 @pytest.mark.parametrize("ratio", [1e-6, 0.1, 0.5, 1.0, 10.0])
 def test_the_first_step_does_not_overshoot(ratio, cells, poisson, nmd):
     column = Column(cells, law=mpm.LinearElastic(young=10e6, poisson=poisson))
