@@ -52,6 +52,8 @@ class AppliedBoundary:
         self._dim = space.mesh.geometry.dim
         self.height = space.tabulate_dof_coordinates()[:, self._dim - 1]
         """Elevation of the dofs of this rank [m], ghosts included, shape (m,)"""
+        highest = space.mesh.comm.allgather(float(np.abs(self.height).max(initial=0.0)))
+        self._rounding = 1e-12 * max(highest)  # by which the coordinates of nodes at a level may miss it
         self.held: list[_Held] = []
         """The conditions where they hold"""
 
@@ -116,7 +118,7 @@ class AppliedBoundary:
         for condition, dofs in ((held.condition, held.dofs) for held in self.held):
             if isinstance(condition, (Head, Reservoir)):
                 level = value_at(condition.level, time)
-                below = dofs if isinstance(condition, Head) else dofs[self.height[dofs] <= level]
+                below = dofs if isinstance(condition, Head) else dofs[self.height[dofs] <= level + self._rounding]
                 free = dofs[~fixed[dofs]] if isinstance(condition, Reservoir) else dofs[:0]
                 upper[free] = np.minimum(upper[free], 0.0)
                 below = below[~fixed[below]]
