@@ -17,7 +17,14 @@ from time import perf_counter
 
 import numpy as np
 from common.consolidation_particles import ParticleGround, near_line
-from common.consolidation_plots import EXCESS, ExcessPicture, save_excess, save_isochrones, save_over_time
+from common.consolidation_plots import (
+    EXCESS,
+    ExcessPicture,
+    save_excess,
+    save_excess_film,
+    save_isochrones,
+    save_over_time,
+)
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
 from common.consolidation_stages import pressures_of
 from common.field_files import FieldFiles
@@ -74,6 +81,9 @@ def parser() -> ArgumentParser:
     add_switch(
         p, "--nmd", True, "average volumetric strains of linear elements and particles over nodes, against locking"
     )
+    add_switch(
+        p, "--film", True, "draw a film of the excess pore pressure and the settlement, with a frame of each step"
+    )
     add_flag(p, "--particles", "compute implicit particles as well; the reservoirs must keep the ground under water")
     add_particles_per_cell(p, 3)
     return p
@@ -86,7 +96,12 @@ class Files(FieldFiles):
     """Files that are written during the run: frames for ParaView, and the history of the settlements."""
 
     def __init__(
-        self, model: water.Consolidation, site: ConsolidationSite, folder: Path, particles: ParticleGround | None
+        self,
+        model: water.Consolidation,
+        site: ConsolidationSite,
+        folder: Path,
+        particles: ParticleGround | None,
+        filmed: bool,
     ) -> None:
         self._model, self._names, self.particles = model, list(site.points), particles
         self._places = np.array(list(site.points.values())) if comm.rank == 0 else np.empty((0, 2))
@@ -99,6 +114,8 @@ class Files(FieldFiles):
             columns += ["largest_excess_pressure_particles_Pa"]
         super().__init__(model.domain, folder / "consolidation", folder / "history.csv", columns)
         self.pictures: list[ExcessPicture | None] = []
+        self.film: list[ExcessPicture | None] = []
+        self._filmed = filmed
 
     def row(self, report: water.ConsolidationReport | None = None) -> None:
         """Add settlements and the largest excess pressure to the history. Collective."""
@@ -115,6 +132,8 @@ class Files(FieldFiles):
             values["largest_excess_pressure_particles_Pa"] = self.particles.largest_excess()
         error = report.water_error if report else 0.0
         self.history.add(time_days=model.time / DAY, largest_excess_pressure_Pa=largest, water_error_m2=error, **values)
+        if self._filmed:
+            self.film.append(self._picture())
 
     def frame(self) -> None:
         """Add pressures, displacement and stress to the files for ParaView, and a picture. Collective."""
@@ -126,12 +145,15 @@ class Files(FieldFiles):
         fields = {"displacement": there["u"], "pore_pressure": there["p"][:, 0], "excess_pore_pressure": there["excess"][:, 0],
                   "effective_stress": there["stress"]}  # fmt: skip
         self.output.write(model.time, fields, {})
-        excess, moved = self._that_is_there(gathered(self._excess)), gathered(model.displacement)
-        days = model.time / DAY
         if self.particles is not None:
-            self.particles.frame(days)
-        name = f"After {in_days(model.time)}"
-        self.pictures.append(None if excess is None or moved is None else ExcessPicture(name, excess, moved.values))
+            self.particles.frame(model.time / DAY)
+        self.pictures.append(self._picture())
+
+    def _picture(self) -> ExcessPicture | None:
+        """Excess pressures and displacements now; None but on the first rank. Collective."""
+        excess, moved = self._that_is_there(gathered(self._excess)), gathered(self._model.displacement)
+        name = f"After {in_days(self._model.time)}"
+        return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values)
 
     def _that_is_there(self, field: Field | None) -> Field | None:
         """A field on the first rank without the cells of soil that is not there now. Collective."""
@@ -177,7 +199,7 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
 
 
 def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
-    """Excess pressures at the frames; settlements and the largest excess pressure over the logarithm of time."""
+    """Excess pressures at the frames and in a film; settlements and the largest excess pressure over the logarithm of time."""
     shown, history = [picture for picture in files.pictures if picture is not None], files.history
     days = history["time_days"][1:]
     settled = {name: 1e3 * history[f"settlement_{name}_m"][1:] for name in site.points}
@@ -199,6 +221,9 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
             folder / "largest_excess.png", days, largest, "Largest excess pore pressure [kPa]", False, largest_theirs
         ),
     }
+    moving = [picture for picture in files.film if picture is not None]
+    if len(moving) > 1:
+        pictures["film"] = lambda: save_excess_film(folder / "film", moving)
     if theirs:
         frame = max(theirs, key=lambda frame: frame[PORE].max())
         pictures["particles_excess.png"] = lambda: save_particles(
@@ -229,7 +254,7 @@ def main(arguments: list[str] | None = None) -> int:
         particles = None
         if a.particles:
             particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, a.nmd, folder))
-        files = stack.enter_context(Files(model, site, folder, particles))
+        files = stack.enter_context(Files(model, site, folder, particles, a.film))
         files.row()
         stopped = follow(a, site, model, files)
     history = files.history

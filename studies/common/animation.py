@@ -19,6 +19,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
 from PIL import Image
 
 from .files import expendable
@@ -122,6 +123,28 @@ def save_film(
     with expendable(path) as aside:
         (_save_mp4 if has_ffmpeg else _save_gif)(aside, pictures_of(counted("film, frames", shown)), rate)
     return path
+
+
+def save_figure_film(path: Path, frames: Sequence[T], figure_of: Callable[[T], Figure]) -> Path:
+    """Write a film of figures of one size; see `save_film`.
+
+    Args:
+        frames: in the order shown, at least one.
+        figure_of: draws the figure of a frame.
+    """
+
+    def pixels(shown: Iterable[T]) -> Iterator[np.ndarray]:
+        with paper_style():
+            for frame in shown:
+                figure = figure_of(frame)
+                canvas = FigureCanvasAgg(figure)
+                figure.set_dpi(150)
+                canvas.draw()
+                drawn = np.asarray(canvas.buffer_rgba())
+                yield drawn[: len(drawn) // 2 * 2, : drawn.shape[1] // 2 * 2].copy()
+                plt.close(figure)
+
+    return save_film(path, frames, pixels)
 
 
 def _pictures(

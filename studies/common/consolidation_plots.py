@@ -9,11 +9,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
+from .animation import save_figure_film
 from .field_plots import Field
 from .figures import save_figure
 from .plots import CURVES, ROUND_TICKS, Quantity, paper_style
@@ -30,50 +33,74 @@ class ExcessPicture:
     moved: np.ndarray
 
 
+@dataclass(frozen=True)
+class ExcessScale:
+    """What pictures of one run have in common: limits of the excess pressure as shown, and a factor of the displacements."""
+
+    limits: tuple[float, float]
+    enlarged: float
+
+    @classmethod
+    def of(cls, pictures: Sequence[ExcessPicture]) -> ExcessScale:
+        """The largest displacement is a twentieth of the ground's height."""
+        height = np.ptp(pictures[0].excess.points[:, 1])
+        largest = max(np.abs(picture.moved).max() for picture in pictures)
+        every = np.concatenate([EXCESS.scale * picture.excess.values[:, 0] for picture in pictures])
+        # What falls below zero by a little takes its colour.
+        least = 0.0 if every.min() > -0.03 * every.max() else every.min()
+        ticks = ROUND_TICKS.tick_values(least, max(every.max(), least + 1e-6))
+        return cls((ticks[0], ticks[-1]), float(f"{0.05 * height / largest:.1g}") if largest > 0 else 1.0)
+
+
 def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
-    """Panels with one scale, side by side where the ground is higher than wide; displacements are enlarged to a twentieth of
-    the picture's height."""
+    """Draw panels with one scale, side by side where the ground is higher than wide."""
+    with paper_style():
+        save_figure(_excess_figure(pictures, ExcessScale.of(pictures)), path, bbox_inches="tight", pad_inches=0.06)
+
+
+def save_excess_film(path: Path, pictures: Sequence[ExcessPicture]) -> Path:
+    """Draw a film with one scale; the suffix is that of `save_film`."""
+    scale = ExcessScale.of(pictures)
+    return save_figure_film(path, pictures, lambda picture: _excess_figure([picture], scale))
+
+
+def _excess_figure(pictures: Sequence[ExcessPicture], scale: ExcessScale) -> Figure:
     points = pictures[0].excess.points
     low, high = points.min(axis=0), points.max(axis=0)
-    largest = max(np.abs(picture.moved).max() for picture in pictures)
-    enlarged = float(f"{0.05 * (high[1] - low[1]) / largest:.1g}") if largest > 0 else 1.0
-    every = np.concatenate([EXCESS.scale * picture.excess.values[:, 0] for picture in pictures])
-    least = (
-        0.0 if every.min() > -0.03 * every.max() else every.min()
-    )  # what falls below zero by a little takes its colour
-    ticks = ROUND_TICKS.tick_values(least, max(every.max(), least + 1e-6))
-    limits, levels = (ticks[0], ticks[-1]), np.linspace(ticks[0], ticks[-1], 21)
-    aspect, count = (high[1] - low[1]) / (high[0] - low[0]), len(pictures)
-    rows, columns, size = (count, 1, (6.9, count * (5.6 * aspect + 0.4) + 0.4))
+    aspect, count, levels = (high[1] - low[1]) / (high[0] - low[0]), len(pictures), np.linspace(*scale.limits, 21)
+    rows, columns, size = (count, 1, (6.9, count * (5.8 * aspect + 0.4) + 0.5))
     if aspect > 1:
         rows, columns, size = 1, count, (count * (4.0 / aspect + 0.5) + 1.0, 4.8)
-    with paper_style():
-        figure, panels = plt.subplots(
-            rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
-        )
-        for axes, picture in zip(panels.ravel(), pictures):
-            field = picture.excess
-            moved = field.points + enlarged * picture.moved
-            triangles = Triangulation(*moved.T, field.cells)
-            values = EXCESS.scale * field.values[:, 0]
-            axes.tricontourf(triangles, values, levels, cmap=EXCESS.colours, extend="both")
-            if values.min() < levels[1] < values.max():
-                axes.tricontour(triangles, values, levels[1:-1], colors="black", linewidths=0.3, alpha=0.6)
-            segments = Field(moved, field.cells, field.values).outline
-            axes.add_collection(LineCollection(segments, colors="black", linewidths=0.8))
-            axes.set_title(picture.name, loc="left", pad=3, fontsize=9)
-            axes.set(aspect="equal", xlim=(low[0], high[0]))
-            axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
-        figure.suptitle(f"Displacements {enlarged:g} times", fontsize=9)
-        for axes in panels[-1]:
-            axes.set_xlabel("$x$ [m]")
-        for axes in panels[:, 0]:
-            axes.set_ylabel("$y$ [m]")
-        bar = figure.colorbar(
-            ScalarMappable(Normalize(*limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01
-        )
-        bar.set_label(EXCESS.label)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+    figure, panels = plt.subplots(
+        rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
+    )
+    for axes, picture in zip(panels.ravel(), pictures):
+        _draw_excess(axes, picture, scale.enlarged, levels)
+        axes.set(aspect="equal", xlim=(low[0], high[0]))
+        axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
+    figure.suptitle(f"Displacements {scale.enlarged:g} times", fontsize=9)
+    for axes in panels[-1]:
+        axes.set_xlabel("$x$ [m]")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("$y$ [m]")
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(*scale.limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01
+    )
+    bar.set_label(EXCESS.label)
+    return figure
+
+
+def _draw_excess(axes: Axes, picture: ExcessPicture, enlarged: float, levels: np.ndarray) -> None:
+    """Excess pressure on the ground as it has moved, and its outline."""
+    field = picture.excess
+    moved = field.points + enlarged * picture.moved
+    triangles, values = Triangulation(*moved.T, field.cells), EXCESS.scale * field.values[:, 0]
+    axes.tricontourf(triangles, values, levels, cmap=EXCESS.colours, extend="both")
+    if values.min() < levels[1] < values.max():
+        axes.tricontour(triangles, values, levels[1:-1], colors="black", linewidths=0.3, alpha=0.6)
+    segments = Field(moved, field.cells, field.values).outline
+    axes.add_collection(LineCollection(segments, colors="black", linewidths=0.8))
+    axes.set_title(picture.name, loc="left", pad=3, fontsize=9)
 
 
 def save_isochrones(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
@@ -19,7 +18,7 @@ import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
-from .animation import save_film
+from .animation import save_figure_film
 from .field_plots import Field, gathered
 from .figures import save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
@@ -92,19 +91,7 @@ def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = 
 def save_flow_film(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> Path:
     """Draw a film of flows in time, with one scale of the quantity; the suffix is that of `save_film`."""
     scales = _scales(pictures, quantity)
-
-    def pixels(shown: Iterable[FlowPicture]) -> Iterator[np.ndarray]:
-        with paper_style():
-            for picture in shown:
-                figure = _figure([picture], quantity, scales)
-                canvas = FigureCanvasAgg(figure)
-                figure.set_dpi(150)
-                canvas.draw()
-                drawn = np.asarray(canvas.buffer_rgba())
-                yield drawn[: len(drawn) // 2 * 2, : drawn.shape[1] // 2 * 2].copy()
-                plt.close(figure)
-
-    return save_film(path, pictures, pixels)
+    return save_figure_film(path, pictures, lambda picture: _figure([picture], quantity, scales))
 
 
 def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[tuple[float, float], float]:
@@ -120,7 +107,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[t
     low, high = points.min(axis=0), points.max(axis=0)
     limits, fastest = scales
     aspect, levels = (high[1] - low[1]) / (high[0] - low[0]), np.linspace(*limits, 21)
-    figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.6 * aspect + 0.35) + 0.4), sharex=True,
+    figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.8 * aspect + 0.35) + 0.4), sharex=True,
                                   squeeze=False, layout="constrained")  # fmt: skip
     for axes, picture in zip(panels[:, 0], pictures):
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)

@@ -24,8 +24,10 @@ CAPTIONS = {
 MOST_PANELS = 4
 
 
-def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[str, float]) -> Pictures:
-    """Draw all pictures of a slope in time; limits: factors of safety by name, drawn as lines. Collective."""
+def slope_pictures(
+    folder: Path, instants: Sequence[Instant], limits: Mapping[str, float], film: bool = True
+) -> Pictures:
+    """Draw all pictures of a slope in time; limits: factors of safety by name, drawn as lines; film: of the flow too. Collective."""
     worst = lowest(list(instants))
     field: Field | None = mechanism_field(worst.safety.mechanism)
     if field is None:
@@ -36,7 +38,7 @@ def slope_pictures(folder: Path, instants: Sequence[Instant], limits: Mapping[st
     saturation = {"saturation": lambda: save_flow(folder / "saturation.png", shown, SATURATION)} if dries(shown) else {}
     return {
         **saturation,
-        "flow": lambda: save_flow_film(folder / "flow", moving, PRESSURE),
+        **({"flow": lambda: save_flow_film(folder / "flow", moving, PRESSURE)} if film else {}),
         "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
         "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),
         "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),

@@ -68,6 +68,6 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     fails = "stands" if failed is None else f"fails after {in_days(failed)}"
     lines = [f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {in_days(worst.time)}"]
     lines += [f"{name}: {value:.3f}" for name, value in values.items()]
-    drawn = slope_pictures(folder, instants, values) | pictures
+    drawn = (slope_pictures(folder, instants, values, a.film) | pictures) if a.pictures else {}
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)

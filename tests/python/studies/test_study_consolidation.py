@@ -149,6 +149,7 @@ def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path):
     for one in found:
         assert np.abs(one - expected).max() < 0.01 * expected.max()
     assert all(np.abs(days / DAYS - corner).min() < 1e-8 for corner in (0.1, 0.3, 0.4, 0.6))  # where steps end
+    assert len(list((tmp_path / "results").glob("film.*"))) == 1
 
 
 STAGES = """
@@ -246,7 +247,7 @@ def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     period = height**2 * 9810.0 / (k * oedometer) / 86400  # days
     folder = tmp_path / "results"
     arguments = ["--site", tmp_path / "layer.toml", "--elements", elements, "--days", period, "--first-step", 1e-3 * period,
-                 "--growth", 1.1, "--frames", 2, "--particles", "--output", folder]  # fmt: skip
+                 "--growth", 1.1, "--frames", 2, "--no-film", "--particles", "--output", folder]  # fmt: skip
     assert consolidation.main([str(word) for word in arguments]) == 0
     with open(folder / "history.csv", newline="") as file:
         columns = ("time_days", "settlement_middle_m", "settlement_middle_particles_m")
@@ -258,6 +259,7 @@ def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
         assert found[late] * oedometer / (load * height) == pytest.approx(np.array(exact)[late], abs=0.02)
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["largest_water_error_m2"] < 1e-10 * load * height / oedometer
+    assert (folder / "settlement.png").exists() and not list(folder.glob("film.*"))
     assert summary["largest_excess_pressure_Pa"] == pytest.approx(load, rel=0.01 if elements == "P1-P1" else 0.1)
 
 

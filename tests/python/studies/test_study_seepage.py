@@ -86,3 +86,12 @@ def test_the_history_of_a_drawdown_balances(tmp_path):
     change, came = np.diff(rows["stored_water_m2"]), np.diff(rows["time_days"]) * inflow[1:]
     assert came == pytest.approx(change, abs=1e-6 * rows["stored_water_m2"][0])
     assert rows["stored_water_m2"][-1] < rows["stored_water_m2"][0]
+    assert len(list(folder.glob("film.*"))) == 1
+
+
+def test_no_film_writes_none(tmp_path):
+    import seepage
+
+    folder = tmp_path / "results"
+    assert seepage.main(["--cell-size", "4", "--days", "5", "--frames", "1", "--no-film", "--output", str(folder)]) == 0
+    assert (folder / "seepage_in_time.png").exists() and not list(folder.glob("film.*"))

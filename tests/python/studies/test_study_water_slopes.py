@@ -96,6 +96,8 @@ def test_the_slide_begins_in_equilibrium_and_gathers_speed(water, tmp_path):
     assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_fraction"] == 0.0
     moved = np.genfromtxt(tmp_path / "results" / "history.csv", delimiter=",", names=True)["largest_displacement_m"]
     assert moved[0] == 0.0 and np.all(np.diff(moved, 2) > 0) and moved[-1] > 0.1
+    drawn = {path.stem for path in (tmp_path / "results").iterdir()}
+    assert "pore_pressure" in drawn and not drawn & {"flow", "slide"}  # these are films
 
 
 def test_a_slope_that_stands_does_not_slide(tmp_path):
@@ -103,6 +105,7 @@ def test_a_slope_that_stands_does_not_slide(tmp_path):
     summary, rows = run("drawdown", path, tmp_path, "--days 3 --slide")
     assert rows["factor_of_safety"].min() > 1 and summary["failure_time_days"] is None
     assert "largest_displacement_m" not in summary
+    assert len(list((tmp_path / "results").glob("flow.*"))) == 1
 
 
 # --- rain ------------------------------------------------------------------------------------------------------------
