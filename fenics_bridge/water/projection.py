@@ -16,7 +16,10 @@ from fenics_bridge.types import Law
 from fenics_bridge.water.soils import PorousSoil
 
 MARGIN = 4
-"""Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells cut from cubes"""
+"""Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells that are not flat"""
+
+REGULAR = 2.5
+"""Longest edge over smallest height up to which cells need no more: of squares and cubes cut into cells, 2 and 2.45"""
 
 
 class PressureProjection:
@@ -87,8 +90,7 @@ def _resisting(law: Law) -> float:
 
 
 def _slenderness(corners: NDArray[np.float64], longest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Longest edge over smallest height of each cell, over that of cells cut from cubes, at least 1: (m,) [-]."""
-    dim = corners.shape[2]
+    """Longest edge over smallest height of each cell, over `REGULAR`, at least 1: (m,) [-]."""
     inner = np.linalg.inv(corners[:, 1:] - corners[:, :1])  # columns: gradients of the shape functions but the first
     largest = np.maximum((inner**2).sum(axis=1).max(axis=1), (inner.sum(axis=2) ** 2).sum(axis=1))
-    return np.maximum(1.0, np.sqrt(longest * largest / (2 * dim)))
+    return np.maximum(1.0, np.sqrt(longest * largest) / REGULAR)

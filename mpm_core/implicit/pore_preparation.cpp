@@ -13,7 +13,8 @@ namespace mpm::implicit
 {
 namespace
 {
-/// Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells cut from cubes.
+/// Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells that are not
+/// flat.
 constexpr double projection_margin = 4;
 
 /// Modulus with which soil resists a compression, that with which it resists displacements that alternate from node to
@@ -118,11 +119,14 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   }
 }
 
-/// Longest edge over smallest height, over that of cells cut from cubes, at least 1: flat cells need more projection.
+/// Longest edge over smallest height up to which cells need no more: of squares and cubes cut into cells, 2 and 2.45.
+constexpr double regular_cell = 2.5;
+
+/// Longest edge over smallest height, over that, at least 1: flat cells need more projection.
 template <int D>
 double slenderness(const CellShape<D>& shape, double edge_squared)
 {
-  return std::max(1.0, std::sqrt(edge_squared / (2 * D)) / smallest_altitude<D>(shape));
+  return std::max(1.0, std::sqrt(edge_squared) / (regular_cell * smallest_altitude<D>(shape)));
 }
 
 /// The projection of a linear pressure has the cell matrix V (delta_kl - 1/(D+1)) / ((D+1) (D+2)), whatever the shape.
