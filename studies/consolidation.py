@@ -179,7 +179,7 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
                 files.row(report)
                 progress.show(model.time / DAY, len(files.history))
 
-        site.change(model, 0.0)
+        begin_stage(site, model, files, 0.0)
         for time in sorted(frames | {change for change in changes if change < max(frames)}):
             try:
                 reports = model.run(time, dt, a.growth, progress=made)
@@ -191,8 +191,19 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
             if time in frames:
                 files.frame()
             if time in changes:
-                site.change(model, time)
+                begin_stage(site, model, files, time)
     return None
+
+
+def begin_stage(site: ConsolidationSite, model: water.Consolidation, files: Files, time: float) -> None:
+    """Begin the stage of a time [s], if one begins then. Collective."""
+    stage = site.stage_at(time)
+    if stage is None:
+        return
+    model.boundary = list(stage.boundary.values())
+    model.reconfigure(off=stage.off, duration=stage.duration)
+    if files.particles is not None:
+        files.particles.begin(stage)
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from fenics_bridge.water.consolidation import Consolidation
 from fenics_bridge.water.consolidation_step import ConsolidationReport
 from fenics_bridge.water.coupled import Element
 from fenics_bridge.water.motion import Newmark
-from fenics_bridge.water.particles import apply_reservoirs
+from fenics_bridge.water.particles import WATERLESS, apply_reservoirs, waterless_facets
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import PorousSoil, dipping
@@ -28,8 +28,10 @@ __all__ = [
     "SeepageFace",
     "Tabulated",
     "VanGenuchten",
+    "WATERLESS",
     "apply_reservoirs",
     "dipping",
     "ground_line",
     "standing_water",
+    "waterless_facets",
 ]

@@ -11,8 +11,10 @@ from mpm_core.output import PARTICLE_FIELDS, ModelOutput
 from fenics_bridge import water
 
 from .consolidation_site import ConsolidationSite
+from .consolidation_stages import GroundStage
 from .movie import PORE, frame_of
 from .scenes import scene_of
+from .slope_case import GRAVITY
 from .wet_particles import SmallMotion
 
 WATER_FIELDS = ("pore_pressure", "excess_pore_pressure", "porosity", "conductivity")
@@ -35,7 +37,11 @@ class ParticleGround:
         self, site: ConsolidationSite, fem: water.Consolidation, per_cell: int, nmd: bool, folder: Path
     ) -> None:
         self.model = site.particles(fem, per_cell, nmd)
-        self._site, self._steps = site, SmallMotion(self.model, nmd)
+        self._site, self._steps, self._per_cell = site, SmallMotion(self.model, nmd), per_cell
+        self._stage = site.stages[0]
+        self._held: list[
+            tuple[int, float]
+        ] = []  # first number of particles, and part of their weight that is held at first
         self._places = np.array(list(site.points.values()))
         self.model.add_field("initial_pore_pressure", unit="Pa", meaning="Pore pressure at the beginning")
         self.model.add_field("excess_pore_pressure", unit="Pa", meaning="Pore pressure above that at the beginning")
@@ -44,7 +50,7 @@ class ParticleGround:
         self.scene = scene_of(self.model, np.unique(self.model.mesh.cell_tags))
         """The mesh behind the particles, on the first rank"""
         self.count = self.model.comm.allreduce(len(self.model.particles))
-        """Number of the particles"""
+        """Number of the particles, at most"""
         self.frames: list[dict[str, np.ndarray] | None] = []
         self.iterations = 0
         """Most iterations of a step"""
@@ -55,9 +61,41 @@ class ParticleGround:
         Raises:
             RunError: the particles cannot.
         """
-        self._site.load_particles(self.model, time)
+        self._site.load_particles(self.model, time, self._stage)
+        self._hold(time)
         for report in self._steps.advance(time, dt):
             self.iterations = max(self.iterations, report.iterations)
+
+    def begin(self, stage: GroundStage) -> None:
+        """Place and dig away the soil of a stage."""
+        model, site, p = self.model, self._site, self.model.particles
+        gone = [tag for soil in stage.off if soil not in self._stage.off for tag in model.mesh.tags_of("cell", soil)]
+        model.remove(np.isin(model.mesh.cell_tags[p.cell], gone))
+        held = self._still_held(stage.start)
+        self._held = [(number, part * held) for number, part in self._held] + [(model._next_id, 1.0)]
+        for soil in self._stage.off:
+            if soil not in stage.off:
+                first = model._next_id
+                site.seed(model, soil, self._per_cell)
+                new = p.id >= first
+                for name, value in zip(("porosity", "conductivity"), site.pores(soil)):
+                    p.set(name, np.where(new, value, getattr(p, name)))
+        self.count = max(self.count, model.comm.allreduce(len(p)))
+        self._stage = stage
+
+    def _still_held(self, time: float) -> float:
+        """Part of what was held when the stage began that is held at a time [s]."""
+        stage = self._stage
+        return max(0.0, 1 - (time - stage.start) / stage.duration) if stage.duration > 0 else 0.0
+
+    def _hold(self, time: float) -> None:
+        """Let the weight of soil that is placed come in equal parts over the time that the stage takes."""
+        p, part = self.model.particles, np.zeros(len(self.model.particles))
+        for number, held in self._held:  # by rising number
+            part[p.id >= number] = held
+        force = np.zeros_like(p.position)
+        force[:, 1] = self._still_held(time) * part * GRAVITY * p.mass
+        p.set("traction", force)
 
     def settlements(self) -> np.ndarray:
         """Settlements of the points of the site [m], shape (n,)."""

@@ -68,14 +68,9 @@ class ConsolidationSite:
         """Times [s] at which loads, levels or soils change their rate; those that follow within `apart` [s] make a jump."""
         return corners_of(self.pressures.values(), self.stages, apart)
 
-    def change(self, model: water.Consolidation, time: float) -> str | None:
-        """Begin the stage of a time [s], if one begins then; returns its name. Collective."""
-        for stage in self.stages[1:]:
-            if np.isclose(stage.start, time, rtol=1e-9, atol=0.0):
-                model.boundary = list(stage.boundary.values())
-                model.reconfigure(off=stage.off, duration=stage.duration)
-                return stage.name
-        return None
+    def stage_at(self, time: float) -> GroundStage | None:
+        """The stage that begins at a time [s], after the beginning; None where none does."""
+        return next((one for one in self.stages[1:] if np.isclose(one.start, time, rtol=1e-9, atol=0.0)), None)
 
     def load(self, time: float) -> bridge.Load:
         """Weights and pressures at a time [s]."""
@@ -126,35 +121,64 @@ class ConsolidationSite:
         Steps in small displacements make forces of stresses as the elements do; where quadratic elements leave something out of
         balance, it is brought to rest, and pore pressures stay.
 
+        Soil without conductivity has pore water too, without pressure (`water.waterless_facets`).
+
         Raises:
-            InputError: the water has a boundary condition other than reservoirs, or the site has stages or soil without water.
+            InputError: the water has a boundary condition other than reservoirs, or a stage places soil with conductivity, or digs
+                soil away in the course of time.
         """
-        if len(self.stages) > 1 or None in self.soils.values():
-            raise mpm.InputError("particles: the site has stages or soil without conductivity, expected soil with water that is "
-                                 "there all the time; describe a fill by its pressure, in [pressures]")  # fmt: skip
-        model = mpm.Model(bridge.background_mesh(*self.mesh), list(self.laws.values()))
-        for k, (soil, weight) in enumerate(self.unit_weight.items()):
-            for tag in model.mesh.tags_of("cell", soil):
-                model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=k)
+        self._require_stages_of_particles()
+        dry = [soil for soil, porous in self.soils.items() if porous is None]
+        facet_tags = water.waterless_facets(*self.mesh, dry) if dry else self.mesh[2]
+        model = mpm.Model(bridge.background_mesh(*self.mesh[:2], facet_tags), list(self.laws.values()))
+        there = [soil for soil in self.laws if soil not in self.stages[0].off]
+        for soil in there:
+            self.seed(model, soil, per_cell)
         bridge.apply_supports(model, self.supports)
         model.set_gravity((0.0, -GRAVITY))
         anisotropy = [
-            soil.conductivity / np.ravel(soil.conductivity)[-1] if np.ndim(soil.conductivity) else None
+            soil.conductivity / np.ravel(soil.conductivity)[-1]
+            if soil is not None and np.ndim(soil.conductivity)
+            else None
             for soil in self.soils.values()
         ]
+        pores = {soil: self.pores(soil) for soil in there}
         model.add_water(
-            porosity={name: soil.porosity for name, soil in self.soils.items()},
-            conductivity={name: float(np.ravel(soil.conductivity)[-1]) for name, soil in self.soils.items()},
+            porosity={soil: porosity for soil, (porosity, _) in pores.items()},
+            conductivity={soil: conductivity for soil, (_, conductivity) in pores.items()},
             anisotropy=anisotropy if any(factors is not None for factors in anisotropy) else None,
         )
-        self.load_particles(model, fem.time)
+        if dry:
+            model.hold_pore_pressure(water.WATERLESS, 0.0)
+        self.load_particles(model, fem.time, self.stages[0])
         bridge.initialise(model, fem, equilibrate=False)
         model.equilibrate(nmd=nmd, small_displacements=True, tolerance=BALANCED)
         return model
 
-    def load_particles(self, model: mpm.Model, time: float) -> None:
-        """Give particles the reservoirs and the pressures of a time [s]. Collective."""
-        water.apply_reservoirs(model, self.boundary, time)
+    def seed(self, model: mpm.Model, soil: str, per_cell: int) -> None:
+        """Place the particles of a soil. Collective."""
+        density, law = self.unit_weight[soil] / GRAVITY, list(self.laws).index(soil)
+        for tag in model.mesh.tags_of("cell", soil):
+            model.seed(density=density, per_cell=per_cell, cell_tag=tag, material=law)
+
+    def pores(self, soil: str) -> tuple[float, float]:
+        """Porosity [-] and vertical conductivity [m/s] of particles; those of another soil where it has none."""
+        porous = self.soils[soil] or next(one for one in self.soils.values() if one is not None)
+        return porous.porosity, float(np.ravel(porous.conductivity)[-1])
+
+    def _require_stages_of_particles(self) -> None:
+        for before, stage in zip(self.stages, self.stages[1:]):
+            wet = [soil for soil in before.off if soil not in stage.off and self.soils[soil] is not None]
+            if wet:
+                raise mpm.InputError(f"particles: stage {stage.name!r} places {wet[0]!r}, which has a conductivity; expected soil "
+                                     "that holds no water, or the pressure of a fill in [pressures]")  # fmt: skip
+            if stage.duration > 0 and any(soil not in before.off for soil in stage.off):
+                raise mpm.InputError(f"particles: stage {stage.name!r} digs soil away in {stage.duration / DAY:g} days, expected "
+                                     "a duration of 0")  # fmt: skip
+
+    def load_particles(self, model: mpm.Model, time: float, stage: GroundStage) -> None:
+        """Give particles the reservoirs of a stage and the pressures, at a time [s]. Collective."""
+        water.apply_reservoirs(model, stage.boundary.values(), time)
         for tag, given in self.pressures.items():
             model.press_surface(tag, value_at(given, time))
 

@@ -92,3 +92,18 @@ def test_soil_is_placed_and_removed_alike_on_any_number_of_ranks():
         )  # fmt: skip
     assert np.abs(results[0]).max() > 1.0
     assert results[1] == pytest.approx(results[0], rel=1e-6, abs=1e-6)
+
+
+def test_facets_of_soil_without_water_are_those_that_touch_no_wet_soil():
+    """Of two dry rows of cells on two wet ones: untagged edges between the nodes of the upper two heights, on any ranks."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 4))
+    cells = domain.topology.index_map(2)
+    tags = np.ones(cells.size_local + cells.num_ghosts, dtype=np.int32)
+    tags[locate_entities(domain, 2, lambda x: x[1] > 0.5 - 1e-9)] = 2
+    cell_tags = meshtags(domain, 2, np.arange(len(tags), dtype=np.int32), tags)
+    found = water.waterless_facets(domain, cell_tags, facet_tags, [2])
+    (number,) = found.names[water.WATERLESS]
+    own = domain.topology.index_map(1).size_local
+    assert domain.comm.allreduce(int(np.sum((found.values == number) & (found.indices < own)))) == 2 + 1 + 2
+    kept = np.isin(found.indices, facet_tags.indices)
+    assert np.array_equal(found.values[kept], facet_tags.values)

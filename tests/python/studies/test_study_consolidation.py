@@ -175,13 +175,14 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
     last = f"[[stages]]\nday = {0.6 * DAYS}\nexcavate = ['second']\nname = 'dug away'\n"
     (tmp_path / "layer.toml").write_text(CLAY + STAGES + "".join(stages) + last)
     arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,
-                 "--frames", 2, "--output", tmp_path / "results"]  # fmt: skip
+                 "--frames", 2, "--particles", "--output", tmp_path / "results"]  # fmt: skip
     assert consolidation.main([str(word) for word in arguments]) == 0
-    days, found = _history(tmp_path / "results", "time_days", "settlement_middle_m")
+    days, *both = _history(tmp_path / "results", "time_days", "settlement_middle_m", "settlement_middle_particles_m")
     ramps = [(0.1, 0.2, 4e3), (0.4, 0.5, 4e3), (0.6, 0.60001, -4e3)]
     expected = _settled(days / DAYS, ramps)
-    assert np.abs(found[days < 0.1 * DAYS]).max() < 1e-9 * expected.max()
-    assert np.abs(found - expected).max() < 0.01 * expected.max()
+    for found in both:
+        assert np.abs(found[days < 0.1 * DAYS]).max() < 1e-9 * expected.max()
+        assert np.abs(found - expected).max() < 0.01 * expected.max()
 
 
 @pytest.mark.parametrize(
@@ -213,6 +214,29 @@ def test_wrong_stages_are_named(stages, words, tmp_path):
     (tmp_path / "layer.toml").write_text(f"{CLAY}{STAGES}[[stages]]\n{stages}\n")
     with pytest.raises(InputError, match=words):
         read_consolidation_site(tmp_path / "layer.toml", MPI.COMM_SELF).at_rest(water.Element.STABILISED)
+
+
+@pytest.mark.parametrize(
+    "change, stage, words",
+    [
+        (
+            ("[soils.first]", "[soils.first]\nconductivity = 1e-6"),
+            "fill = ['first', 'second']",
+            "'first, second' places 'first', which has a conductivity",
+        ),
+        (("", ""), "excavate = 'second'\nduration = 2.0", "'second' digs soil away in 2 days, expected a duration of 0"),
+    ],
+)
+def test_stages_that_particles_cannot_follow_are_named(change, stage, words, tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    _write_layer(tmp_path, (2.0, 2.2, 2.4))
+    (tmp_path / "layer.toml").write_text(f"{CLAY}{STAGES.replace(*change)}[[stages]]\nday = 1.0\n{stage}\n")
+    ground = read_consolidation_site(tmp_path / "layer.toml", MPI.COMM_SELF)
+    with pytest.raises(InputError, match=f"particles: stage {words}"):
+        ground.particles(ground.at_rest(water.Element.STABILISED), 3)
 
 
 @pytest.mark.parametrize(
