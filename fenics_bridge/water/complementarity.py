@@ -26,7 +26,7 @@ class BoundedProblem:
 
     Args:
         form: F, UFL.
-        tangents: UFL bilinear forms, the exact one first, then those to fall back on.
+        tangents: UFL bilinear forms, the exact one first, then those to fall back on where it fails without a line search and with one.
         unknown: function u.
         options_prefix: prefix of the PETSc options of the solver.
     """
@@ -57,11 +57,13 @@ class BoundedProblem:
         """
         self._fixed, self._values, self._scale = fixed[: self._n], values, scale
         start = self.unknown.x.array.copy()
+        exact, *others = self._tangents
         failure = None
-        for tangent in self._tangents:
+        # Where a bound or a fixed value jumps, only a search for a lower residual finds the way; elsewhere it costs iterations.
+        for tangent, search in [(exact, "basic"), (exact, "bt"), *((other, "basic") for other in others)]:
             self.unknown.x.array[:] = np.where(fixed, values, np.minimum(start, upper))
             self._tangent = tangent
-            failure = self._attempt(upper)
+            failure = self._attempt(upper, search)
             if not failure:
                 return None
         self.unknown.x.array[:] = start
@@ -71,7 +73,7 @@ class BoundedProblem:
         """F of the unknown as it is, (m,) on the dofs of this rank, ghosts included. Collective."""
         return assembled(self._form, self._space, into=self._vector).array
 
-    def _attempt(self, upper: NDArray[np.float64]) -> Any:
+    def _attempt(self, upper: NDArray[np.float64], search: str) -> Any:
         comm = self._space.mesh.comm
         snes = PETSc.SNES().create(comm)
         snes.setOptionsPrefix(self._prefix)
@@ -87,7 +89,7 @@ class BoundedProblem:
         solution = right.duplicate()
         solution.array[:] = self.unknown.x.array[: self._n]
         linear = direct_options(comm.size, alone=False)
-        options = {"snes_linesearch_type": "basic", **linear}
+        options = {"snes_linesearch_type": search, **linear}
         with defaults(self._prefix, options):
             snes.setFromOptions()
             snes.solve(None, solution)

@@ -181,6 +181,28 @@ def test_water_is_conserved_in_every_step_of_a_draining_column():
     assert start - drained == pytest.approx(flow.stored_water(), rel=1e-8)
 
 
+def test_coarse_sand_drains_where_the_head_at_its_base_falls_at_once():
+    """In steps that each converge, with no water lost; after a day as much is left as where the head falls within a minute."""
+
+    def drained(head, first, growth):
+        domain, facet_tags = box((0.2, 5.0), (2, 50))
+        sand = water.PorousSoil(1e-3, porosity=0.4, retention=water.VanGenuchten(1.5e-3, 4.0, residual=0.05))
+        flow = water.Seepage(domain, sand, facet_tags, [water.Head(BASE, 5.0)])
+        flow.solve()
+        flow.boundary[0] = water.Head(BASE, head)
+        held, dt = flow.stored_water(), first
+        while flow.time < 86400.0:
+            before = flow.stored_water()
+            dt = min(dt, 86400.0 - flow.time)
+            assert flow.advance(dt), flow.reason
+            assert flow.stored_water() - before == pytest.approx(dt * flow.inflow(BASE), abs=1e-10 * held)
+            dt *= growth
+        return flow.stored_water() / held
+
+    slowly = drained(((0.0, 5.0), (60.0, 0.0)), 5.0, 1.2)
+    assert slowly < 0.2 and drained(0.0, 600.0, 1.2) == pytest.approx(slowly, rel=0.02)
+
+
 def test_pressure_in_a_saturated_layer_diffuses_as_terzaghi_says():
     # c_v = k / (gamma_w (n / K_w + m_v)); the degree of consolidation at T = 0.1, 0.2, 0.5
     k, storage = 1e-8, 1e-7
