@@ -73,13 +73,19 @@ def implicit_options(
     return options
 
 
-def _energy_check(options: Any) -> tuple[str, int]:
-    """Advice on energy that an implicit run does not explain, and the number of steps from which it is checked."""
+def _energy_check(options: Any, water: bool) -> tuple[str, int]:
+    """Advice on energy that an implicit run does not explain, and the number of steps from which it is checked.
+
+    Args:
+        options: the core's.
+        water: whether the model has pore water, which steps of second order refuse.
+    """
     if options.second_order or options.damping:
         return ADVICE, LEAST_STEPS
+    less = "shorter steps" if water else "second_order=True with integration=MIXED, or shorter steps,"
     return (
-        "steps of backward Euler dissipate motion that they resolve, and a slide ends too early: second_order=True with "
-        "integration=MIXED, or shorter steps, dissipate less (docs/implicit.md)",
+        "steps of backward Euler dissipate motion that they resolve, and a slide ends too early: "
+        f"{less} dissipate less (docs/implicit.md)",
         LEAST_EULER_STEPS,
     )
 
@@ -201,7 +207,7 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    advice, least_steps = _energy_check(options)
+    advice, least_steps = _energy_check(options, model.has_water)
     averages = options.nmd and not options.average_stress and dilates(model.laws)
     advise = (lambda: f"{AVERAGED}; {advice}") if averages else (lambda: swollen(model) or advice)
     energy = EnergyWatch(energy_limit, model.comm.rank == 0, advise, least_steps)

@@ -109,3 +109,12 @@ def test_a_column_that_swings_and_drains_accounts_for_its_energy_in_explicit_ste
         assert abs(report.unexplained_fraction) < 5e-3
     assert report.external_work == pytest.approx(0.2 * LOAD**2 / OEDOMETER, rel=0.02)
     assert report.drag_work == pytest.approx(0.5 * report.external_work, rel=0.02)
+
+
+def test_advice_on_dissipated_energy_is_one_that_runs_with_water_can_follow():
+    """They refuse steps of second order."""
+    model = column(10, conductivity=1e-12, modulus=2.2e8)
+    height = model.particles.position[:, 1]
+    model.particles.set("velocity", np.column_stack([np.zeros_like(height), 1e-3 * np.sin(np.pi * height / 2)]))
+    with pytest.warns(mpm.EnergyWarning, match="too early: shorter steps dissipate less"):
+        list(model.implicit(5e-3, dt=1e-4))
