@@ -112,7 +112,9 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[t
     for axes, picture in zip(panels[:, 0], pictures):
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)
         axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
-        axes.tricontour(triangles, picture.values(quantity), levels[1:-1], colors="black", linewidths=0.35, alpha=0.6)
+        values, lines = picture.values(quantity), levels[1:-1]
+        if np.any((lines > values.min()) & (lines < values.max())):  # matplotlib warns of none
+            axes.tricontour(triangles, values, lines, colors="black", linewidths=0.35, alpha=0.6)
         _flow_lines(axes, triangles, picture, (low, high), fastest)
         pressure_head = picture.head.values[:, 0]
         if pressure_head.min() < 0 < pressure_head.max():

@@ -95,6 +95,10 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
     for key in given:
         if key not in SOIL_KEYS:
             raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(SOIL_KEYS)}")
+        if key in CURVES and not isinstance(given[key], dict):
+            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
+        if not _has_numbers(given[key]):
+            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected numbers")
     curves = [key for key in given if key in CURVES]
     if len(curves) > 1 or "conductivity" not in given:
         raise mpm.InputError(
@@ -109,6 +113,13 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
         return water.PorousSoil(**parameters)
     except (TypeError, mpm.InputError) as error:
         raise mpm.InputError(f"{where}: {error}") from None
+
+
+def _has_numbers(value: Any) -> bool:
+    """Whether a value of a site file, or whatever is in its lists and tables, is a number."""
+    if isinstance(value, (list, dict)):
+        return all(_has_numbers(part) for part in (value.values() if isinstance(value, dict) else value))
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _of_strata(conductivity: Any, dip: float) -> Any:
@@ -127,7 +138,7 @@ def condition(name: str, given: dict, where: str) -> Any:
     key, value = next(iter(given.items()))
     make, unit = CONDITIONS[key]
     if isinstance(value, list):
-        if not value or any(not isinstance(row, list) or len(row) != 2 for row in value):
+        if not value or any(not isinstance(row, list) or len(row) != 2 or not _has_numbers(row) for row in value):
             raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
         return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
     if isinstance(value, bool) or not isinstance(value, (int, float)):

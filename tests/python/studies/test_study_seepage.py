@@ -27,6 +27,14 @@ def read(text, folder):
     "old, new, words",
     [
         ("conductivity = 1e-8", "conductivity = 0.0", "soils.core: conductivity is 0.0"),
+        ("conductivity = 1e-8", 'conductivity = "low"', "soils.core: conductivity is 'low', expected numbers"),
+        (
+            "{alpha = 6e-5, n = 1.4, residual = 0.15, air_entry = 200.0}",
+            "1.4",
+            "van_genuchten is 1.4, expected a table",
+        ),
+        ("n = 1.4, ", "n = true, ", "soils.core: van_genuchten is .*expected numbers"),
+        ("[15.0, 3.0]", '["day 15", 3.0]', "boundaries.upstream: reservoir is .*expected a number or rows"),
         ("conductivity = 1e-8", "permeability = 1e-8", "soils.core: unknown key 'permeability'"),
         ("n = 1.4, ", "", "soils.core: .*missing.*'n'"),
         ("[soils.core]", "[soils.clay]", "no cell has the name 'clay'"),
