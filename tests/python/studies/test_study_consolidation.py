@@ -224,7 +224,11 @@ def test_wrong_stages_are_named(stages, words, tmp_path):
             "fill = ['first', 'second']",
             "'first, second' places 'first', which has a conductivity",
         ),
-        (("", ""), "excavate = 'second'\nduration = 2.0", "'second' digs soil away in 2 days, expected a duration of 0"),
+        (
+            ("", ""),
+            "excavate = 'second'\nduration = 2.0",
+            "'second' digs soil away in 2 days, expected a duration of 0",
+        ),
     ],
 )
 def test_stages_that_particles_cannot_follow_are_named(change, stage, words, tmp_path):
