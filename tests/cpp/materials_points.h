@@ -14,7 +14,7 @@ namespace mpm::test
 {
 using namespace materials;
 
-/// Points with storage. Stress, strain increment and plastic strain start at zero.
+/// Points with storage. Stress, strain increment and states start at zero.
 template <int D>
 struct Points
 {
@@ -26,6 +26,7 @@ struct Points
       stress[k].assign(static_cast<std::size_t>(size), 0.0);
     }
     plastic_strain.assign(static_cast<std::size_t>(size), 0.0);
+    separation.assign(static_cast<std::size_t>(size), 0.0);
   }
 
   template <class L>
@@ -43,8 +44,8 @@ struct Points
       points.strain_increment[k] = strain_increment[k].data();
       points.stress[k] = stress[k].data();
     }
-    state = plastic_strain.data();
-    points.state = &state;
+    state = {plastic_strain.data(), separation.data()};
+    points.state = state.data();
     points.tangent = with_tangent ? tangent.data() : nullptr;
     return points;
   }
@@ -61,7 +62,7 @@ struct Points
 
   Index size;
   std::array<Column, n_stress<D>> strain_increment, stress;
-  Column plastic_strain, tangent;
+  Column plastic_strain, separation, tangent;
 
 private:
   static SymTensor<D> row(const std::array<Column, n_stress<D>>& columns, Index i)
@@ -76,7 +77,7 @@ private:
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       columns[k][static_cast<std::size_t>(i)] = value[k];
   }
-  double* state = nullptr;
+  std::array<double*, 2> state{};
 };
 
 inline constexpr double degree = std::numbers::pi / 180;

@@ -2,6 +2,7 @@
 
 #include "materials/tools/deviator.h"
 #include "materials/tools/elasticity.h"
+#include "materials/tools/separation.h"
 
 #include <numbers>
 
@@ -27,7 +28,7 @@ Cone cone_of(const DruckerPrager& law)
   const double apex = law.friction > 0 ? law.strength / law.friction : infinity;
   const double tension = std::min(law.tension_cutoff, apex);
   const double corner = tension < apex ? law.strength - (law.friction > 0 ? law.friction * tension : 0.0) : 0.0;
-  return {moduli, moduli.lambda + 2 * moduli.shear / 3, law.strength, law.friction, law.dilation, tension, corner};
+  return {moduli, bulk_modulus(moduli), law.strength, law.friction, law.dilation, tension, corner};
 }
 
 enum class ReturnPart
@@ -114,22 +115,31 @@ BatchReport update(const DruckerPrager& law, const PointBatch<D>& points)
   BatchReport report;
   for (Index i = 0; i < points.size; ++i)
   {
-    const SymTensor<D> trial = elastic_trial<D>(cone.moduli, points, i);
+    SymTensor<D> trial = elastic_trial<D>(cone.moduli, points, i);
     if (!is_usable<D>(trial))
     {
       report.failed.push_back(i);
       continue;
     }
+    double& separation = points.state[1][i];
+    const double closed = close_separation<D>(trial, separation, cone.bulk);
+    separation -= closed;
     const SymTensor<D> s = deviator<D>(trial);
-    const double j = radius<D>(s);
-    const Returned returned = return_to_cone(cone, mean<D>(trial), j);
+    const double p = mean<D>(trial), j = radius<D>(s);
+    const Returned returned = return_to_cone(cone, p, j);
     const bool plastic = returned.part != ReturnPart::elastic;
+    if (returned.part == ReturnPart::cut_off || returned.part == ReturnPart::corner)
+      separation += (p - returned.mean) / cone.bulk;
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = plastic ? (k < 3 ? returned.mean : 0.0) + returned.ratio * s[k] : trial[k];
     points.state[0][i] += (1 - returned.ratio) * j / (std::numbers::sqrt3 * cone.moduli.shear);
     report.plastic += plastic ? 1 : 0;
-    if (points.tangent)
-      write_tangent<D>(cone, returned, s, j, points.tangent + static_cast<std::size_t>(i) * entries);
+    if (!points.tangent)
+      continue;
+    double* const tangent = points.tangent + static_cast<std::size_t>(i) * entries;
+    write_tangent<D>(cone, returned, s, j, tangent);
+    if (closed > 0 && separation > 0)
+      remove_volumetric_part<D>(tangent);
   }
   return report;
 }

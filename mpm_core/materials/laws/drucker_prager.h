@@ -12,6 +12,7 @@ namespace mpm::materials
 /// The flow on the cone is that of the same cone with `dilation` in place of `friction`; the flow on the cut-off is
 /// associated. Where the cut-off lies beyond the apex, p = strength / friction, the apex takes its place: a trial
 /// stress that the flow does not lead to the cone is returned there. Without friction it is the criterion of von Mises.
+/// Soil that has been pulled apart closes again before it carries pressure (tools/separation.h).
 /// Source: de Souza Neto, Peric, Owen (2008), Computational Methods for Plasticity, sections 6.4.3 and 8.3.
 struct DruckerPrager
 {
@@ -37,7 +38,7 @@ struct DruckerPrager
   }
 
   static constexpr std::string_view name = "DruckerPrager";
-  static constexpr std::array state_names{"plastic_strain"};
+  static constexpr std::array state_names{"plastic_strain", "separation"};
 
   bool operator==(const DruckerPrager&) const = default;
 };

@@ -2,6 +2,7 @@
 
 #include "base/work_columns.h"
 #include "materials/laws/mohr_coulomb_tangent.h"
+#include "materials/tools/separation.h"
 #include "materials/tools/spectral.h"
 
 #include <optional>
@@ -35,6 +36,7 @@ struct Candidates
   WorkColumn<Index> point;           ///< number in the batch
   WorkColumns<SymTensor<D>> stress;  ///< trial stress, then the final one
   WorkColumn<double> plastic_strain; ///< accumulated plastic deviatoric strain
+  WorkColumn<double> separation;     ///< volumetric strain by which the soil has been pulled apart
   WorkColumns<Spectral<D>> trial;    ///< principal stresses and directions before the return; for tangents only
   WorkColumns<Returned> returned;    ///< principal stresses after the return, and the region; for tangents only
 };
@@ -50,23 +52,38 @@ Surface surface_of(const MohrCoulomb& law)
 struct ElasticStep
 {
   WorkColumn<std::int64_t> may_leave; ///< 1 for points that may yield
+  bool separated;                     ///< whether any point has a separation
+  WorkColumn<double> closed;          ///< volumetric strain by which the increment closes it, if so
   Index leaving = 0, failed = 0;      ///< their number, and that of points whose trial stress is not usable
 };
 
-/// Elastic step of the points from to last of the block that begins with `first`: their stress becomes the trial
-/// stress, unless that is not usable.
-/// @tparam unseen  whether all are taken for points that may yield
-template <int D, bool unseen>
+/// Elastic step of the points from to last of the block that begins with `first`: what closes of their separation is
+/// taken from it, and their stress becomes the trial stress, unless that is not usable.
+/// @tparam unseen     whether all are taken for points that may yield
+/// @tparam separated  whether any has a separation
+template <int D, bool unseen, bool separated>
 void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index from, Index last, ElasticStep& step)
 {
   std::int64_t failed = 0, leaving = 0;
+  const double bulk = bulk_modulus(m.moduli);
 #pragma GCC ivdep
   for (Index i = from; i < last; ++i)
   {
-    const SymTensor<D> trial = elastic_trial<D>(m.moduli, points, i);
+    SymTensor<D> trial = elastic_trial<D>(m.moduli, points, i);
     const bool usable = is_usable<D>(trial);
+    double separation = 0, closed = 0;
+    if constexpr (separated)
+    {
+      separation = points.state[1][i];
+      closed = close_separation<D>(trial, separation, bulk);
+    }
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
+    if constexpr (separated)
+    {
+      points.state[1][i] = usable ? separation - closed : separation;
+      step.closed[static_cast<std::size_t>(i - first)] = usable ? closed : 0.0;
+    }
     const std::int64_t leaves = usable & (unseen || may_yield(m, trial)) ? 1 : 0;
     step.may_leave[static_cast<std::size_t>(i - first)] = leaves;
     leaving += leaves;
@@ -76,17 +93,27 @@ void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, In
   step.failed += static_cast<Index>(failed);
 }
 
+template <int D, bool separated>
+void elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last, ElasticStep& step)
+{
+  const Index sampled = std::min(last, first + sample_size);
+  elastic_step<D, false, separated>(m, points, first, first, sampled, step);
+  if (step.leaving > dense_fraction * (sampled - first))
+    elastic_step<D, true, separated>(m, points, first, sampled, last, step);
+  else
+    elastic_step<D, false, separated>(m, points, first, sampled, last, step);
+}
+
 /// Elastic step of the points of a block.
 template <int D>
 ElasticStep elastic_step(const Surface& m, const PointBatch<D>& points, Index first, Index last)
 {
   ElasticStep step;
-  const Index sampled = std::min(last, first + sample_size);
-  elastic_step<D, false>(m, points, first, first, sampled, step);
-  if (step.leaving > dense_fraction * (sampled - first))
-    elastic_step<D, true>(m, points, first, sampled, last, step);
+  step.separated = is_separated(points.state[1], first, last);
+  if (step.separated)
+    elastic_step<D, true>(m, points, first, last, step);
   else
-    elastic_step<D, false>(m, points, first, sampled, last, step);
+    elastic_step<D, false>(m, points, first, last, step);
   return step;
 }
 
@@ -102,7 +129,7 @@ void list_candidates(const ElasticStep& step, Index first, Index from, Index las
   }
 }
 
-/// Copies the trial stresses and plastic strains of the candidates, and fills up with zeros.
+/// Copies the trial stresses and states of the candidates, and fills up with zeros.
 template <int D>
 void gather(const PointBatch<D>& points, Candidates<D>& candidates)
 {
@@ -112,21 +139,25 @@ void gather(const PointBatch<D>& points, Candidates<D>& candidates)
       candidates.stress.column(k)[i] = points.stress[k][candidates.point[i]];
 #pragma GCC ivdep
   for (std::size_t i = 0; i < candidates.size; ++i)
+  {
     candidates.plastic_strain[i] = points.state[0][candidates.point[i]];
+    candidates.separation[i] = points.state[1][candidates.point[i]];
+  }
   for (std::size_t i = candidates.size; i % lanes != 0; ++i)
   {
     candidates.stress.set(i, {});
     candidates.plastic_strain[i] = 0;
+    candidates.separation[i] = 0;
   }
 }
 
-/// Stresses and accumulated plastic strains of points to return, whose number fills vectors
+/// Stresses and states of points to return, whose number fills vectors
 template <int D>
 struct Returning
 {
   std::size_t size;
   std::array<double*, n_stress<D>> stress; ///< trial stress, then the final one
-  double* plastic_strain;
+  double *plastic_strain, *separation;
 };
 
 /// Returns the trial stresses that are outside to the surface. What only tangents need is kept for them only: it would
@@ -137,7 +168,8 @@ template <int D, bool for_tangents, bool with_cutoff>
 [[gnu::noinline]] Index return_stresses(const Surface& surface, const Returning<D>& columns, Candidates<D>& results)
 {
   const Surface m = surface; // copies that no store can alias
-  const auto [size, stress, plastic_strain] = columns;
+  const auto [size, stress, plastic_strain, separation] = columns;
+  const double per_bulk = 1 / bulk_modulus(m.moduli);
   std::int64_t plastic = 0;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < size; ++i)
@@ -157,6 +189,7 @@ template <int D, bool for_tangents, bool with_cutoff>
       results.returned.set(i, returned);
     }
     plastic_strain[i] += deviatoric_plastic_strain(m, spectrum.stress, returned.stress);
+    separation[i] += per_bulk * tension_beyond_apex(spectrum.stress, returned);
     plastic += elastic ? 0 : 1;
   }
   return static_cast<Index>(plastic);
@@ -170,13 +203,16 @@ Index return_stresses(const Surface& m, const Returning<D>& columns, Candidates<
   return return_stresses<D, for_tangents, false>(m, columns, results);
 }
 
-/// Returns the candidates, side by side, and writes their stresses and plastic strains back.
+/// Returns the candidates, side by side, and writes their stresses and states back.
 /// @returns how many yielded
 template <int D, bool for_tangents>
 Index return_candidates(const Surface& m, const PointBatch<D>& points, Candidates<D>& candidates)
 {
   gather(points, candidates);
-  Returning<D> columns{(candidates.size + lanes - 1) / lanes * lanes, {}, candidates.plastic_strain.data()};
+  Returning<D> columns{(candidates.size + lanes - 1) / lanes * lanes,
+                       {},
+                       candidates.plastic_strain.data(),
+                       candidates.separation.data()};
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     columns.stress[k] = candidates.stress.column(k).data();
   const Index plastic = return_stresses<D, for_tangents>(m, columns, candidates);
@@ -186,7 +222,10 @@ Index return_candidates(const Surface& m, const PointBatch<D>& points, Candidate
       points.stress[k][candidates.point[i]] = candidates.stress.column(k)[i];
 #pragma GCC ivdep
   for (std::size_t i = 0; i < candidates.size; ++i)
+  {
     points.state[0][candidates.point[i]] = candidates.plastic_strain[i];
+    points.state[1][candidates.point[i]] = candidates.separation[i];
+  }
   return plastic;
 }
 
@@ -196,7 +235,7 @@ template <int D>
 Index return_in_place(const Surface& m, const PointBatch<D>& points, Index first, std::size_t size,
                       Candidates<D>& candidates)
 {
-  Returning<D> columns{size, {}, points.state[0] + first};
+  Returning<D> columns{size, {}, points.state[0] + first, points.state[1] + first};
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     columns.stress[k] = points.stress[k] + first;
   return return_stresses<D, false>(m, columns, candidates);
@@ -260,6 +299,8 @@ BatchReport update(const MohrCoulomb& law, const PointBatch<D>& points)
     failed += step.failed;
     if (step.leaving > 0)
       report.plastic += return_block(m, maps, points, first, last, step, candidates);
+    if (points.tangent && step.separated)
+      correct_tangents<D>(step.closed, points.state[1], points.tangent, first, last);
   }
   if (failed > 0)
     report.failed = unusable_points<D>(m.moduli, points);

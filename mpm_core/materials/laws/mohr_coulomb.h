@@ -11,8 +11,9 @@ namespace mpm::materials
 ///     (s1 - s3)/2 + (s1 + s3)/2 sin(phi) - c cos(phi) <= 0   and   s1 <= tension_cutoff.
 /// The flow on a Mohr-Coulomb plane is that of the same plane with the angle psi in place of phi; the flow on a
 /// tension plane is associated. With psi = 0 < phi no flow leads to the apex: a trial stress beyond it is returned to
-/// the apex by convention. A friction angle of 0 is the Tresca criterion with the strength c in shear.
-/// Source: Clausen, Damkilde, Andersen (2006), IJNME 66, 1967-1989, and (2007), Comput. Struct. 85, 1795-1807.
+/// the apex by convention. A friction angle of 0 is the Tresca criterion with the strength c in shear. Soil that has
+/// been pulled apart at the apex closes again before it carries pressure (tools/separation.h). Source: Clausen,
+/// Damkilde, Andersen (2006), IJNME 66, 1967-1989, and (2007), Comput. Struct. 85, 1795-1807.
 struct MohrCoulomb
 {
   double young, poisson, cohesion, friction_angle;
@@ -39,7 +40,7 @@ struct MohrCoulomb
   static constexpr auto parameters() { return parameters_within<MohrCoulomb>(); }
 
   static constexpr std::string_view name = "MohrCoulomb";
-  static constexpr std::array state_names{"plastic_strain"};
+  static constexpr std::array state_names{"plastic_strain", "separation"};
 
   bool operator==(const MohrCoulomb&) const = default;
 };

@@ -245,6 +245,14 @@ template <bool with_cutoff = true>
   return select(is_outside(m, trial.s1, trial.s3), result, elastic);
 }
 
+/// By how much the mean of the trial stress is beyond the apex, or the tension cut-off in all directions [Pa]; over the
+/// bulk modulus it is the volumetric strain by which the return pulls the soil apart. Zero in all other regions.
+inline double tension_beyond_apex(Principal trial, Returned returned)
+{
+  const bool apart = (returned.region == Region::apex) | (returned.region == Region::tension_apex);
+  return apart ? (trial.s1 + trial.s2 + trial.s3) * (1.0 / 3) - returned.stress.s1 : 0.0;
+}
+
 /// Accumulated plastic deviatoric strain of a return, sqrt(2/3 e : e) with e the deviatoric plastic strain
 inline double deviatoric_plastic_strain(const Surface& m, Principal trial, Principal stress)
 {

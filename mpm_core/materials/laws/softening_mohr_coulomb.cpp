@@ -3,6 +3,7 @@
 #include "base/work_columns.h"
 #include "materials/laws/softening_tangent.h"
 #include "materials/tools/root.h"
+#include "materials/tools/separation.h"
 
 // The loops marked `ivdep` vectorise, as those of mohr_coulomb.cpp do.
 
@@ -31,6 +32,9 @@ constexpr double accuracy = 1e-10;
 /// Steps of Newton's method after which the roots that are left are bracketed
 constexpr int most_newton_steps = 6;
 
+/// The separation among the state variables
+constexpr std::size_t separation_column = 3;
+
 /// The points of a block that may yield, side by side
 template <int D>
 struct Candidates
@@ -55,10 +59,12 @@ struct Candidates
 struct ElasticStep
 {
   WorkColumn<std::int64_t> may_leave; ///< 1 for points that may yield
+  WorkColumn<double> closed;          ///< volumetric strain by which the increment closes the separation
   std::int64_t failed = 0;            ///< number of points whose trial stress is not usable
 };
 
-/// Elastic step of the points of a block: stresses become trial stresses where they are usable.
+/// Elastic step of the points of a block: what closes of their separation is taken from it, and stresses become trial
+/// stresses where they are usable.
 /// @tparam intact  whether no point has lost strength yet, nor is weaker than the law: all have the peak's surface
 template <int D, Falls falls, bool intact>
 void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, Index first, Index last,
@@ -66,14 +72,19 @@ void elastic_step(const FallingStrength& strength, const PointBatch<D>& points, 
 {
   const FallingStrength s = strength; // a copy that no store can alias
   const Surface peak = surface_after<falls>(s, 0, 0);
+  const double bulk = bulk_modulus(s.moduli);
   std::int64_t failed = 0;
 #pragma GCC ivdep
   for (Index i = first; i < last; ++i)
   {
-    const SymTensor<D> trial = elastic_trial<D>(s.moduli, points, i);
+    SymTensor<D> trial = elastic_trial<D>(s.moduli, points, i);
     const bool usable = is_usable<D>(trial);
+    const double separation = points.state[separation_column][i];
+    const double closed = close_separation<D>(trial, separation, bulk);
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] = usable ? trial[k] : points.stress[k][i];
+    points.state[separation_column][i] = usable ? separation - closed : separation;
+    step.closed[static_cast<std::size_t>(i - first)] = usable ? closed : 0.0;
     bool leaves;
     if constexpr (intact)
       leaves = may_yield(peak, trial);
@@ -241,9 +252,10 @@ void find_increments(const FallingStrength& s, Candidates<D>& c)
 /// Final stresses and states of the candidates that yielded; the others are as they are to be.
 /// @returns how many yielded
 template <int D>
-Index write_back(const PointBatch<D>& points, Candidates<D>& candidates)
+Index write_back(double bulk, const PointBatch<D>& points, Candidates<D>& candidates)
 {
   double *const plastic_strain = points.state[0], *const band_strain = points.state[1];
+  double* const separation = points.state[separation_column];
   std::int64_t plastic = 0;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < candidates.size; ++i)
@@ -257,6 +269,7 @@ Index write_back(const PointBatch<D>& points, Candidates<D>& candidates)
     const double increment = yields ? candidates.next[i] : 0.0;
     plastic_strain[p] += increment;
     band_strain[p] += candidates.bands_per_cell[i] * increment;
+    separation[p] += tension_beyond_apex(candidates.trial.at(i).stress, returned) / bulk;
     plastic += yields ? 1 : 0;
   }
   return static_cast<Index>(plastic);
@@ -300,17 +313,22 @@ BatchReport update(const SofteningMohrCoulomb& law, const FallingStrength& stren
   constexpr auto block = static_cast<Index>(block_size);
   for (Index first = 0; first < points.size; first += block)
   {
-    elastic_step<D, falls>(strength, points, first, std::min(points.size, first + block), step, candidates);
-    if (candidates.size == 0)
+    const Index last = std::min(points.size, first + block);
+    elastic_step<D, falls>(strength, points, first, last, step, candidates);
+    if (candidates.size > 0)
+    {
+      gather(points, 1 / law.reference_length, candidates);
+      if (law.peak.tension_cutoff < unlimited)
+        find_increments<D, true, falls>(strength, candidates);
+      else
+        find_increments<D, false, falls>(strength, candidates);
+      report.plastic += write_back(bulk_modulus(strength.moduli), points, candidates);
+    }
+    if (!points.tangent)
       continue;
-    gather(points, 1 / law.reference_length, candidates);
-    if (law.peak.tension_cutoff < unlimited)
-      find_increments<D, true, falls>(strength, candidates);
-    else
-      find_increments<D, false, falls>(strength, candidates);
-    report.plastic += write_back(points, candidates);
-    if (points.tangent)
+    if (candidates.size > 0)
       write_tangents(strength, candidates, points.tangent);
+    correct_tangents<D>(step.closed, points.state[separation_column], points.tangent, first, last);
   }
   if (step.failed > 0)
     report.failed = unusable_points<D>(strength.moduli, points);

@@ -53,7 +53,7 @@ struct SofteningMohrCoulomb
   /// strain counts h / reference_length times in a cell of size h. The strength follows from it, so that it never rises
   /// again when a particle comes into a smaller cell. `cohesion_deviation` is the relative deviation of the point's
   /// cohesion, peak and residual, from the law's, for random fields; at least -1.
-  static constexpr std::array state_names{"plastic_strain", "band_strain", "cohesion_deviation"};
+  static constexpr std::array state_names{"plastic_strain", "band_strain", "cohesion_deviation", "separation"};
   static constexpr Needs special_needs{.cell_size = true};
 
   bool operator==(const SofteningMohrCoulomb&) const = default;

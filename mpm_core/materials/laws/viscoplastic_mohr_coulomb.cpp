@@ -2,6 +2,7 @@
 
 #include "base/work_columns.h"
 #include "materials/tools/elasticity.h"
+#include "materials/tools/separation.h"
 
 #include <algorithm>
 #include <numbers>
@@ -10,12 +11,14 @@ namespace mpm::materials
 {
 namespace
 {
-/// Stress and plastic strain of a block of points before the increment
+constexpr std::size_t n_states = ViscoplasticMohrCoulomb::state_names.size();
+
+/// Stress and states of a block of points before the increment
 template <int D>
 struct Start
 {
   std::array<std::array<double, block_size>, n_stress<D>> stress;
-  std::array<double, block_size> plastic_strain;
+  std::array<std::array<double, block_size>, n_states> state;
 };
 
 template <int D>
@@ -23,10 +26,12 @@ void copy_start(const PointBatch<D>& points, Start<D>& start)
 {
   for (std::size_t k = 0; k < n_stress<D>; ++k)
     std::copy_n(points.stress[k], points.size, start.stress[k].begin());
-  std::copy_n(points.state[0], points.size, start.plastic_strain.begin());
+  for (std::size_t k = 0; k < n_states; ++k)
+    std::copy_n(points.state[k], points.size, start.state[k].begin());
 }
 
-/// Takes the points from where the law without viscosity has them back towards their trial stress.
+/// Takes the points from where the law without viscosity has them back towards their trial stress, and their states
+/// towards those of that stress. What an increment closes of a separation meets no viscosity.
 /// @param left  fraction of the overstress that remains at the end, 1 / (1 + a)
 template <int D>
 void restore_overstress(const ElasticModuli& moduli, double left, const Start<D>& start, const PointBatch<D>& points)
@@ -37,26 +42,33 @@ void restore_overstress(const ElasticModuli& moduli, double left, const Start<D>
     before.stress[k] = stress[k].data();
   for (Index i = 0; i < points.size; ++i)
   {
-    const SymTensor<D> trial = elastic_trial<D>(moduli, before, i);
+    SymTensor<D> trial = elastic_trial<D>(moduli, before, i);
     if (!is_usable<D>(trial)) // it has failed, and is as it was
       continue;
+    std::array<double, n_states> state;
+    for (std::size_t k = 0; k < n_states; ++k)
+      state[k] = start.state[k][static_cast<std::size_t>(i)];
+    state[1] -= close_separation<D>(trial, state[1], bulk_modulus(moduli));
     for (std::size_t k = 0; k < n_stress<D>; ++k)
       points.stress[k][i] += left * (trial[k] - points.stress[k][i]);
-    double& plastic = points.state[0][i];
-    plastic -= left * (plastic - start.plastic_strain[static_cast<std::size_t>(i)]);
+    for (std::size_t k = 0; k < n_states; ++k)
+      points.state[k][i] += left * (state[k] - points.state[k][i]);
   }
 }
 
 template <int D>
-void mix_tangents(const ElasticModuli& moduli, double left, const PointBatch<D>& points)
+void mix_tangents(const ElasticModuli& moduli, double left, const Start<D>& start, const PointBatch<D>& points)
 {
   const auto elastic = elastic_tangent<D>(moduli);
   for (Index i = 0; i < points.size; ++i)
+  {
+    double* const tangent = points.tangent + static_cast<std::size_t>(i) * elastic.size();
     for (std::size_t k = 0; k < elastic.size(); ++k)
-    {
-      double& entry = points.tangent[static_cast<std::size_t>(i) * elastic.size() + k];
-      entry += left * (elastic[k] - entry);
-    }
+      tangent[k] += left * (elastic[k] - tangent[k]);
+    const double separation = points.state[1][i];
+    if (separation > 0 && separation < start.state[1][static_cast<std::size_t>(i)])
+      remove_volumetric_part<D>(tangent);
+  }
 }
 } // namespace
 
@@ -79,7 +91,7 @@ BatchReport update(const ViscoplasticMohrCoulomb& law, const PointBatch<D>& poin
   for (Index first = 0; first < points.size; first += static_cast<Index>(block_size))
   {
     const Index size = std::min(static_cast<Index>(block_size), points.size - first);
-    const BatchSlice<D> block(points, first, size, 1);
+    const BatchSlice<D> block(points, first, size, static_cast<int>(n_states));
     copy_start(block.batch, start);
     const BatchReport report = update<D>(law.inviscid, block.batch);
     total.plastic += report.plastic;
@@ -88,7 +100,7 @@ BatchReport update(const ViscoplasticMohrCoulomb& law, const PointBatch<D>& poin
     if (report.plastic > 0)
       restore_overstress(moduli, left, start, block.batch);
     if (points.tangent)
-      mix_tangents(moduli, left, block.batch);
+      mix_tangents(moduli, left, start, block.batch);
   }
   return total;
 }

@@ -36,7 +36,7 @@ struct ViscoplasticMohrCoulomb
                                    "shear stress above the strength over the rate of plastic shear strain")};
   }
   static constexpr std::string_view name = "ViscoplasticMohrCoulomb";
-  static constexpr std::array state_names{"plastic_strain"};
+  static constexpr std::array state_names = MohrCoulomb::state_names;
 
   bool operator==(const ViscoplasticMohrCoulomb&) const = default;
 };

@@ -19,6 +19,9 @@ constexpr ElasticModuli elastic_moduli(double young, double poisson)
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
 
+/// K = lambda + 2 mu / 3 [Pa]
+constexpr double bulk_modulus(const ElasticModuli& moduli) { return moduli.lambda + 2 * moduli.shear / 3; }
+
 /// K + 4G/3 = lambda + 2 mu [Pa]
 constexpr double p_wave_modulus(const ElasticModuli& moduli) { return moduli.lambda + 2 * moduli.shear; }
 

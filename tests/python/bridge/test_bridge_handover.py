@@ -79,7 +79,7 @@ def test_soil_that_is_handed_over_softens_as_seeded_soil_does(fem_size, cell_siz
     bridge.initialise(model, fem_model, equilibrate=False)
     # Squares cut in four by their diagonals: triangles that are halves of squares of this side. Strength is lost by plastic
     # strain times size over the reference length: that of the elements' cells before, that of the particles' cells after
-    plastic, band, _ = model.particles.state.T
+    plastic, band, _, _ = model.particles.state.T
     assert plastic.max() > 1e-4
     assert np.allclose(band, plastic * fem_size / np.sqrt(2) / 0.1, rtol=1e-12, atol=0)
     order = np.argsort(model.particles.id)

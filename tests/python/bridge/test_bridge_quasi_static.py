@@ -232,7 +232,7 @@ def test_stress_of_the_slope_is_admissible_and_its_mean_too():
     points = np.random.default_rng(0).random((500, 2)) * (1.1, 1.0)
     values = model.evaluate_at(points)
     assert excess_of_strength(values["stress"], 1e3, 25.0).max() < 1e-8
-    assert values["state"].shape == (500, 1) and values["state"].min() >= 0
+    assert values["state"].shape == (500, model.law.n_state) and values["state"].min() >= 0
 
 
 def test_step_beyond_collapse_fails_and_leaves_everything_as_it_was():

@@ -98,7 +98,7 @@ def test_some_soils_stay_as_they_are():
 class Frictional:
     """The Mohr-Coulomb law of the core, called from Python, which names its strength."""
 
-    n_state = 1
+    n_state = sand().n_state
     p_wave_modulus = sand().p_wave_modulus
     strength_parameters = {"c": "strength", "phi": "friction angle", "psi": "dilation angle"}
 

@@ -69,8 +69,8 @@ def test_points_without_values_have_those_of_the_law():
     law = mpm.Heterogeneous(mpm.MohrCoulomb(**SOIL), ["cohesion"])
     stress, strain = random_points(3, 100, pressure=50e3, deviator=15e3, strain=1e-3)
     ours, theirs = stress.copy(), stress.copy()
-    law.update(strain, ours, np.zeros((100, 2)))
-    law.law.update(strain, theirs, np.zeros((100, 1)))
+    law.update(strain, ours, np.zeros((100, law.n_state)))
+    law.law.update(strain, theirs, np.zeros((100, law.law.n_state)))
     assert np.array_equal(ours, theirs)
 
 
@@ -85,7 +85,7 @@ def test_strength_reduction_weakens_every_point():
     for i in range(2):
         one = mpm.MohrCoulomb(**ELASTIC, cohesion=values[0][i], friction_angle=values[1][i])
         s = stress[[i]].copy()
-        bridge.reduced_strength(one, 1.5).update(strain[[i]], s, np.zeros((1, 1)))
+        bridge.reduced_strength(one, 1.5).update(strain[[i]], s, np.zeros((1, one.n_state)))
         assert ours[i] == pytest.approx(s[0], rel=1e-9)
     inside = bridge.reduced_strength(mpm.Undrained(mpm.Hencky(law), porosity=0.4), 1.5)
     assert inside.skeleton.law.strength_factor == 1.5

@@ -62,7 +62,7 @@ def test_overstress_relaxes_at_rest_on_every_part_of_the_surface():
     stress, _ = random_points(3, 500, pressure=20e3, deviator=40e3, strain=0.0)
     inviscid = mpm.MohrCoulomb(**ELASTIC, cohesion=2e3, friction_angle=30.0, dilation_angle=12.0)
     inside = Batch(inviscid, stress, np.zeros_like(stress)).stress
-    state, at_rest = np.zeros((500, 1)), np.zeros_like(stress)
+    state, at_rest = np.zeros((500, 2)), np.zeros_like(stress)
     dt, now = 0.3 * SAND.relaxation_time, stress.copy()
     for k in range(1, 6):
         SAND.update(at_rest, now, state, dt=dt)
@@ -77,7 +77,7 @@ def test_limits_of_slow_and_fast_loading(dim):
     slow, reference = Batch(SAND, stress, strain), Batch(inviscid, stress, strain)
     assert np.array_equal(slow.stress, reference.stress) and np.array_equal(slow.tangent, reference.tangent)
     assert np.array_equal(slow.state, reference.state) and reference.report.plastic > 100
-    now, state = stress.copy(), np.zeros((300, 1))
+    now, state = stress.copy(), np.zeros((300, SAND.n_state))
     SAND.update(strain, now, state, dt=0.0)
     elastic = Batch(mpm.LinearElastic(**ELASTIC), stress, strain)
     assert np.abs(now - elastic.stress).max() < 1e-9 * np.abs(stress).max()
@@ -90,7 +90,7 @@ def test_tangent_is_the_derivative_of_the_stress(law, dim):
     stress, strain = random_points(dim, 200, pressure=30e3, deviator=10e3, strain=2e-3)
 
     def updated(increment):
-        new, state, tangent = stress.copy(), np.zeros((200, 1)), np.zeros((200, *2 * stress.shape[1:]))
+        new, state, tangent = stress.copy(), np.zeros((200, law.n_state)), np.zeros((200, *2 * stress.shape[1:]))
         law.update(increment, new, state, tangent, dt=0.7 * law.relaxation_time)
         return new, tangent
 

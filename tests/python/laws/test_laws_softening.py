@@ -29,7 +29,7 @@ def strength_excess(law, stress, state):
     """Value of the yield function that holds at the points' plastic strain, by the scale of the stress."""
     s = principal(stress)
     excess = []
-    for (s1, _, s3), (_, band_strain, deviation) in zip(s, state, strict=True):
+    for (s1, _, s3), (_, band_strain, deviation, _) in zip(s, state, strict=True):
         now = law.softened(band_strain, deviation)
         phi = np.radians(now.friction_angle)
         f = (s1 - s3) / 2 + (s1 + s3) / 2 * np.sin(phi) - now.cohesion * np.cos(phi)
@@ -41,7 +41,7 @@ def strength_excess(law, stress, state):
 @pytest.mark.parametrize("strain", [1e-3, 5e-3])
 def test_tangent_is_the_derivative_of_the_stress(law, dim, strain):
     stress, increment = random_points(dim, 300, pressure=50e3, deviator=20e3, strain=strain)
-    state = np.random.default_rng(5).uniform(0, [0.02, 0.2, 0.3], (300, 3))
+    state = np.random.default_rng(5).uniform(0, [0.02, 0.2, 0.3, 1e-4], (300, 4))
     batch = Batch(law, stress, increment, state)
     assert batch.report.plastic > 40
     assert_tangent(batch, 1e-8, tolerance=1e-4)
@@ -69,7 +69,7 @@ def test_tension_cutoff_holds_while_strength_falls(dim):
 
 def test_a_point_does_not_depend_on_those_beside_it(law):
     stress, increment = random_points(2, 300, pressure=50e3, deviator=20e3, strain=2e-3)
-    state = np.random.default_rng(5).uniform(0, [0.02, 0.2, 0.3], (300, 3))
+    state = np.random.default_rng(5).uniform(0, [0.02, 0.2, 0.3, 1e-4], (300, 4))
     together = Batch(law, stress, increment, state)
     for first in (0, 7, 131):
         alone = Batch(law, stress[first:][:5], increment[first:][:5], state[first:][:5])
@@ -115,7 +115,7 @@ def test_simple_shear_of_a_clay_softens_by_closed_form():
 def shear_band_energy(cells):
     """Energy [J/m2] that a column 1 m high dissipates in shear when its softest cell takes all the softening."""
     size = 1.0 / cells
-    tests = [mpm.ElementTest(CLAY, [0.0] * 4, [0.0, 0.0, 0.0 if k else -0.01], cell_size=size) for k in range(2)]
+    tests = [mpm.ElementTest(CLAY, [0.0] * 4, [0.0, 0.0, 0.0 if k else -0.01, 0.0], cell_size=size) for k in range(2)]
     band, rest = tests
     work = 0.0
     displacement = 0.0
@@ -142,7 +142,7 @@ def test_dissipated_energy_does_not_depend_on_the_cell_size():
 
 def test_cohesion_may_deviate_from_point_to_point():
     for deviation in (-0.5, 0.0, 0.5):
-        test = mpm.ElementTest(CLAY, [0.0] * 4, [0.0, 0.0, deviation])
+        test = mpm.ElementTest(CLAY, [0.0] * 4, [0.0, 0.0, deviation, 0.0])
         test.step([0, 0, 0, 1.0])
         plastic = test.state[0]
         assert test.stress[3] == pytest.approx((1 + deviation) * (4e3 + 16e3 * np.exp(-plastic / 0.1)), rel=1e-9)
