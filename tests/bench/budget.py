@@ -2,7 +2,7 @@
 and compares them with the recorded budget: a phase that needs over 3 % more fails.
 
 Counts are repeatable on one build; each compiler has its own budget. After a change that is worth its instructions:
-tests/run budget --record (or --record given here) writes the new ones.
+`tests/bench/budget.py build-portable/tests/bench/mpm_counted --record` writes the new ones.
 """
 
 from __future__ import annotations
