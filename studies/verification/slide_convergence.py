@@ -144,9 +144,10 @@ def run(quick: bool, folder: Path) -> Result:
     plain = slide(0.1, nmd=False)
     name = f"implicit steps of {STEP:g} s, cells of 0.1 m, no averaging"
     checks += alike(name, plain, slide(0.1, nmd=False, implicit=True), 0.03)
-    plain = slide(0.1, nmd=False, viscous=False)
-    name = f"no viscosity, implicit steps of {STEP:g} s, cells of 0.1 m, no averaging"
-    checks += alike(name, plain, slide(0.1, nmd=False, viscous=False, implicit=True), 0.015, 0.05)
+    plain = slide(0.1, per_cell=10, nmd=False, viscous=False)
+    implicit = slide(0.1, per_cell=10, nmd=False, viscous=False, implicit=True)
+    name = f"no viscosity, implicit steps of {STEP:g} s, cells of 0.1 m, ten particles in each, no averaging"
+    checks += alike(name, plain, implicit, 0.015, 0.05)
 
     # --- 4. A smooth base, without viscosity ------------------------------------------------------------------------
     free = {"viscous": False, "smooth": True}
