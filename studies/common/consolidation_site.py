@@ -34,7 +34,7 @@ from fenics_bridge.water.boundary import value_at
 from .consolidation_stages import GroundStage, Table, corners_of, pressure_table, stages_of
 from .site_file import law_at, read_toml, supports_of
 from .slope_case import GRAVITY
-from .water_site import condition, porous_soil
+from .water_site import DAY, condition, porous_soil
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points", "stages")
 BALANCED = 1e-9
