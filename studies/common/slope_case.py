@@ -143,7 +143,7 @@ def initialise(case: SlopeCase, kind: str, unit_weight: float, nmd: bool = False
         return hand_over(case, unit_weight, gravity, nmd)
     particles = case.model.particles
     if kind == "elastic":
-        particles.set("stress", elastic_stress(case, unit_weight))
+        particles.set("stress", elastic_stress(case, unit_weight, nmd))
     elif kind == "k0":
         k0 = bridge.k0_elastic(case.args.poisson)
         particles.set("stress", bridge.k0_stress(particles.position, case.surface, unit_weight, k0))
@@ -184,8 +184,8 @@ def solved_fem(case: SlopeCase, unit_weight: float, nmd: bool = False) -> bridge
     return fem
 
 
-def soil_fem(case: SlopeCase, nmd: bool = False) -> bridge.QuasiStatic:
-    """Finite elements, linear triangles, on the particles' soil cells, unloaded. Collective.
+def soil_fem(case: SlopeCase, nmd: bool = False, soil: object = None) -> bridge.QuasiStatic:
+    """Finite elements, linear triangles, on the particles' soil cells, unloaded; of another soil if given. Collective.
 
     Particles that take their stresses over are as far out of balance, so the tolerance is a tight one.
     """
@@ -194,7 +194,7 @@ def soil_fem(case: SlopeCase, nmd: bool = False) -> bridge.QuasiStatic:
         warnings.simplefilter("ignore", RuntimeWarning)
         return bridge.QuasiStatic(
             body,
-            case.soil,
+            case.soil if soil is None else soil,
             facet_tags,
             SUPPORTS,
             degree=1,
@@ -204,8 +204,13 @@ def soil_fem(case: SlopeCase, nmd: bool = False) -> bridge.QuasiStatic:
         )
 
 
-def elastic_stress(case: SlopeCase, unit_weight: float) -> np.ndarray:
-    """Stresses at the particles from elastic equilibrium of the soil body under its weight, by FEM: (n, 4) [Pa]."""
-    body, _, facet_tags = bridge.soil_mesh(case.domain, case.cell_tags, case.facet_tags, tag=bridge.SOIL)
-    solution = bridge.solve_elastic(body, facet_tags, SUPPORTS, case.args.young, case.args.poisson, unit_weight)
-    return solution.evaluate_at(case.model.particles.position)["stress"]
+def elastic_stress(case: SlopeCase, unit_weight: float, nmd: bool) -> np.ndarray:
+    """Stresses at the particles from elastic equilibrium of the soil body under its weight, by FEM: (n, 4) [Pa]. Collective."""
+    angles = {name: getattr(case.soil, name, 0.0) for name in ("friction_angle", "dilation_angle")}
+    # A strength that is not reached; by which fraction strains are averaged depends on the angles.
+    elastic = mpm.MohrCoulomb(
+        young=case.args.young, poisson=case.args.poisson, cohesion=1e3 * case.args.young, **angles
+    )
+    fem = soil_fem(case, nmd, elastic)
+    fem.solve(bridge.Load(unit_weight=unit_weight))
+    return fem.evaluate_at(case.model.particles.position)["stress"]
