@@ -87,7 +87,7 @@ def parser() -> ArgumentParser:
     start = p.add_argument_group("initial state")
     add_choice(start, "--initial", None, ("fem", "elastic", "k0", "zero"),
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
-    add_number(start, "--initial-unit-weight", 20e3, "N/m3", "unit weight that balances the initial stresses", above=0)
+    add_number(start, "--initial-unit-weight", 18e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     slide = p.add_argument_group("slide")
     add_number(slide, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_pic(slide, 0.0)

@@ -59,7 +59,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_slope_options(p)
     add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
-    add_number(p, "--initial-unit-weight", 20e3, "N/m3", "unit weight that balances the initial stresses", above=0)
+    add_number(p, "--initial-unit-weight", 18e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
     add_pic(p, 0.0)
     add_discretisation(p)
