@@ -83,13 +83,20 @@ def flow_checks(quick):
 # --- 2. A long slope -----------------------------------------------------------------------------------------------
 
 
-def slope_factor(length, angle, unit_weight, seeps):
-    """Factor of safety of a layer 1 m deep on an incline, with cohesion c = 1 kPa, φ = ψ = 30°."""
+LINEAR_SLOPE = (
+    "Linear elements converge from above with the cell size: with seepage the error is 10, 4 and 2 % with four, eight and sixteen "
+    "of them over the depth."
+)
+
+
+def slope_factor(length, angle, unit_weight, seeps, degree):
+    """Factor of safety of a layer 1 m deep on an incline, with cohesion c = 1 kPa, φ = ψ = 30°; linear elements in half the size."""
+    rows = 4 if degree == 2 else 8
     tangent = np.tan(angle)
-    domain, _, facet_tags = bridge.box_mesh(comm, (length, 1.0), (int(2 * length), 4))
+    domain, _, facet_tags = bridge.box_mesh(comm, (length, 1.0), (int(0.5 * rows * length), rows))
     domain.geometry.x[:, 1] -= tangent * domain.geometry.x[:, 0]
     law = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=1e3, friction_angle=30.0, dilation_angle=30.0)
-    fem = bridge.QuasiStatic(domain, law, facet_tags, HELD)
+    fem = bridge.QuasiStatic(domain, law, facet_tags, HELD, degree, nmd=degree == 1)
     if seeps:
         fem.reconfigure(pore_pressure=lambda x: WATER * np.cos(angle) ** 2 * (1.0 - x[:, 1] - tangent * x[:, 0]))
     found = bridge.factor_of_safety(fem, bridge.Load(unit_weight=unit_weight), start=0.4, tolerance=1e-3)
@@ -98,15 +105,15 @@ def slope_factor(length, angle, unit_weight, seeps):
 
 def slope_checks(quick):
     angle, checks = np.radians(20.0), []
+    lengths = (15.0, 30.0) if quick else (20.0, 40.0)
     for name, unit_weight, seeps in (("dry", 18e3, False), ("seepage parallel to it", 20e3, True)):
-        short, long = (
-            slope_factor(length, angle, unit_weight, seeps) for length in ((15.0, 30.0) if quick else (20.0, 40.0))
-        )
         normal = (unit_weight - WATER * seeps) * np.cos(angle) ** 2
         exact = (1e3 + normal * np.tan(np.radians(30.0))) / (unit_weight * np.sin(angle) * np.cos(angle))
-        checks.append(Check(f"factor of safety of an infinite slope of 20°, {name}", exact,
-                            "[c + (γ d cos²β - p) tan φ] / (γ d sin β cos β)", 2 * long - short, 0.02,
-                            method="quadratic elements"))  # fmt: skip
+        for degree, method in ((2, "quadratic elements"), (1, "linear elements, NMD")):
+            short, long = (slope_factor(length, angle, unit_weight, seeps, degree) for length in lengths)
+            checks.append(Check(f"factor of safety of an infinite slope of 20°, {name}", exact,
+                                "[c + (γ d cos²β - p) tan φ] / (γ d sin β cos β)", 2 * long - short, 0.02,
+                                limit=LINEAR_SLOPE if degree == 1 else "", method=method))  # fmt: skip
     return checks
 
 

@@ -85,7 +85,7 @@ def coupled(size, element, nmd=False):
 def slope(size):
     """Unit weights, in multiples of cohesion over height, under which a slope of 45° collapses, to 1/2000 of it.
 
-    By total stresses with quadratic and with averaged linear elements, and by soil and water with the latter.
+    By total stresses with quadratic and with averaged linear elements, and by soil and water with both, P2-P1 and P1-P1.
     """
     background = bridge.slope_mesh(comm, height=1.0, angle=45.0, crest=1.2, cell_size=size, kind="fitted")
     domain, _, facet_tags = bridge.soil_mesh(*background)
@@ -94,10 +94,17 @@ def slope(size):
         model = bridge.QuasiStatic(domain, undrained(), facet_tags, supports, degree, nmd=degree == 1)
         model.solve(bridge.Load(unit_weight=20 * COHESION), first_step=0.2, tolerance=1e-3)
         found.append(model.load.unit_weight / COHESION)
-    soil = water.PorousSoil(1e-17, porosity=POROSITY)
+    for element in (water.Element.TAYLOR_HOOD, water.Element.STABILISED):
+        found.append(carried_unit_weight(domain, facet_tags, supports, element) / COHESION)
+    return found
+
+
+def carried_unit_weight(domain, facet_tags, supports, element):
+    """Largest unit weight [N/m3] with an equilibrium of soil and water."""
     model = water.Consolidation(
-        domain, clay(), soil, facet_tags, supports, [], element=water.Element.STABILISED, nmd=True, unit_weight=1e-3
-    )
+        domain, clay(), water.PorousSoil(1e-17, porosity=POROSITY), facet_tags, supports, [], element=element,
+        nmd=element == water.Element.STABILISED, unit_weight=1e-3,
+    )  # fmt: skip
     carried, more = 0.0, 2 * COHESION
     while more > 3e-3 * COHESION:
         model.load = bridge.Load(unit_weight=carried + more)
@@ -105,7 +112,7 @@ def slope(size):
             carried += more
         else:
             more /= 2
-    return [*found, carried / COHESION]
+    return carried
 
 
 def particles(size, *, wet=True):
@@ -149,8 +156,10 @@ def run(quick: bool, folder) -> Result:
         checks.append(Check(f"load of total stresses over the cohesion, cells of {size:g} m", LIMIT, "2 + π, Prandtl 1920",
                             expected, 0.05, limit=COARSE if size > 0.2 else "", method="P2"))  # fmt: skip
     for size in (0.1,) if quick else (0.1, 0.05):
-        quadratic, linear, wet = slope(size)
+        quadratic, linear, taylor_hood, wet = slope(size)
         name = f"slope, unit weight at collapse over the cohesion, cells of {size:g} m"
+        checks.append(Check(name, quadratic, "quadratic elements, total stresses", taylor_hood, 0.02, "1/m",
+                            method="P2-P1"))  # fmt: skip
         checks.append(Check(name, quadratic, "quadratic elements, total stresses", wet, 0.02, "1/m",
                             limit=COARSE_SLOPE if size > 0.05 else "", method="P1-P1, NMD"))  # fmt: skip
         checks.append(Check(f"{name}, against linear elements", linear, "linear elements with averages, total stresses", wet,
