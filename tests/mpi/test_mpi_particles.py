@@ -36,10 +36,10 @@ def test_a_damped_slide_is_the_same_on_any_partition(comm, owners_of):
     # Where a node's velocity passes through zero within a step, the damping does so too: its sign is not left to round-off.
     model, alone = sliding_slope(comm, owners_of, per_cell=10), sliding_slope(MPI.COMM_SELF, per_cell=10)
     for each in (model, alone):
-        *_, report = each.explicit(1.5, dt=1e-3, damping=0.5)
-    assert report.steps == 1500
+        *_, report = each.explicit(1.0, dt=1e-3, damping=0.5)
+    assert report.steps == 1000
     moved = all_by_id(model)
-    assert moved["displacement"][:, 0].min() > 0.5 and moved["state"].max() > 0.1
+    assert moved["displacement"][:, 0].min() > 0.3 and moved["state"].max() > 0.1
     assert_same(moved, all_by_id(alone))
 
 
