@@ -26,7 +26,7 @@ from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.solver import Solver
+from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags
 from fenics_bridge.views import body_text, law_lines
@@ -86,7 +86,7 @@ class MixedQuasiStatic(SupportedBody):
         self._kinematics = _MixedKinematics(*unknowns, self.points, constraints, law, self.geometry)
         linear = LinearSolver(space, options_prefix, newton=True)
         self._body = Body(*unknowns, self.points, self._kinematics, constraints, linear)
-        self.solver = solver or Solver()
+        self.solver = given_solver(domain.comm, solver)
         """Tolerances of the solution"""
         self._facet_tags = facet_tags
         self._displacements = space.sub(0).collapse()

@@ -31,7 +31,7 @@ from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.quadrature import QuadraturePoints
-from fenics_bridge.fem.solver import Solver
+from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
@@ -124,7 +124,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """The load in equilibrium"""
         self.converged = False
         """Whether the last call reached its load"""
-        self.solver = solver or Solver()
+        self.solver = given_solver(domain.comm, solver)
         """Tolerances of the solution"""
         self._assemble(constraints)
         warn_of_laws(self)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenics_bridge.errors import InputError
+from mpi4py import MPI
+
+from fenics_bridge.errors import InputError, agree
 
 
 @dataclass(frozen=True)
@@ -45,3 +47,14 @@ class Solver:
 PRACTICE = Solver(tolerance=1e-5, missing_tolerance=1e-2)
 """Also accepts a relaxation with an out-of-balance force of 1 % in which no cell that yields lacks more than 1 % of the stress,
 tolerances as in practice. Factors of safety become up to 1 % higher, whatever part of the body fails: see `missing_stress`."""
+
+
+def given_solver(comm: MPI.Comm, solver: Solver | None) -> Solver:
+    """The solver that a caller gives, or the default one. Collective.
+
+    Raises:
+        InputError: something else is given. Raised on all ranks alike.
+    """
+    known = isinstance(solver, (Solver, type(None)))
+    agree(comm, None if known else f"solver is {solver!r}, expected a Solver, or None")
+    return solver or Solver()

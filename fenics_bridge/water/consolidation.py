@@ -25,7 +25,7 @@ from fenics_bridge.fem.locking import warn_of_laws
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
-from fenics_bridge.fem.solver import Solver
+from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text
@@ -118,7 +118,7 @@ class Consolidation(ConsolidationResults):
         agree(domain.comm, alone if hasattr(boundary, "facet_tag") else None)
         self.boundary = list(boundary)
         """Boundary conditions of the water; they may be changed between steps, and hold at the end of a step"""
-        self.solver = solver or Solver()
+        self.solver = given_solver(domain.comm, solver)
         """Tolerances of the solution"""
         self.radius = radius_of(domain, self.geometry)
         """Radius of an axisymmetric body, a UFL expression; None in others"""

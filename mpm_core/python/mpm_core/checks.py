@@ -37,6 +37,20 @@ def member(name: str, value: Any, kind: Any) -> Any:
     return value
 
 
+def of_kind(name: str, value: Any, *kinds: type) -> Any:
+    """An object of one of the kinds, such as Newton; the error names them."""
+    if not isinstance(value, kinds):
+        raise InputError(f"{name} is {value!r}, expected a {' or a '.join(kind.__name__ for kind in kinds)}")
+    return value
+
+
+def watcher(watch: Any) -> Any:
+    """A function that watches a run, or None."""
+    if not (watch is None or callable(watch)):
+        raise InputError(f"watch is {watch!r}, expected a function without arguments, or None")
+    return watch
+
+
 def flag(name: str, value: Any) -> bool:
     """True or False; text, of which any that is not empty would count as True, is refused."""
     if not isinstance(value, (bool, np.bool_)) and not (isinstance(value, (int, np.integer)) and value in (0, 1)):

@@ -10,7 +10,7 @@ from . import checkpoint
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .absorbing import refuse_absorbing
 from .body import Body
-from .checks import flag, member, positive
+from .checks import flag, member, of_kind, positive, watcher
 from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies
 from .contact_methods import ContactMethods
@@ -216,7 +216,7 @@ class Model(ContactMethods, Body):
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
             )
-        options, run, times, threshold, steps, limit = collectively(
+        options, run, times, threshold, steps, limit, _ = collectively(
             self.comm,
             lambda: (
                 explicit_options(damping, nmd, integration, stress_update, damped, reproducible, transfer),
@@ -225,6 +225,7 @@ class Model(ContactMethods, Body):
                 rebalance_threshold(rebalance),
                 steps_between(every_steps),
                 checked_energy_limit(energy_limit),
+                watcher(watch),
             ),
         )
         begin_two_phases(self, integration, stress_update, damped)
@@ -308,7 +309,7 @@ class Model(ContactMethods, Body):
             refuse_water(self, "the scheme of second order")
         if isinstance(solver, Relaxation):
             refuse_water(self, "relaxation")
-        options, longest, times, steps, threshold, limit, wanted = collectively(
+        options, longest, times, steps, threshold, limit, wanted, method, _ = collectively(
             self.comm,
             lambda: (
                 implicit_options(
@@ -320,13 +321,15 @@ class Model(ContactMethods, Body):
                 rebalance_threshold(rebalance),
                 checked_energy_limit(energy_limit),
                 checked_accuracy(accuracy, second_order),
+                of_kind("solver", solver or Newton(), Newton, Relaxation),
+                watcher(watch),
             ),
         )
         core_conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
         reports = run_implicit(
-            self, solver or Newton(), options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
+            self, method, options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
             energy_limit=limit, accuracy=wanted, conversion=core_conversion,
         )  # fmt: skip
         return Reports(reports, "implicit", self, until)
@@ -367,12 +370,14 @@ class Model(ContactMethods, Body):
         refuse_contacts(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
-        options = collectively(
+        options, method, ratio = collectively(
             self.comm,
-            lambda: implicit_options(
-                0.0, 0.0, nmd, integration, True, ghost, small_displacements, averaged_forces=averaged_forces
+            lambda: (
+                implicit_options(
+                    0.0, 0.0, nmd, integration, True, ghost, small_displacements, averaged_forces=averaged_forces
+                ),
+                of_kind("solver", solver or Newton(), Newton, Relaxation),
+                positive("tolerance", tolerance, "(a ratio)"),
             ),
         )
-        return find_equilibrium(
-            self, solver or Newton(), options, positive("tolerance", tolerance, "(a ratio)"), max_steps
-        )
+        return find_equilibrium(self, method, options, ratio, max_steps)

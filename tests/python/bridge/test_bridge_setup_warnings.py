@@ -15,9 +15,9 @@ HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(
 ELASTIC = mpm.LinearElastic(young=1e7, poisson=0.3)
 
 
-def body(law=ELASTIC, supports=HELD):
+def body(law=ELASTIC, supports=HELD, **options):
     domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
-    return bridge.QuasiStatic(domain, law, facet_tags, supports)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, **options)
 
 
 def test_sound_input_says_nothing():
@@ -81,6 +81,7 @@ def test_loads_of_another_kind_are_refused(load, words):
         (lambda: body(supports=bridge.fixed(BASE)), r"supports is Support\(facet_tag=3.*expected a list"),
         (lambda: body([ELASTIC, ELASTIC]), r"law is \[.*expected a law such as MohrCoulomb"),
         (lambda: body("clay"), "law is 'clay', expected a law"),
+        (lambda: body(solver="newton"), "solver is 'newton', expected a Solver, or None"),
         (lambda: body().solve(20e3), "load is 20000.0, expected a Load"),
         (lambda: body().reconfigure(pore_pressure=1e4), "pore_pressure is 10000.0, expected a function of positions"),
         (lambda: flow(water.Head(LEFT, 1.0)), r"boundary is Head\(facet_tag=1.*expected a list of conditions"),

@@ -185,6 +185,7 @@ def test_bad_supports_and_loads(model, call, words):
         ({"pic": None}, "pic is None, expected a number"),
         ({"nmd": "no"}, "nmd is 'no', expected True or False"),
         ({"reproducible": 2}, "reproducible is 2, expected True or False"),
+        ({"watch": 3}, "watch is 3, expected a function"),
     ],
 )
 def test_bad_run_options(model, change, words):
@@ -200,6 +201,8 @@ def test_bad_run_options(model, change, words):
         ({"quasi_static": "yes"}, "quasi_static is 'yes', expected True or False"),
         ({"nmd": None}, "nmd is None, expected True or False"),
         ({"ghost": 0.1}, "ghost is 0.1, expected a GhostPenalty or None"),
+        ({"solver": "newton"}, "solver is 'newton', expected a Newton or a Relaxation"),
+        ({"watch": "yes"}, "watch is 'yes', expected a function"),
     ],
 )
 def test_bad_options_of_implicit_runs(model, change, words):
