@@ -31,7 +31,7 @@ class Solver:
     """A relaxation also ends when the out-of-balance force, and in every cell that yields the missing stress over the mobilised
     strength, are below this number [-]; at 0 only `relaxed_tolerance` counts"""
     max_steps: int = 80
-    """Largest number of steps of a relaxation"""
+    """Largest number of steps of a relaxation; four times as many where supports move"""
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "relaxed_tolerance"):
