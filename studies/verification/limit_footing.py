@@ -1,9 +1,11 @@
-"""Strip footing: the bearing capacity factors Nc and Nq of weightless ground.
+"""Strip footing: the bearing capacity factors Nc and Nq of weightless ground, and Nγ of sand with weight.
 
 Half of a smooth, flexible strip footing is computed with associated flow. Nc is the ratio of the limit pressure of ground
 with cohesion to the cohesion; Nq is the ratio of the limit pressure of ground without cohesion, beside a surcharge, to the
-surcharge. Finite elements converge from above; their load steps begin with the cohesion or the surcharge and are bisected to
-0.2 % of the pressure.
+surcharge. Nγ = 2 Q / (γ B²) is that of a rough, rigid footing that is pressed into sand by a fiftieth of its width. Its
+error is in proportion to the cells, so that it is extrapolated from cells of 0.1 and 0.05 m below the footing. Finite
+elements converge from above; the load steps of Nc and Nq begin with the cohesion or the surcharge and are bisected to 0.2 %
+of the pressure.
 """
 
 import numpy as np
@@ -16,7 +18,9 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-SURFACE, SURCHARGE = 4, 1e3  # facet tag beside the footing, Pa
+SURFACE, SURCHARGE, UNIT_WEIGHT = 4, 1e3, 20e3  # facet tag beside the footing, Pa, N/m3
+MARTIN = {20.0: 2.839, 30.0: 14.754}
+"""Nγ of rough footings, by the friction angle [degrees]"""
 QUICK, FULL = "0.1", "0.05"
 """Cell sizes below the footing [m]; a fifth of them at its edge."""
 
@@ -52,6 +56,31 @@ def nq(friction: float, size: float) -> float:
     return last.value / SURCHARGE
 
 
+def ngamma(friction: float, size: float) -> float:
+    """Nγ of a rough footing that is pressed into sand, on one mesh."""
+    # --- 1. Sand at rest, with hardly any cohesion ------------------------------------------------------------------
+    parameters = {"half_width": 0.5, "width": 3.0, "depth": 1.5,
+                  "edge_size": 0.2 * size, "near_size": size, "far_size": 6 * size}  # fmt: skip
+    domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", MPI.COMM_WORLD, parameters=parameters)
+    soil = mpm.MohrCoulomb(
+        young=20e6, poisson=0.3, cohesion=1e-4 * UNIT_WEIGHT, friction_angle=friction, dilation_angle=friction
+    )
+    supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE),
+                bridge.prescribed(FOOTING, (0.0, -0.02))]  # fmt: skip
+    model = bridge.QuasiStatic(
+        domain, soil, facet_tags, supports, degree=2, solver=bridge.Solver(relaxed_tolerance=5e-5)
+    )
+    at_rest = bridge.k0_stress(model.points.coordinates(), surface=0.0, unit_weight=UNIT_WEIGHT, k0=0.5)
+    model.set_initial_stress(at_rest, bridge.Load(unit_weight=UNIT_WEIGHT, displacement=0.0))
+
+    # --- 2. The footing is pressed down by a fiftieth of its width -------------------------------------------------
+    for part in (0.1, 0.3, 0.6, 1.0):
+        report = model.equilibrate(bridge.Load(unit_weight=UNIT_WEIGHT, displacement=part))
+        if not report.converged:
+            raise mpm.RunError(f"no equilibrium at {part:g} of the settlement: {report.reason}")
+    return 4 * model.reaction(FOOTING)[1] / UNIT_WEIGHT
+
+
 def run(quick: bool, folder) -> Result:
     # --- 3. Both factors over friction angles -----------------------------------------------------------------------
     size = QUICK if quick else FULL
@@ -61,6 +90,13 @@ def run(quick: bool, folder) -> Result:
               for friction, found in nc_found.items()]  # fmt: skip
     checks += [Check(f"Nq, φ {friction:g}°", surcharge_factor(friction), "Reissner 1924", found, 0.05)
                for friction, found in nq_found.items()]  # fmt: skip
+
+    for friction, exact in MARTIN.items():
+        if friction in nq_found:
+            extrapolated = 2 * ngamma(friction, float(FULL)) - ngamma(friction, float(QUICK))
+            checks.append(
+                Check(f"Nγ, φ {friction:g}°", exact, "Martin 2005, method of characteristics", extrapolated, 0.03)
+            )
 
     # --- 4. Picture -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
