@@ -22,6 +22,9 @@ PATIENCE = 8
 SHORTEST_PART = 1 / 32
 """Fraction of a step that prescribes displacements below which it is not divided any further [-]"""
 
+MOVING = 4
+"""Times as many steps of a relaxation where supports move, since all of the soil that they push yields from the first step on"""
+
 
 @dataclass(frozen=True)
 class EquilibriumReport:
@@ -96,6 +99,8 @@ def find_equilibrium(
             return replace(whole, iterations=report.iterations + whole.iterations)
     if not solver.relaxation:
         return EquilibriumReport("undecided", report.residuals, report.reason, report.iterations)
+    if step.moves_supports:
+        solver = replace(solver, max_steps=MOVING * solver.max_steps)
     return _relaxed(body, laws, external, before, displacement, solver, report)
 
 

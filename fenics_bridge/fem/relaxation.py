@@ -54,9 +54,6 @@ AFTER_FAILURE = 3.0
 REDUCTION = 0.15, 0.3
 """Fractions of the residual: target of a step of relaxation, and limit at which it is still accepted"""
 
-MOVING = 4
-"""Times as many steps where supports move, since all of the soil that they push yields from the first step on"""
-
 STEADY = 0.8
 """Fraction of the residual of half the time before, above which the motion counts as steady"""
 
@@ -115,9 +112,7 @@ def relax(
     tolerance = solver.relaxed_tolerance
     rate: np.ndarray | None = None
     start = body.solution.x.array.copy()
-    moves_supports = EquilibriumStep(body, laws, external, before, displacement).moves_supports
-    max_steps = solver.max_steps * (MOVING if moves_supports else 1)
-    for _ in range(max_steps):
+    for _ in range(solver.max_steps):
         step = EquilibriumStep(body, laws, external, before, displacement, theta, scale)
         residuals = _solve_step(step, tolerance, None if rate is None else rate / theta)
         result.iterations += len(residuals) - 1
@@ -150,7 +145,7 @@ def relax(
             return result
         theta *= NEXT_THETA[len(residuals) - 2]
     last = result.residual[-1] if result.residual else np.inf
-    result.reason = f"residual {last:.1e} after {max_steps} steps of relaxation"
+    result.reason = f"residual {last:.1e} after {solver.max_steps} steps of relaxation"
     return result
 
 
