@@ -6,10 +6,13 @@ straight lines; before the first and after the last time their end values hold.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
+
+from fenics_bridge.errors import agree
 
 Value = float | Callable | tuple
 
@@ -75,6 +78,17 @@ def value_at(value: Value, time: float) -> float:
         times, values = np.transpose(np.asarray(value, dtype=float))
         return float(np.interp(time, times, values))
     return float(value)
+
+
+def listed(comm: MPI.Comm, boundary: Iterable[WaterBoundary]) -> list[WaterBoundary]:
+    """The conditions that a caller gives, as a list. Collective.
+
+    Raises:
+        InputError: a condition stands alone. Raised on all ranks alike.
+    """
+    alone = hasattr(boundary, "facet_tag")
+    agree(comm, f"boundary is {boundary!r}, expected a list of conditions" if alone else None)
+    return list(boundary)
 
 
 def mistake_in(condition: WaterBoundary) -> str | None:

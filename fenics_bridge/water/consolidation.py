@@ -30,7 +30,7 @@ from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
-from fenics_bridge.water.boundary import Flux, WaterBoundary
+from fenics_bridge.water.boundary import Flux, WaterBoundary, listed
 from fenics_bridge.water.consolidation_results import ConsolidationResults
 from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, collapsed, solve_step
 from fenics_bridge.water.construction import lonely_dofs, reconfigure
@@ -114,9 +114,7 @@ class Consolidation(ConsolidationResults):
         """Time of the consolidation [s]"""
         self.load = load or Load()
         """The load, or a function of the time [s] that returns one; may be changed between steps, and holds at the end of one"""
-        alone = f"boundary is {boundary!r}, expected a list of conditions"
-        agree(domain.comm, alone if hasattr(boundary, "facet_tag") else None)
-        self.boundary = list(boundary)
+        self.boundary = listed(domain.comm, boundary)
         """Boundary conditions of the water; they may be changed between steps, and hold at the end of a step"""
         self.solver = given_solver(domain.comm, solver)
         """Tolerances of the solution"""

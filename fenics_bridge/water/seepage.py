@@ -28,7 +28,7 @@ from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
-from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace, WaterBoundary
+from fenics_bridge.water.boundary import Head, Rain, Reservoir, SeepageFace, WaterBoundary, listed
 from fenics_bridge.water.complementarity import BoundedProblem
 from fenics_bridge.water.positions import at_positions
 from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
@@ -105,9 +105,7 @@ class Seepage:
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
         self._applied = AppliedBoundary(space, facet_tags, self._largest)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
-        alone = f"boundary is {boundary!r}, expected a list of conditions"
-        agree(comm, alone if hasattr(boundary, "facet_tag") else None)
-        self.boundary = list(boundary)
+        self.boundary = listed(comm, boundary)
         """The boundary conditions, which may be changed between steps"""
         self._take_boundary()
         self._set_load()
