@@ -99,20 +99,19 @@ def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
     weights = [float(weight) for weight in _weight_by_tag(load.unit_weight).values()]
     odd = [weight for weight in weights if weight and not UNIT_WEIGHTS[0] <= abs(weight) <= UNIT_WEIGHTS[1]]
     upwards = [weight for weight in weights if weight < 0]
-    if upwards and comm.rank == 0:
-        warnings.warn(
+    texts = []
+    if upwards:
+        texts.append(
             f"the unit weight is {upwards[0]:.4g} N/m3, so that it acts upwards, expected a number from 0 on: a positive one acts "
-            "against the last axis",
-            RuntimeWarning,
-            stacklevel=3,
+            "against the last axis"
         )
-    if odd and comm.rank == 0:
-        warnings.warn(
+    if odd:
+        texts.append(
             f"the unit weight is {odd[0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
-            "weights are in N/m3, 20e3 for most soils",
-            RuntimeWarning,
-            stacklevel=3,
+            "weights are in N/m3, 20e3 for most soils"
         )
+    for text in texts if comm.rank == 0 else ():
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 def _weight_by_tag(unit_weight: Any) -> Any:
