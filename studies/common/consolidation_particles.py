@@ -39,9 +39,8 @@ class ParticleGround:
         self.model = site.particles(fem, per_cell, nmd)
         self._site, self._steps, self._per_cell = site, SmallMotion(self.model, nmd), per_cell
         self._stage = site.stages[0]
-        self._held: list[
-            tuple[int, float]
-        ] = []  # first number of particles, and part of their weight that is held at first
+        # First number of particles, and part of their weight that is held at first
+        self._held: list[tuple[int, float]] = []
         self._places = np.array(list(site.points.values()))
         self.model.add_field("initial_pore_pressure", unit="Pa", meaning="Pore pressure at the beginning")
         self.model.add_field("excess_pore_pressure", unit="Pa", meaning="Pore pressure above that at the beginning")

@@ -82,7 +82,7 @@ def ngamma(friction: float, size: float) -> float:
 
 
 def run(quick: bool, folder) -> Result:
-    # --- 3. Both factors over friction angles -----------------------------------------------------------------------
+    # --- 3. The factors over friction angles ------------------------------------------------------------------------
     size = QUICK if quick else FULL
     nc_found = {friction: nc(friction, size) for friction in ((0.0, 20.0) if quick else (0.0, 20.0, 30.0))}
     nq_found = {friction: nq(friction, float(size)) for friction in ((20.0,) if quick else (20.0, 30.0))}
@@ -90,7 +90,6 @@ def run(quick: bool, folder) -> Result:
               for friction, found in nc_found.items()]  # fmt: skip
     checks += [Check(f"Nq, φ {friction:g}°", surcharge_factor(friction), "Reissner 1924", found, 0.05)
                for friction, found in nq_found.items()]  # fmt: skip
-
     for friction, exact in MARTIN.items():
         if friction in nq_found:
             extrapolated = 2 * ngamma(friction, float(FULL)) - ngamma(friction, float(QUICK))
