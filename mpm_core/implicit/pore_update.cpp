@@ -2,6 +2,7 @@
 
 #include "base/eigen.h"
 #include "implicit/pore_water.h"
+#include "model/integration.h"
 #include "transfer/resting.h"
 
 #include <cmath>
@@ -114,10 +115,11 @@ double add_increments(Particles<G::dim>& particles, double modulus, const Run& r
 }
 
 /// Lets mass, and the saturation of soil that may dry, follow the water that particles take up over the step.
+/// @param factor  volume over which the step integrates the cell, over that of its particles
 /// @pre pressures are those of the end, volumes and porosities of the start
 /// @returns kinetic energy of the water that leaves them, which moves as they do
 template <class G, int D = G::dim>
-double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double growth,
+double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<G>& step, double factor, double growth,
                      const CellPressure<D>& pressure, const Vector<G::dim>& centre, const CellMoments<G>& moments,
                      Particles<D>& particles)
 {
@@ -137,7 +139,7 @@ double take_up_water(const Run& run, const PoreWater& water, const ImplicitStep<
       particles.saturation[0][p] = after;
     }
     const double gained = after * (growth + porosity / water.modulus * increment) + (after - before) * porosity;
-    const double mass = step.pore.density * particles.volume[p] * gained;
+    const double mass = step.pore.density * factor * particles.volume[p] * gained;
     const Vector<D> v = at<D>(particles.velocity, p);
     double squared = dot<D>(v, v);
     if (run.resting) // its mean over the particles
@@ -175,9 +177,10 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       model.energy.stress_work +=
           add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
       const double growth = growth_of(mesh, field, step, run.cell);
+      const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
       if (changes_masses(*model.water, step.options))
-        model.energy.outflow_kinetic +=
-            take_up_water(run, *model.water, step, growth, pressure, centre, field.moments[run.cell], model.particles);
+        model.energy.outflow_kinetic += take_up_water(run, *model.water, step, factor, growth, pressure, centre,
+                                                      field.moments[run.cell], model.particles);
     }
     if (!step.options.hold_positions)
       grow_pores<G::dim>(model.particles, run.first, run.last, 1 + step.strains[run.cell].volumetric,

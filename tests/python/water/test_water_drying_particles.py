@@ -244,7 +244,8 @@ def test_steps_that_cannot_dry_soil_refuse_it():
 
 
 @pytest.mark.parametrize("small", [False, True], ids=["", "small"])
-def test_a_bank_whose_reservoir_falls_loses_the_water_that_leaves_it(small):
+@pytest.mark.parametrize("integration", [mpm.Integration.PARTICLES, mpm.Integration.MIXED], ids=["particles", "mixed"])
+def test_a_bank_whose_reservoir_falls_loses_the_water_that_leaves_it(small, integration):
     """Its surface cuts cells and dries, its water is compressible: the masses of the particles say what they have lost."""
     background = bridge.slope_mesh(MPI.COMM_SELF, height=4.0, angle=30.0, crest=4.0, cell_size=1.0, kind="fitted")
     soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=12e3, friction_angle=28.0, dilation_angle=0.0)
@@ -257,10 +258,11 @@ def test_a_bank_whose_reservoir_falls_loses_the_water_that_leaves_it(small):
     model.add_water(porosity=POROSITY, conductivity=1e-6, retention=retention, drained_surface=True)
     model.set_pore_pressure(lambda x: GRAVITY_OF_WATER * (3.0 - x[:, 1]))
     model.stand_water([(0.0, 3.0), (1e5, 0.5)])
-    model.equilibrate(small_displacements=True)
+    model.equilibrate(small_displacements=True, integration=integration)
     model.hold_pore_pressure(bridge.LEFT, level=3.0)
     held, entered, mass = model.water_volume(), 0.0, model.particles.mass.sum()
-    for _ in model.implicit(2e5, dt=2e4, quasi_static=True, nmd=True, small_displacements=small, every_steps=1):
+    options = {"quasi_static": True, "nmd": True, "small_displacements": small, "integration": integration}
+    for _ in model.implicit(2e5, dt=2e4, every_steps=1, **options):
         inflow, now = model.water_inflow(), model.particles.mass.sum()
         assert 9.81 / GRAVITY_OF_WATER * (now - mass) == pytest.approx(inflow - entered, abs=1e-10 * held)
         entered, mass = inflow, now
