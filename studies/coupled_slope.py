@@ -144,7 +144,8 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool, fol
     output = ModelOutput(model, folder / "particles", folder / "mesh", FIELDS) if resting else nullcontext()
     rows, frames, seconds, started = [(0.0, 0.0, 0.0, 0.0)], [], 0.0, process_time()
     with output as files:
-        for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, conversion=conversion):
+        options = {"damping": a.damping, "conversion": conversion, "integration": mpm.Integration.PARTICLES}
+        for report in model.explicit(a.time, every=a.time / a.frames, **options):
             seconds += process_time() - started
             moved = [float(np.linalg.norm(mean_displacement(model, followed[name]))) for name in ("crest", "toe")]
             rows.append(

@@ -64,7 +64,7 @@ def initialise(
     equilibrate: bool = True,
     resting: bool = False,
     nmd: bool | None = None,
-    integration: mpm.Integration = mpm.Integration.PARTICLES,
+    integration: mpm.Integration | None = None,
 ) -> Handover:
     """Start particles from an equilibrium found by finite elements (a consistent transfer: it keeps values). Collective.
 
@@ -98,7 +98,7 @@ def initialise(
             They are not moved, and not equilibrated: with the cells of the finite elements they are in equilibrium as they are.
         nmd: whether the run that follows averages strains, in explicit steps: equilibrium is then one of forces of averaged mean
             stresses. By default as in the finite elements. False for implicit steps that move particles: these average strains.
-        integration: how the run that follows makes forces of stresses; see `mpm_core.Integration`.
+        integration: how the run that follows makes forces of stresses; by default as in `mpm_core.Model.explicit`.
 
     Returns:
         How far the particles are from equilibrium, and how many of them yield.

@@ -37,6 +37,7 @@ from .element import ElementTest
 from .energy import EnergyWarning
 from .field_contact import FieldContact
 from .ghost import GhostPenalty
+from .integration import default_integration
 from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
@@ -113,6 +114,7 @@ __all__ = [
     "__version__",
     "checkpoint_description",
     "critical_cell",
+    "default_integration",
     "distances",
     "log_preconsolidation",
     "matched_drucker_prager",

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ._core import InputError, RunError
+from ._core import InputError, Integration, RunError
 from .report import Report
 
 WARN_ABOVE = 0.01
@@ -21,6 +21,14 @@ LEAST_STEPS = 32
 
 ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
 """Advice for runs with unexplained energy"""
+
+ADVICE_FOR = {
+    Integration.PARTICLES: "cell crossings and too long steps are the usual causes; integration=MIXED closes the balance in soil with "
+    "cohesion (docs/howto/switches.md)",
+    Integration.MIXED: "with mixed integration the usual causes are few particles in a cell, bodies that bend and soil that comes "
+    "apart; more particles in a cell or integration=PARTICLES help (docs/integration.md)",
+}
+"""Advice for explicit runs, by the integration of stresses; for others see `ADVICE`"""
 
 
 class EnergyWarning(RuntimeWarning):

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from . import _core
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .checks import flag, member, positive, within
-from .energy import ADVICE, EnergyWatch
+from .energy import ADVICE, ADVICE_FOR, EnergyWatch
 from .partition import keep_balance
 from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def explicit_options(
     damping: float,
     nmd: bool,
-    integration: Any,
+    integration: Integration,
     stress_update: Any,
     rayleigh: Rayleigh,
     reproducible: bool,
@@ -38,7 +38,7 @@ def explicit_options(
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.nmd = flag("nmd", nmd)
     options.transfer = member("transfer", transfer, Transfer)
-    options.integration = member("integration", integration, Integration)
+    options.integration = integration
     options.stress_update = member("stress_update", stress_update, StressUpdate)
     options.reproducible = flag("reproducible", reproducible)
     options.rayleigh = rayleigh._as_core()
@@ -111,7 +111,8 @@ def run_explicit(
     # after each control interval anyway.
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or ADVICE)
+    advice = ADVICE_FOR.get(options.integration, ADVICE)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice)
     failure = FailureWatch(model, options.nmd)
     penetration = PenetrationWatch(model)
     if model._space_watch is None:

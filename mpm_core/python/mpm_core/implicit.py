@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from ._core import InputError, Integration, RunError
-from .checks import flag, member, positive, within
+from .checks import flag, positive, within
 from .energy import ADVICE, LEAST_STEPS, EnergyWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
@@ -50,7 +50,7 @@ def implicit_options(
     options.damping = within("damping", damping, 0, 1, open_above=True)
     options.pic = within("pic", pic, 0, 1)
     options.nmd = flag("nmd", nmd)
-    if member("integration", integration, Integration) == Integration.DUAL_DOMAIN:
+    if integration == Integration.DUAL_DOMAIN:
         raise InputError("integration is DUAL_DOMAIN, expected PARTICLES or MIXED, which the implicit scheme has")
     options.integration = integration
     options.quasi_static = flag("quasi_static", quasi_static)

@@ -10,7 +10,7 @@ from . import checkpoint
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .absorbing import refuse_absorbing
 from .body import Body
-from .checks import flag, member, of_kind, positive, watcher
+from .checks import flag, of_kind, positive, watcher
 from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies
 from .contact_methods import ContactMethods
@@ -26,6 +26,7 @@ from .explicit import (
 from .far_field import refuse_far_field
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
+from .integration import integration_of
 from .mesh import floats
 from .newton import Newton
 from .partition import rebalance_threshold
@@ -127,17 +128,17 @@ class Model(ContactMethods, Body):
         gravity: ArrayLike | None = None,
         *,
         nmd: bool = False,
-        integration: Integration = Integration.PARTICLES,
+        integration: Integration | None = None,
     ) -> float:
         """Out-of-balance over external force of the particles as they are: |f_ext - f_int| / |f_ext| over the nodes [-].
 
         Args:
             gravity: [m/s2], shape (D,), to weigh the particles with; by default the model's own, without its ramp.
             nmd: take forces of averaged mean stresses, as explicit steps with ``nmd`` do.
-            integration: how stresses become forces in the steps that are meant; see `Integration`.
+            integration: how stresses become forces in the steps that are meant; by default as in ``explicit``.
         """
         g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
-        return self._core.out_of_balance(g, member("integration", integration, Integration), flag("nmd", nmd))
+        return self._core.out_of_balance(g, integration_of(self.laws, integration), flag("nmd", nmd))
 
     def report(self) -> Report:
         """State of the run at the present time."""
@@ -164,7 +165,7 @@ class Model(ContactMethods, Body):
         rayleigh: Rayleigh | None = None,
         pic: float = 0.0,
         nmd: bool = False,
-        integration: Integration = Integration.PARTICLES,
+        integration: Integration | None = None,
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         transfer: Transfer = Transfer.FLIP,
         allow_unstable: bool = False,
@@ -192,7 +193,8 @@ class Model(ContactMethods, Body):
                 the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation), and mean stresses for the nodal forces by the
                 transpose, so that both do the same work.
-            integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`.
+            integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`. By default MIXED where
+                all soil that yields has cohesion, otherwise PARTICLES; see `default_integration`.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             transfer: which velocities particles carry: FLIP or AFFINE; see `Transfer`.
             allow_unstable: take ``dt`` even above the critical time step.
@@ -212,6 +214,7 @@ class Model(ContactMethods, Body):
         """
         refuse_far_field(self, "the explicit scheme")
         damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
+        integration = collectively(self.comm, lambda: integration_of(self.laws, integration))
         if damping and self._free_fields:
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
@@ -249,7 +252,7 @@ class Model(ContactMethods, Body):
         damping: float = 0.0,
         pic: float = 0.0,
         nmd: bool = False,
-        integration: Integration = Integration.PARTICLES,
+        integration: Integration | None = None,
         ghost: GhostPenalty | None = None,
         small_displacements: bool = False,
         rebalance: float | None = None,
@@ -278,7 +281,7 @@ class Model(ContactMethods, Body):
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
                 the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
-            integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
+            integration: how stresses become forces: PARTICLES or MIXED; by default as in ``explicit``.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs. With
                 ``nmd``, strains and nodal forces are averaged as in the finite elements, so that the tangent is symmetric for
@@ -297,6 +300,7 @@ class Model(ContactMethods, Body):
             RunError: a step of dt / 1024 did not converge, or a particle left the mesh; with the reason. The
                 particles have the state after the last step that converged.
         """
+        integration = collectively(self.comm, lambda: integration_of(self.laws, integration))
         refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
@@ -339,7 +343,7 @@ class Model(ContactMethods, Body):
         *,
         solver: Newton | Relaxation | None = None,
         nmd: bool = False,
-        integration: Integration = Integration.PARTICLES,
+        integration: Integration | None = None,
         ghost: GhostPenalty | None = None,
         tolerance: float = 1e-6,
         max_steps: int = 20,
@@ -356,7 +360,7 @@ class Model(ContactMethods, Body):
             solver: solver of each step; Newton's method by default.
             nmd: average volumetric strains over nodes, and mean stresses for the nodal forces (nodal mixed discretisation), as
                 explicit steps with ``nmd`` do; with ``small_displacements`` and without water as finite elements do.
-            integration: how stresses become forces: PARTICLES or MIXED; see `Integration`.
+            integration: how stresses become forces: PARTICLES or MIXED; by default as in ``explicit``.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
             tolerance: out-of-balance ratio |f_ext - f_int| / |f_ext| to reach, in the state after a step.
             max_steps: largest number of steps.
@@ -374,7 +378,14 @@ class Model(ContactMethods, Body):
             self.comm,
             lambda: (
                 implicit_options(
-                    0.0, 0.0, nmd, integration, True, ghost, small_displacements, averaged_forces=averaged_forces
+                    0.0,
+                    0.0,
+                    nmd,
+                    integration_of(self.laws, integration),
+                    True,
+                    ghost,
+                    small_displacements,
+                    averaged_forces=averaged_forces,
                 ),
                 of_kind("solver", solver or Newton(), Newton, Relaxation),
                 positive("tolerance", tolerance, "(a ratio)"),

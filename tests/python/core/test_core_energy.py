@@ -13,6 +13,7 @@ ELASTIC = mpm.LinearElastic(young=200e3, poisson=0.3)
 DENSITY = 2000.0
 MUSL, USF = {}, {"stress_update": mpm.StressUpdate.FIRST}
 NMD = {"nmd": True}
+PARTICLES = {"integration": mpm.Integration.PARTICLES}
 MIXED, DUAL = {"integration": mpm.Integration.MIXED}, {"integration": mpm.Integration.DUAL_DOMAIN}
 
 
@@ -70,7 +71,7 @@ def test_plastic_work_of_confined_compression():
     y = model.particles.position[:, 1]
     model.particles.set("velocity", np.column_stack([0 * y, -rate * y]))
     strain = 0.02
-    report = run(model, strain / rate, dt=0.05 * model.critical_time_step())
+    report = run(model, strain / rate, dt=0.05 * model.critical_time_step(), **PARTICLES)
     plastic = 4 / 3 * cohesion * (strain - cohesion / shear)
     stored = 0.5 * bulk * strain**2 + (2 * cohesion) ** 2 / (6 * shear)
     assert report.plastic_work == pytest.approx(plastic, rel=0.03)
@@ -170,7 +171,7 @@ def test_yielding_soil_with_averaged_strains_keeps_its_energy(law):
     # The nodes' forces do the work of the particles' stresses only if these are averaged by the transpose of what averages the
     # strains. With forces of the stresses as they are, each of these slides gains energy from nothing.
     model = failing_block(law)
-    report = run(model, 0.3, **NMD, dt=0.1 * model.critical_time_step(), energy_limit=None)
+    report = run(model, 0.3, **NMD, **PARTICLES, dt=0.1 * model.critical_time_step(), energy_limit=None)
     assert report.plastic_work > 0.1 * report.external_work  # it has failed
     assert abs(report.unexplained_fraction) < 0.01
 

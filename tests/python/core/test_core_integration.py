@@ -132,3 +132,50 @@ def test_a_slide_on_a_smooth_base_hardly_depends_on_the_cells(transfer):
         run_outs.append(model.particles.position[:, 0].max() - front)
     assert run_outs[0] > 0.5
     assert run_outs[1] == pytest.approx(run_outs[0], rel=0.03)
+
+
+# --- the default ------------------------------------------------------------------------------------------------------
+
+CLAY = mpm.tresca(young=YOUNG, poisson=POISSON, shear_strength=2e3)
+SAND = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=0.0, friction_angle=30.0)
+LOAM = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angle=30.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "mixed"),
+    [
+        ([CLAY], True),
+        ([LOAM], True),
+        ([ELASTIC, LOAM], True),
+        ([mpm.von_mises(young=YOUNG, poisson=POISSON, yield_stress=2e3)], True),
+        ([mpm.Undrained(LOAM, water_modulus=1e8, porosity=0.4)], True),
+        ([mpm.Hencky(CLAY)], True),
+        ([mpm.CamClay(compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.3, void_ratio=1.0,
+                      preconsolidation=100e3)], True),
+        ([mpm.SofteningMohrCoulomb(LOAM, residual_cohesion=0.0, residual_friction_angle=20.0, softening_strain=0.1,
+                                   reference_length=0.1)], True),
+        ([SAND], False),
+        ([SAND, CLAY], False),
+        ([mpm.DruckerPrager(young=YOUNG, poisson=POISSON, strength=0.0, friction=0.5)], False),
+        ([ELASTIC], False),
+        ([mpm.Hencky(ELASTIC)], False),
+        ([mpm.Undrained(ELASTIC, water_modulus=1e8, porosity=0.4)], False),
+    ],
+)  # fmt: skip
+def test_default_is_mixed_where_all_soil_that_yields_has_cohesion(laws, mixed):
+    assert mpm.default_integration(laws) == (Integration.MIXED if mixed else Integration.PARTICLES)
+
+
+@pytest.mark.parametrize("law", [LOAM, SAND], ids=["loam", "sand"])
+def test_a_run_that_is_not_told_takes_the_default_of_its_laws(law):
+    """In a slope that slides, to the last bit; and the two integrations differ there."""
+    places = {}
+    for integration in (None, Integration.MIXED, Integration.PARTICLES):
+        model = slope(0.2, law=law)
+        model.explicit(0.3, integration=integration).last()
+        places[integration] = by_id(model, "position")
+    as_told, other = Integration.MIXED, Integration.PARTICLES
+    if law is SAND:
+        as_told, other = other, as_told
+    assert np.array_equal(places[None], places[as_told])
+    assert not np.array_equal(places[None], places[other])

@@ -9,6 +9,7 @@ import mpm_core as mpm
 from mpm_core import RunError
 
 H, WAVE_SPEED = 1.0, np.sqrt(1e6 / 1000.0)
+PARTICLES = {"integration": mpm.Integration.PARTICLES}
 
 
 def vibrating_column():
@@ -64,7 +65,7 @@ def test_damping_is_that_of_the_explicit_scheme_where_steps_are_small():
 def test_undamped_slope_comes_to_the_explicit_place():
     """An independent explicit code gives 0.68 to 0.69 m at the crest after 2 s and 0.65 m implicitly with steps of 0.1 s."""
     model = slope()
-    *_, report = model.implicit(2.0, dt=0.1)
+    *_, report = model.implicit(2.0, dt=0.1, **PARTICLES)
     assert crest_displacement(model) == pytest.approx(0.65, abs=0.02)
     assert report.kinetic_energy < 0.01 * report.external_work
 
@@ -75,7 +76,7 @@ def slope_at_rest():
     model = slope()
     crest = {}
     for until in (10.0, 65.0, 75.0):
-        *_, report = model.explicit(until, damping=0.75)
+        *_, report = model.explicit(until, damping=0.75, **PARTICLES)
         crest[until] = crest_displacement(model)
     assert report.kinetic_energy < 1e-3 * report.external_work
     assert crest[75.0] - crest[65.0] < 0.01 * crest[75.0]
@@ -93,9 +94,9 @@ def test_damped_slope_comes_to_rest_where_the_explicit_one_does(slope_at_rest, s
     on_the_way, at_rest = slope_at_rest
     model = slope()
     dt = multiple * model.critical_time_step()
-    list(model.implicit(10.0, dt=dt, damping=0.75, solver=solver))
+    list(model.implicit(10.0, dt=dt, damping=0.75, solver=solver, **PARTICLES))
     assert crest_displacement(model) == pytest.approx(on_the_way, rel=0.1)
-    *_, report = model.implicit(75.0, dt=dt, damping=0.75, solver=solver)
+    *_, report = model.implicit(75.0, dt=dt, damping=0.75, solver=solver, **PARTICLES)
     assert report.kinetic_energy < 1e-5 * report.external_work
     assert crest_displacement(model) == pytest.approx(at_rest, rel=0.1)
 
@@ -124,11 +125,11 @@ def test_thin_toe_does_not_hinder_the_slide_unless_its_nodes_have_no_ghost_penal
 
     def slide(**options):
         model = slope()
-        reports = list(model.implicit(10.0, dt=50 * model.critical_time_step(), damping=0.75, **options))
+        reports = list(model.implicit(10.0, dt=50 * model.critical_time_step(), damping=0.75, **PARTICLES, **options))
         return model, sum(report.iterations for report in reports), sum(report.cuts for report in reports)
 
     explicit = slope()
-    list(explicit.explicit(10.0, damping=0.75))
+    list(explicit.explicit(10.0, damping=0.75, **PARTICLES))
     model, iterations, cuts = slide()
     assert cuts == 0
     toe = [each.particles.position[:, 0].max() for each in (model, explicit)]

@@ -93,7 +93,7 @@ def column(law, dim):
 def test_explicit_run_is_that_of_the_core_law(law, dim):
     models = [column(law, dim), column(NATIVE, dim)]
     for model in models:
-        run(model, 0.05, damping=0.2)
+        run(model, 0.05, damping=0.2, integration=mpm.Integration.PARTICLES)
         assert (model.particles.plastic_strain > 0).mean() > 0.1
     stress = [m.particles.stress[np.argsort(m.particles.id)] for m in models]
     assert np.abs(stress[0] - stress[1]).max() < 1e-6 * np.abs(stress[1]).max()
@@ -102,7 +102,7 @@ def test_explicit_run_is_that_of_the_core_law(law, dim):
 def test_implicit_run_is_that_of_the_core_law(law):
     models = [column(law, 2), column(NATIVE, 2)]
     for model in models:
-        list(model.implicit(0.05, dt=0.01))
+        list(model.implicit(0.05, dt=0.01, integration=mpm.Integration.PARTICLES))
         assert (model.particles.plastic_strain > 0).mean() > 0.1
     assert np.abs(models[0].particles.displacement - models[1].particles.displacement).max() < 1e-9
 
