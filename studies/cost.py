@@ -35,8 +35,6 @@ import mpm_core as mpm
 from mpm_core import _core
 
 comm = MPI.COMM_WORLD
-INTEGRATION = mpm.Integration.PARTICLES
-"""Of stresses: three particles in a cell are too few for mixed integration"""
 SOILS = ("drained", "undrained")
 SOLVERS: dict[str, Callable[[], Any]] = {
     "Newton": mpm.Newton,
@@ -126,7 +124,7 @@ def initial_stress(a: Namespace, soil: str) -> np.ndarray | None:
 def settled_explicitly(a: Namespace, model: mpm.Model) -> None:
     """Damped motion until the particles balance their weight; looks after as many steps as a wave takes through the slope."""
     every = 100 * model.critical_time_step()
-    for report in model.explicit(LONGEST, every=every, damping=a.damping, integration=INTEGRATION):
+    for report in model.explicit(LONGEST, every=every, damping=a.damping):
         if report.unbalanced_ratio <= a.tolerance:
             return
 
@@ -139,8 +137,7 @@ def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> d
         seconds, reached = limited(lambda: settled_explicitly(a, model), a.limit)
         iterations[0] = model.steps
     else:
-        options = {"tolerance": a.tolerance, "max_steps": 100, "integration": INTEGRATION}
-        work = lambda: model.equilibrate(solver=SOLVERS[name](), **options)
+        work = lambda: model.equilibrate(solver=SOLVERS[name](), tolerance=a.tolerance, max_steps=100)
         with counted(iterations):
             seconds, reached = limited(work, a.limit)
     watched = case.crest_particle()
@@ -149,8 +146,7 @@ def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> d
     return {
         "soil": soil, "method": name, "cell_size_m": a.cell_size, "particles": len(particles),
         "cells": len(particles) // a.particles_per_cell, "reached": reached, "cpu_seconds": seconds,
-        "force_evaluations": iterations[0], "out_of_balance_ratio": model.out_of_balance(integration=INTEGRATION),
-        "crest_displacement_m": crest,
+        "force_evaluations": iterations[0], "out_of_balance_ratio": model.out_of_balance(), "crest_displacement_m": crest,
     }  # fmt: skip
 
 
@@ -184,8 +180,7 @@ def one_step(a: Namespace, name: str, multiple: float) -> dict[str, object]:
     reports: list[Any] = []
     count = [0]
     with counted(count):
-        run = model.implicit(dt, dt=dt, solver=SOLVERS[name](), integration=INTEGRATION)
-        seconds, reached = limited(lambda: reports.extend(run), a.limit)
+        seconds, reached = limited(lambda: reports.extend(model.implicit(dt, dt=dt, solver=SOLVERS[name]())), a.limit)
     return {
         "method": name, "cell_size_m": a.cell_size, "step_over_critical": multiple, "reached": reached,
         "force_evaluations": count[0], "steps": len(reports), "cpu_seconds": seconds,

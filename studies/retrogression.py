@@ -27,7 +27,7 @@ from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import INTEGRATIONS, add_pic, stable_integration
+from common.schemes import add_pic
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import write_summary
 from mpi4py import MPI
@@ -150,8 +150,6 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
     ratio = start(case)
     disturb(case)
     a, model = case.args, case.model
-    integration = INTEGRATIONS[stable_integration(a.particles_per_cell, cohesive=True)]
-    options = {"damping": a.damping, "pic": a.pic, "nmd": a.nmd, "integration": integration}
     with (
         History(folder / f"history_{size:g}.csv", COLUMNS, comm) as history,
         Progress(f"{size:g} m", a.time, comm) as progress,
@@ -159,7 +157,7 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
         result = Slide(case, size, history, ratio)
         result.look(model.report())
         try:
-            for report in model.explicit(a.time, every=a.time / a.frames, **options):
+            for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd):
                 result.look(report)
                 progress.show(report.time, report.steps, runout=f"{history['runout_m'][-1]:.2f} m")
                 result.at_rest = is_at_rest(history)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 
+from mpm_core.integration import LEAST_IN_CELL
 from mpm_core.setup_warnings import dilates, keeps_volume, locks_at_failure
 
 import mpm_core as mpm
@@ -19,8 +20,6 @@ INTEGRATIONS = {
     "dual-domain": mpm.Integration.DUAL_DOMAIN,
 }
 TRANSFERS = {"flip": mpm.Transfer.FLIP, "affine": mpm.Transfer.AFFINE}
-LEAST_FOR_MIXED = 6
-"""Particles in a cell from which on mixed integration keeps the energy of a slide"""
 
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
@@ -58,11 +57,11 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
 def stable_integration(per_cell: int, cohesive: bool) -> str:
     """Name of the integration whose runs keep their energy: mixed, but for few particles in a cell and for dry grains, which
     loosen (docs/integration.md)."""
-    return "mixed" if cohesive and per_cell >= LEAST_FOR_MIXED else "particles"
+    return "mixed" if cohesive and per_cell >= LEAST_IN_CELL[2] else "particles"
 
 
 def averages_strains(scheme: str, laws: Sequence[object]) -> bool:
-    """Whether a run averages strains unless it is told: where linear cells lock in the soil. Implicit steps do not average forces,
+    """Whether a run averages strains by default: where linear cells lock in the soil. Implicit steps do not average forces,
     and lose their equilibrium or generate energy where averaged soil dilates (docs/guide/theory.md): there they do not average.
     """
     return keeps_volume(laws) or (locks_at_failure(laws) and (scheme == "explicit" or not dilates(laws)))
@@ -80,7 +79,7 @@ def add_discretisation(parser: argparse.ArgumentParser, integration: str | None 
         + (
             ""
             if integration
-            else f" (default: mixed; particles with --paper, without cohesion, and below {LEAST_FOR_MIXED} "
+            else f" (default: mixed; particles with --paper, without cohesion, and below {LEAST_IN_CELL[2]} "
             "particles in a cell)"
         ),
     )

@@ -96,6 +96,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         """Number of repartitions of the background mesh since the model was made."""
         self._first_mesh = mesh  # kept, since it may own the communicator
         self._left_imbalance = 1.0  # by the last partition
+        self._integration: Any = None  # of stresses, where runs name none; kept until more particles are seeded
         self.particles = Particles(self._core, self.geometry)
         """The particles on this rank."""
 
@@ -113,6 +114,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
 
     def _seeded(self, added: int, ids: int) -> int:
         self._next_id += ids
+        self._integration = None
         return self.comm.allreduce(added)
 
     def seed(self, *, density: float, per_cell: int = 10, cell_tag: Tag | None = None, material: int = 0) -> int:

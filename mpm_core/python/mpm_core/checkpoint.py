@@ -309,6 +309,7 @@ def _description(model: Model) -> dict[str, Any]:
         "added_fields": _added_fields(model),
         "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
+        "integration": None if model._integration is None else model._integration.name,
         "contacts": model._contacts,
         "collisions": model._collisions,
         "field_contacts": model._field_contacts,
@@ -408,6 +409,7 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._prescribed = {int(tag): model._conditions[k] for tag, k in there["prescribed"].items()}
     model._next_id = there["next_id"]
     model._left_imbalance = there.get("left_imbalance", 1.0)
+    model._integration = _core.Integration.__members__.get(there.get("integration"))
     model._control = None
     model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
     collectively(model.comm, lambda: core.set_supports(model._conditions))

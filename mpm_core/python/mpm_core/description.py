@@ -6,7 +6,7 @@ import json
 import math
 from typing import Any
 
-from ._core import Geometry, RunError
+from ._core import Geometry, Integration, RunError
 from .surfaces import KINDS
 
 
@@ -155,7 +155,7 @@ _CONTROL = {"longest": _is_above_zero, "length": _is_above_zero, "iterations?": 
 
 _OPTIONAL = (
     "added_fields", "contacts", "far_field", "field_contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance",
-    "implicit", "notes", "sums", "collisions", "absorbing",
+    "implicit", "notes", "sums", "collisions", "absorbing", "integration",
 )  # fmt: skip
 """Entries that older files lack"""
 
@@ -190,6 +190,10 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     ),  # fmt: skip
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
+    "integration": (
+        AnyOf([_NONE, set(Integration.__members__)]),
+        f"null, or one of {', '.join(Integration.__members__)}",
+    ),
     "implicit": (AnyOf([_NONE, _CONTROL]), "null, or the state of an implicit run"),
     "notes": (dict, "a table"),
     "sums": (_is_table_of_sums, "a table of numbers"),

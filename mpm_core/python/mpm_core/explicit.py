@@ -13,11 +13,11 @@ from . import _core
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .checks import flag, member, positive, within
 from .energy import ADVICE, ADVICE_FOR, EnergyWatch
+from .failure_watch import FailureWatch
 from .partition import keep_balance
 from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
 from .report import Report
-from .setup_warnings import FailureWatch
 from .space import SpaceWatch, swollen
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def run_explicit(
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     advice = ADVICE_FOR.get(options.integration, ADVICE)
     energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice)
-    failure = FailureWatch(model, options.nmd)
+    failure = FailureWatch(model, options)
     penetration = PenetrationWatch(model)
     if model._space_watch is None:
         model._space_watch = SpaceWatch(model)

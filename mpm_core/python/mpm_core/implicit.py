@@ -12,11 +12,12 @@ from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import flag, positive, within
 from .energy import ADVICE, LEAST_STEPS, EnergyWatch
+from .failure_watch import FailureWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
 from .report import ImplicitReport
-from .setup_warnings import FailureWatch, dilates
+from .setup_warnings import dilates
 from .solution import Solution
 from .space import swollen
 from .step_control import StepControl
@@ -211,7 +212,7 @@ def run_implicit(
     averages = options.nmd and not options.average_stress and dilates(model.laws)
     advise = (lambda: f"{AVERAGED}; {advice}") if averages else (lambda: swollen(model) or advice)
     energy = EnergyWatch(energy_limit, model.comm.rank == 0, advise, least_steps)
-    failure = FailureWatch(model, options.nmd)
+    failure = FailureWatch(model, options)
 
     def report() -> ImplicitReport:
         now = stepper.report()

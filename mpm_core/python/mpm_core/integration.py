@@ -1,35 +1,66 @@
-"""How stresses become forces where a run does not say it: by what the laws of the soil allow."""
+"""How stresses become forces where the caller does not say it: by the laws of the soil, and the number of its particles."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from . import _core
 from ._core import Integration
 from .checks import member
 from .setup_warnings import with_inner_laws
 
+if TYPE_CHECKING:
+    from .model import Model
 
-def default_integration(laws: Iterable[Any]) -> Integration:
-    """How a run integrates stresses unless it is told (docs/integration.md, "The default, and why").
+LEAST_IN_CELL = {2: 6, 3: 4}
+"""Particles of which a cell must be full for mixed integration, by the dimension: with fewer it generates energy"""
 
-    MIXED where soil yields and all of it that does has cohesion: the energy balance of slides closes, and their results
-    depend least on the mesh. PARTICLES where all is elastic or some has none: in bodies that bend and in grains that
-    come apart mixed integration generates energy. What a law in Python or a UMAT is made of is not known; it counts as
-    soil without cohesion.
+
+def default_integration(model: Model) -> Integration:
+    """How runs of a model integrate stresses where none is named (docs/integration.md, "The default, and why"). Collective.
+
+    MIXED where soil yields, all of it that does has cohesion, and six of its particles fill a triangle, or four a tetrahedron:
+    the energy balance of slides closes, and their results depend least on the mesh. PARTICLES otherwise: in bodies that bend,
+    in grains that come apart, and with few particles in a cell mixed integration generates energy. What a law in Python or a
+    UMAT is made of is not known; it counts as soil without cohesion.
 
     Args:
-        laws: of the particles, as ``Model.laws``.
+        model: with its particles.
     """
+    return Integration.MIXED if suits_mixed(model) else Integration.PARTICLES
+
+
+def integration_of(model: Model, integration: Any) -> Integration:
+    """The integration that is named, or for None the default as it was when the present particles were seeded. Collective."""
+    if integration is not None:
+        return member("integration", integration, Integration)
+    if model._integration is None:
+        model._integration = default_integration(model)
+    return model._integration
+
+
+def suits_mixed(model: Model) -> bool:
+    """Whether mixed integration suits the soil and the particles of a model. Collective."""
+    return all_cohesive(model.laws) and particles_in_cell(model) >= LEAST_IN_CELL[model.mesh.dim]
+
+
+def all_cohesive(laws: Iterable[Any]) -> bool:
+    """Whether some soil yields, and all of it that does has cohesion."""
     yielding = [law for law in map(_innermost, laws) if not isinstance(law, _core.LinearElastic)]
-    return Integration.MIXED if yielding and all(map(_has_cohesion, yielding)) else Integration.PARTICLES
+    return bool(yielding) and all(map(_has_cohesion, yielding))
 
 
-def integration_of(laws: Iterable[Any], integration: Any) -> Integration:
-    """The integration that was asked for, or the default of the laws for None."""
-    return default_integration(laws) if integration is None else member("integration", integration, Integration)
+def particles_in_cell(model: Model) -> float:
+    """Mean number of particles that fill a cell, by their volumes and those of their cells. Collective."""
+    p = model.particles
+    counts = np.where(p.is_resting, p.resting if p.is_resting.any() else 0, 1)
+    full = counts * model.cell_volumes[p.cell] / p.volume
+    total, n = model.comm.allreduce(np.array([counts @ full, counts.sum()]))
+    return float(total / n) if n else 0.0
 
 
 def _innermost(law: Any) -> Any:

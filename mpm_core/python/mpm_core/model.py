@@ -138,7 +138,7 @@ class Model(ContactMethods, Body):
             integration: how stresses become forces in the steps that are meant; by default as in ``explicit``.
         """
         g = self._core.gravity if gravity is None else floats("gravity", gravity, (self.mesh.dim,)).tolist()
-        return self._core.out_of_balance(g, integration_of(self.laws, integration), flag("nmd", nmd))
+        return self._core.out_of_balance(g, integration_of(self, integration), flag("nmd", nmd))
 
     def report(self) -> Report:
         """State of the run at the present time."""
@@ -193,8 +193,8 @@ class Model(ContactMethods, Body):
                 the step.
             nmd: average volumetric strains over nodes (nodal mixed discretisation), and mean stresses for the nodal forces by the
                 transpose, so that both do the same work.
-            integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`. By default MIXED where
-                all soil that yields has cohesion, otherwise PARTICLES; see `default_integration`.
+            integration: how stresses become forces: PARTICLES, MIXED or DUAL_DOMAIN; see `Integration`. By default as
+                `default_integration` says: MIXED in soil with cohesion and six or more particles in a cell, otherwise PARTICLES.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             transfer: which velocities particles carry: FLIP or AFFINE; see `Transfer`.
             allow_unstable: take ``dt`` even above the critical time step.
@@ -214,11 +214,11 @@ class Model(ContactMethods, Body):
         """
         refuse_far_field(self, "the explicit scheme")
         damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
-        integration = collectively(self.comm, lambda: integration_of(self.laws, integration))
         if damping and self._free_fields:
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
             )
+        integration = integration_of(self, integration)
         options, run, times, threshold, steps, limit, _ = collectively(
             self.comm,
             lambda: (
@@ -300,7 +300,6 @@ class Model(ContactMethods, Body):
             RunError: a step of dt / 1024 did not converge, or a particle left the mesh; with the reason. The
                 particles have the state after the last step that converged.
         """
-        integration = collectively(self.comm, lambda: integration_of(self.laws, integration))
         refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
@@ -313,6 +312,7 @@ class Model(ContactMethods, Body):
             refuse_water(self, "the scheme of second order")
         if isinstance(solver, Relaxation):
             refuse_water(self, "relaxation")
+        integration = integration_of(self, integration)
         options, longest, times, steps, threshold, limit, wanted, method, _ = collectively(
             self.comm,
             lambda: (
@@ -374,6 +374,7 @@ class Model(ContactMethods, Body):
         refuse_contacts(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
+        integration = integration_of(self, integration)
         options, method, ratio = collectively(
             self.comm,
             lambda: (
@@ -381,7 +382,7 @@ class Model(ContactMethods, Body):
                     0.0,
                     0.0,
                     nmd,
-                    integration_of(self.laws, integration),
+                    integration,
                     True,
                     ghost,
                     small_displacements,

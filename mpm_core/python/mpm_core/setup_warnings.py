@@ -13,7 +13,6 @@ from . import _core
 
 if TYPE_CHECKING:
     from .model import Model
-    from .report import Report
 
 UNIT_WEIGHTS = (1e3, 150e3)
 """Bounds of the unit weight of a soil [N/m3]: peat has 10 kN/m3, published slopes have up to 80, and 16 kN/m3 taken for a density
@@ -24,9 +23,6 @@ RADIANS = (0.1, 1.57)
 
 STEEPEST_FRICTION = 2.0
 """Coefficient of friction, of an angle of 63 degrees, above which it is more probably an angle"""
-
-YIELDS_ABOVE = 0.2
-"""Plastic work over the energy at work above which a body counts as one that fails"""
 
 NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
@@ -169,34 +165,6 @@ def dilates(laws: Iterable[Any]) -> bool:
     """Whether soil of a law with friction dilates as it fails."""
     yields = [law for law in laws if not isinstance(law, _core.LinearElastic) and not keeps_volume([law])]
     return any(_core.associated_fraction(law) > 0 for law in yields)
-
-
-class FailureWatch:
-    """Warns once where frictional soil fails that locks only then: its dilation angle is below its friction angle.
-
-    Args:
-        model: the model.
-        nmd: whether its strains are averaged.
-    """
-
-    def __init__(self, model: Model, nmd: bool) -> None:
-        self._speaks = not nmd and model.comm.rank == 0 and locks_at_failure(model.laws)
-
-    def look(self, report: Report) -> None:
-        """Warn if the soil has failed.
-
-        Args:
-            report: the state of the run.
-        """
-        if self._speaks and report.plastic_work > YIELDS_ABOVE * report.energy_scale > 0:
-            self._speaks = False
-            warnings.warn(
-                "the soil fails, and its dilation angle is below its friction angle, so that its volume hardly changes; linear cells "
-                "then overestimate the strength (volumetric locking), the more the coarser the mesh. Use nmd=True, which averages "
-                "volumetric strains, best together with integration=MIXED (docs/howto/switches.md)",
-                RuntimeWarning,
-                stacklevel=5,
-            )
 
 
 def _reasons_to_lock(law: Any) -> Iterator[str]:

@@ -163,7 +163,36 @@ LOAM = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angl
     ],
 )  # fmt: skip
 def test_default_is_mixed_where_all_soil_that_yields_has_cohesion(laws, mixed):
-    assert mpm.default_integration(laws) == (Integration.MIXED if mixed else Integration.PARTICLES)
+    model = mpm.Model(box([4, 4]), laws)
+    model.seed(density=DENSITY, per_cell=6)
+    assert mpm.default_integration(model) == (Integration.MIXED if mixed else Integration.PARTICLES)
+
+
+@pytest.mark.parametrize(("dim", "enough", "too_few"), [(2, 6, 4), (3, 4, 1)])
+def test_default_is_mixed_where_enough_particles_fill_a_cell(dim, enough, too_few):
+    for per_cell, expected in ((too_few, Integration.PARTICLES), (enough, Integration.MIXED)):
+        model = mpm.Model(box([4] * dim), CLAY)
+        model.seed(density=DENSITY, per_cell=per_cell)
+        assert mpm.default_integration(model) == expected
+
+
+def test_default_stays_while_particles_gather_and_over_a_restart(tmp_path):
+    model = slope(0.2, law=CLAY)
+    model.explicit(0.05).last()
+    p = model.particles
+    model.place(p.initial_position)
+    p.set("volume", 3 * p.volume)
+    assert mpm.default_integration(model) == Integration.PARTICLES
+    model.save(tmp_path / "state.h5")
+    other = mpm.Model(model.mesh, CLAY)
+    other.restore(tmp_path / "state.h5")
+    for each in (model, other):
+        each.explicit(0.1, integration=None, energy_limit=None).last()
+    told = mpm.Model(model.mesh, CLAY)
+    told.restore(tmp_path / "state.h5")
+    told.explicit(0.1, integration=Integration.MIXED, energy_limit=None).last()
+    for each in (model, other):
+        assert np.array_equal(by_id(each, "position"), by_id(told, "position"))
 
 
 @pytest.mark.parametrize("law", [LOAM, SAND], ids=["loam", "sand"])
