@@ -150,10 +150,7 @@ def _follow(model: Any, damping: float, rest: float, nmd: bool) -> Any:
     steps_before = model.steps
     for look in range(1, LAST_LOOK + 1):
         try:
-            # By particles: nearer to the finite elements on the same cells than mixed integration, by 1 % of the factor.
-            report = model.explicit(
-                model.time + period, damping=damping, nmd=nmd, integration=mpm.Integration.PARTICLES
-            ).last()
+            report = model.explicit(model.time + period, damping=damping, nmd=nmd).last()
         except mpm.RunError as error:
             return EquilibriumReport("undecided", residuals, str(error), model.steps - steps_before), moved[-1]
         residuals.append(report.unbalanced_ratio)
