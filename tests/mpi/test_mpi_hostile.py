@@ -66,7 +66,10 @@ CONTACT = {
     "body": {"start": 0, "mass": 0, "speed": 0, "velocity": [[], []], "spin": [[], []], "force": [[], []], "centre": [0, 0],
              "inertia": [], "drive": [], "rotates": False},
 }  # fmt: skip
-WATER = {"unit_weight": 1e4, "modulus": "much", "kozeny_carman": False, "drained_surface": False, "conditions": []}
+WATER = {
+    "unit_weight": 1e4, "modulus": "much", "suction_limit": "inf", "kozeny_carman": False, "drained_surface": False, "standing": [],
+    "rain": [], "retention": [], "anisotropy": [], "conditions": [],
+}  # fmt: skip
 
 HOSTILE = {
     "not UTF-8": (not_utf8, "description is damaged"),
@@ -207,48 +210,6 @@ def test_a_partition_that_is_none_is_refused(comm, shared_path, cell):
     comm.barrier()
     with pytest.raises(mpm.RunError, match="/cells/owned_cells"):
         model.restore(path)
-
-
-@pytest.mark.parametrize("prefix", ["energy_", "order_"])
-def test_an_older_file_lacks_numbers_and_goes_on_alike(comm, shared_path, prefix):
-    """Neither the energy balance nor the count of particles out of order moves a particle."""
-    path = shared_path / "state.h5"
-    model, again = sliding_slope(comm), sliding_slope(comm)
-    list(model.explicit(0.05))
-    model.save(path)
-    if comm.rank == 0:
-        with h5py.File(path, "r+") as file:
-            older = [name for name in file["ranks"] if name.startswith(prefix)]
-            assert older
-            for name in older:
-                del file["ranks"][name]
-    comm.barrier()
-    again.restore(path)
-    for each in (model, again):
-        list(each.explicit(0.1))
-    moved, expected = all_by_id(again)["position"], all_by_id(model)["position"]
-    np.testing.assert_allclose(moved, expected, rtol=1e-12, atol=0)
-
-
-def test_a_file_of_format_1_is_read(comm, shared_path):
-    """As version 0.1.0 wrote it: without checksums of HDF5, with 512 bytes in front and the description as an attribute."""
-    path, old = shared_path / "state.h5", shared_path / "old.h5"
-    model, again = sliding_slope(comm), sliding_slope(comm)
-    list(model.explicit(0.05))
-    model.save(path)
-    if comm.rank == 0:
-        with h5py.File(path) as file, h5py.File(old, "w", userblock_size=512) as copy:
-            for group in ("particles", "cells", "ranks"):
-                for name, rows in file[group].items():
-                    copy[f"{group}/{name}"] = rows[()]
-            copy.attrs["description"] = np.bytes_(file["description"][0])
-    comm.barrier()
-    again.restore(old)
-    for each in (model, again):
-        list(each.explicit(0.1))
-    one, other = all_by_id(model), all_by_id(again)
-    for name in one:
-        np.testing.assert_array_equal(one[name], other[name], err_msg=name)
 
 
 def test_a_long_path_can_be_read_too(comm, shared_path):

@@ -91,24 +91,24 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     there = checkpoint_description(name, model.comm)
     here = _description(model)
     collectively(model.comm, lambda: _compare(name, there, here))
-    surfaces = [one["surface"] for one in there.get("contacts", [])]
-    surfaces += [one["interface"] for one in there.get("field_contacts", [])]
+    surfaces = [one["surface"] for one in there["contacts"]]
+    surfaces += [one["interface"] for one in there["field_contacts"]]
     collectively(model.comm, lambda: require_surfaces(model, surfaces))
-    collectively(model.comm, lambda: require_border(model, name, there.get("far_field")))
+    collectively(model.comm, lambda: require_border(model, name, there["far_field"]))
     with CheckpointFile(name, model.comm) as file:
-        if there.get("cuts") and there["ranks"] == model.comm.size:
+        if there["cuts"] and there["ranks"] == model.comm.size:
             _take_partition(model, file, name)
             model.repartitions = there["cuts"]
         with _usable(name):
-            for field in there.get("added_fields", []):
+            for field in there["added_fields"]:
                 if field["name"] not in {known["name"] for known in model.particles.schedule()}:
                     model.add_field(**field)
-        contacts = tuple(there.get(name, []) for name in ("contacts", "collisions", "field_contacts"))
+        contacts = tuple(there[name] for name in ("contacts", "collisions", "field_contacts"))
         before, water = (model._contacts, model._collisions, model._field_contacts), _water(model)
         try:
             with _usable(name):
                 _replace_contacts(model, *contacts)
-                _take_water(model, there.get("water"))
+                _take_water(model, there["water"])
             _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
             _replace_contacts(model, *before)
@@ -194,7 +194,7 @@ def _require_totals(model: Model, path: str, totals: Arrays, there: dict[str, An
             raise RunError(f"cannot read /ranks/{name} in {path}: it has the value {totals[name][0]}, expected {there[name]}, as "
                            "its description says")  # fmt: skip
     for name, total in _sums(totals).items():
-        expected_sum = there.get("sums", {}).get(name, total)  # older checkpoints have none
+        expected_sum = there["sums"].get(name)
         if total != expected_sum:
             raise RunError(f"cannot read /ranks/{name} in {path}: its sum over ranks is {total}, expected {expected_sum}, as its "
                            "description says")  # fmt: skip
@@ -267,18 +267,10 @@ _COMPARED = {
 def _compare(path: str, there: dict[str, Any], here: dict[str, Any]) -> None:
     """Refuse a checkpoint of another dimension, geometry, mesh or materials."""
     for key, what in _COMPARED.items():
-        was = there.get(key, _default(key, here))
-        if was != here[key]:
+        if there[key] != here[key]:
             raise InputError(
-                f"checkpoint {path} is of another {what}: it has {_shown(was)}, the model has {_shown(here[key])}"
+                f"checkpoint {path} is of another {what}: it has {_shown(there[key])}, the model has {_shown(here[key])}"
             )
-
-
-def _default(key: str, here: dict[str, Any]) -> Any:
-    """Entries that older checkpoints lack, with the only value that existed then."""
-    if key == "geometry":
-        return "PLANE_STRAIN" if here["dimension"] == 2 else "SOLID"
-    return [0] * len(here["materials"]) if key == "velocity_fields" else None
 
 
 def _shown(value: Any) -> str:
@@ -359,33 +351,28 @@ def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
         return
     water = _core.PoreWater()
     for name in _WATER:
-        if name in entry:  # older checkpoints have no suction_limit
-            setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
+        setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
     for name in _OF_SURFACE:
-        setattr(water, name, [(time, value) for time, value in entry.get(name, [])])
-    water.anisotropy = [  # older checkpoints have the factors along the axes
-        (tensor if np.ndim(tensor) == 2 else np.diag(tensor).tolist()) for tensor in entry.get("anisotropy", [])
-    ]
-    model._set_retention(water, [[np.asarray(values) for values in of_law] for of_law in entry.get("retention", [])])
+        setattr(water, name, [(time, value) for time, value in entry[name]])
+    water.anisotropy = entry["anisotropy"]
+    model._set_retention(water, [[np.asarray(values) for values in of_law] for of_law in entry["retention"]])
     model._core.water = water
     model._set_water_conditions(
-        [(tag, _history(value), slope, held, loads) for tag, value, slope, held, loads in entry["conditions"]]
+        [
+            (tag, [tuple(pair) for pair in value], slope, held, loads)
+            for tag, value, slope, held, loads in entry["conditions"]
+        ]
     )
 
 
-def _history(value: Any) -> list[tuple[float, float]]:
-    """A pressure over time; older checkpoints have a number."""
-    return [(time, number) for time, number in value] if isinstance(value, list) else [(0.0, value)]
-
-
-_NEWER = ("needs_cell_size", "strength_parameters", "library", "symbol")
-"""Properties on which no step depends beside the others, and that checkpoints of older versions do not have"""
+_NOT_COMPARED = ("needs_cell_size", "strength_parameters", "library", "symbol")
+"""Properties on which no step depends beside the others"""
 
 
 def _material(law: Any) -> str:
     """Text with the name and all parameters of a law and the laws within it, which differs between any two laws."""
     names = sorted(
-        name for name, value in vars(type(law)).items() if isinstance(value, property) and name not in _NEWER
+        name for name, value in vars(type(law)).items() if isinstance(value, property) and name not in _NOT_COMPARED
     )
     values = [getattr(law, name) for name in names]
     texts = [_value(law, value) for value in values]
@@ -408,10 +395,10 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._conditions = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
     model._prescribed = {int(tag): model._conditions[k] for tag, k in there["prescribed"].items()}
     model._next_id = there["next_id"]
-    model._left_imbalance = there.get("left_imbalance", 1.0)
-    model._integration = _core.Integration.__members__.get(there.get("integration"))
+    model._left_imbalance = there["left_imbalance"]
+    model._integration = _core.Integration.__members__.get(there["integration"])
     model._control = None
-    model._resumed = StepControl(**there["implicit"]) if there.get("implicit") else None
+    model._resumed = StepControl(**there["implicit"]) if there["implicit"] else None
     collectively(model.comm, lambda: core.set_supports(model._conditions))
-    model._take_absorbing(there.get("absorbing"))
-    model._take_border_state(there.get("far_field"))
+    model._take_absorbing(there["absorbing"])
+    model._take_border_state(there["far_field"])

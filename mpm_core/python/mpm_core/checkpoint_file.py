@@ -19,9 +19,7 @@ from .hdf5 import RowsFile
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 FORMAT = 2
-"""1: checked by a stamp in its first 512 bytes, which is not read any more, and with the description as an attribute"""
-_MAY_LACK = ("drag_work", "friction_work", "energy_", "order_", "converted_", "gained_")
-"""Beginnings of the names of totals that older files do not have"""
+"""Number of the layout, which is read alone"""
 
 
 def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str, Arrays]) -> None:
@@ -130,19 +128,18 @@ class CheckpointFile:
         with open(self._path, "rb"):  # the system names what it refuses in plain words
             pass
         file = h5py.File(self._path, "r")
-        number = int(file["format"][0]) if "format" in file else 1 if file.userblock_size == 512 else 0
-        if number < 1 or "description" not in (file if number > 1 else file.attrs):
+        if "format" not in file or "description" not in file:
             raise ValueError("it is not a checkpoint")
-        if number > FORMAT:
-            raise ValueError(f"it has format {number}, this program reads formats 1 to {FORMAT}")
+        number = int(file["format"][0])
+        if number != FORMAT:
+            raise ValueError(f"it has format {number}, this program reads format {FORMAT}")
         return file
 
     def description(self) -> bytes:
         """The text of the description, as it is in the file."""
 
         def read() -> bytes:
-            old = "format" not in self._file
-            text = self._file.attrs["description"] if old else self._file["description"][0]
+            text = self._file["description"][0]
             if not isinstance(text, bytes):
                 raise ValueError("its description is no text")
             return bytes(text)
@@ -208,9 +205,7 @@ class CheckpointFile:
 
     def totals(self, widths: Mapping[str, int], rows: slice) -> Arrays:
         """Totals of some ranks."""
-        there = self.names("ranks")
-        names = [name for name in widths if name in there or not name.startswith(_MAY_LACK)]
-        return {name: self.rows(f"ranks/{name}", rows, widths[name]) for name in names}
+        return {name: self.rows(f"ranks/{name}", rows, width) for name, width in widths.items()}
 
     def cells(self, widths: Mapping[str, int]) -> Arrays:
         """Tables of the cells of this rank."""

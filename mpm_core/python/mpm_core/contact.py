@@ -350,7 +350,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     dim, known = model.mesh.dim, len(model._contacts)
     for number, entry in list(enumerate(entries))[known:]:
         surface, _ = surface_of(model, entry["surface"])._checked(dim)
-        bonded = entry.get("bonded", False)  # files of before there were any lack it
+        bonded = entry["bonded"]
         slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
         bond = bond_name(number) if bonded else ""
         known_fields = {field["name"] for field in model.particles.schedule()}

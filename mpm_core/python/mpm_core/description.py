@@ -23,8 +23,6 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
     if not isinstance(there, dict):
         raise RunError(f"cannot read checkpoint {path}: its description is no table of entries")
     for name, (shape, expected) in _ENTRIES.items():
-        if name not in there and name in _OPTIONAL:
-            continue
         if not _has_shape(there.get(name), shape):
             raise RunError(
                 f"cannot read checkpoint {path}: {name} in its description is {json.dumps(there.get(name))[:80]}, "
@@ -54,18 +52,15 @@ def _has_shape(value: Any, shape: Any) -> bool:
     Args:
         value: a value as `json.loads` returns it.
         shape: a type; a set of what the value may be; a function that checks it; a list with the shape of all items; a tuple with
-            the shapes of a list of fixed length; a table with the shape of each key, where a question mark after a key says that
-            older files lack it; or several of these, `AnyOf`.
+            the shapes of a list of fixed length; a table with the shape of each key; or several of these, `AnyOf`.
     """
     if isinstance(shape, AnyOf):
         return any(_has_shape(value, one) for one in shape)
     if isinstance(shape, dict):
-        known = {key.rstrip("?"): key for key in shape}
         return (
             isinstance(value, dict)
-            and set(value) <= set(known)
-            and all(key in value or known[key].endswith("?") for key in known)
-            and all(_has_shape(one, shape[known[key]]) for key, one in value.items())
+            and set(value) == set(shape)
+            and all(_has_shape(one, shape[key]) for key, one in value.items())
         )
     if isinstance(shape, list):
         return isinstance(value, list) and all(_has_shape(one, shape[0]) for one in value)
@@ -140,24 +135,18 @@ _BODY = {
     "centre": [_is_number], "inertia": [_is_number], "drive": [{0, 1, 2}], "rotates": bool,
 }  # fmt: skip
 _CONTACT = {
-    "surface": _is_surface, "friction": _is_number, "adhesion": _is_number, "penalty": _is_number, "bonded?": bool, "body": _BODY
+    "surface": _is_surface, "friction": _is_number, "adhesion": _is_number, "penalty": _is_number, "bonded": bool, "body": _BODY
 }  # fmt: skip
 _FIELD_CONTACT = {
     "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
 }  # fmt: skip
 _WATER = {
-    "unit_weight": _is_number, "modulus": str, "suction_limit?": str,  # texts, as they may be infinite
-    "kozeny_carman": bool, "drained_surface": bool, "standing?": [_PAIR], "rain?": [_PAIR], "retention?": [[[_is_number]]],
-    "anisotropy?": [AnyOf([(_is_number,) * 3, ((_is_number,) * 3,) * 3])],
-    "conditions": [(_is_tag, AnyOf([_is_number, [_PAIR]]), _is_number, bool, bool)],
+    "unit_weight": _is_number, "modulus": str, "suction_limit": str,  # texts, as they may be infinite
+    "kozeny_carman": bool, "drained_surface": bool, "standing": [_PAIR], "rain": [_PAIR], "retention": [[[_is_number]]],
+    "anisotropy": [((_is_number,) * 3,) * 3],
+    "conditions": [(_is_tag, [_PAIR], _is_number, bool, bool)],
 }  # fmt: skip
-_CONTROL = {"longest": _is_above_zero, "length": _is_above_zero, "iterations?": _is_positive, "cuts?": _is_positive}
-
-_OPTIONAL = (
-    "added_fields", "contacts", "far_field", "field_contacts", "water", "geometry", "velocity_fields", "cuts", "left_imbalance",
-    "implicit", "notes", "sums", "collisions", "absorbing", "integration",
-)  # fmt: skip
-"""Entries that older files lack"""
+_CONTROL = {"longest": _is_above_zero, "length": _is_above_zero, "iterations": _is_positive, "cuts": _is_positive}
 
 _ENTRIES: dict[str, tuple[Any, str]] = {
     "ranks": (lambda v: _is_count(v) and v > 0, "a whole number from 1 on"),
