@@ -359,7 +359,7 @@ def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
     model._core.water = water
     model._set_water_conditions(
         [
-            (tag, [tuple(pair) for pair in value], slope, held, loads)
+            (tag, [(time, number) for time, number in value], slope, held, loads)
             for tag, value, slope, held, loads in entry["conditions"]
         ]
     )
