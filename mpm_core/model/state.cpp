@@ -179,15 +179,6 @@ bool is_positive(std::string_view name)
                              "energy_outflow_kinetic"};
   return std::ranges::find(names, name) != names.end() || name.starts_with("least_mass");
 }
-
-/// Files of before the energy balance do not have its numbers.
-template <class G>
-void begin_balance_where_unknown(Model<G>& model, const std::vector<Table>& ranks)
-{
-  if (std::ranges::none_of(ranks, [](const Table& table) { return table.name.starts_with("energy_"); }))
-    start_energy_balance(model);
-  model.energy.stale = false;
-}
 } // namespace
 
 template <class G, int D>
@@ -257,7 +248,7 @@ void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<T
   }
   for (const Table& table : ranks)
     set_number(model, table, table.values.front());
-  begin_balance_where_unknown(model, ranks);
+  model.energy.stale = false;
   map_to_nodes(model); // so that nodal sums are there before the first step
 }
 
@@ -285,7 +276,7 @@ void restore_other(Model<G>& model, Particles<D>&& particles, const std::vector<
                       number = static_cast<std::remove_cvref_t<decltype(number)>>(value);
                     }
                   });
-  begin_balance_where_unknown(model, ranks);
+  model.energy.stale = false;
   map_to_nodes(model);
 }
 
