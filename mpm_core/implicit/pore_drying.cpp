@@ -49,7 +49,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
   pore.drying.assign(pore.cells.size(), DryingCell<D>{});
   for (const Run& run : runs)
   {
-    const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const double factor = integration_factor(mesh, field, run.cell);
     const auto standing = standing_water(mesh, water, run.cell);
     const double growth = growth_of(mesh, field, step, run.cell);
     const Matrix<D> anisotropy = anisotropy_of<D>(water, run.material).tensor;

@@ -161,7 +161,7 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
   for (const Run& run : step.runs)
   {
     const Law& law = model.laws[static_cast<std::size_t>(run.material)];
-    const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const double factor = integration_factor(mesh, field, run.cell);
     const auto standing = standing_water(mesh, *model.water, run.cell);
     const auto anisotropy = anisotropy_of<D>(*model.water, run.material);
     const double per_density = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);

@@ -115,7 +115,7 @@ double add_increments(Particles<G::dim>& particles, double modulus, const Run& r
 }
 
 /// Lets mass, and the saturation of soil that may dry, follow the water that particles take up over the step.
-/// @param factor  volume over which the step integrates the cell, over that of its particles
+/// @param factor  see `integration_factor`
 /// @pre pressures are those of the end, volumes and porosities of the start
 /// @returns kinetic energy of the water that leaves them, which moves as they do
 template <class G, int D = G::dim>
@@ -177,7 +177,7 @@ void update_pore_water(Model<G>& model, const ImplicitStep<G>& step)
       model.energy.stress_work +=
           add_increments<G>(model.particles, model.water->modulus, run, centre, field.moments[run.cell], pressure);
       const double growth = growth_of(mesh, field, step, run.cell);
-      const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+      const double factor = integration_factor(mesh, field, run.cell);
       if (changes_masses(*model.water, step.options))
         model.energy.outflow_kinetic += take_up_water(run, *model.water, step, factor, growth, pressure, centre,
                                                       field.moments[run.cell], model.particles);

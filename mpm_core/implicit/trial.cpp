@@ -186,7 +186,7 @@ void integrate_cells(const Mesh<D>& mesh, const VelocityField<G>& field, Implici
 {
   for (Index c : step.cells)
   {
-    const double factor = integrated_volume(mesh, field, c) / field.moments[c].volume;
+    const double factor = integration_factor(mesh, field, c);
     for (double& component : step.stress[c])
       component *= factor;
     if (!step.stiffness.empty())

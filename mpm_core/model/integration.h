@@ -28,6 +28,13 @@ inline double integrated_volume(const Mesh<D>& mesh, const VelocityField<G>& fie
   return whole ? cell_volume<G>(mesh.shapes[cell]) : field.moments[cell].volume;
 }
 
+/// That volume over the volume of the cell's particles: what sums over these are multiplied by.
+template <class G, int D = G::dim>
+inline double integration_factor(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  return integrated_volume(mesh, field, cell) / field.moments[cell].volume;
+}
+
 /// The fraction of nodal mixed discretisation in a cell, that of its forces.
 template <int D>
 inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)

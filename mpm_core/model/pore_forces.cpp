@@ -14,7 +14,7 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
     return;
   for (const Run& run : runs)
   {
-    const double factor = integrated_volume(mesh, field, run.cell) / field.moments[run.cell].volume;
+    const double factor = integration_factor(mesh, field, run.cell);
     const auto standing = standing_water(mesh, water, run.cell);
     PoreLoad<D> load{};
     for (Index p = run.first; p < run.last; ++p)
