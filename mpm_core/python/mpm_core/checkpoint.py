@@ -25,6 +25,7 @@ from .field_contact import set_field_contacts
 from .fingerprint import fingerprint, mesh_fingerprint
 from .rows import find_items
 from .step_control import StepControl
+from .water_entry import take_water, water_entry
 
 if TYPE_CHECKING:
     from .model import Model
@@ -104,15 +105,15 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
                 if field["name"] not in {known["name"] for known in model.particles.schedule()}:
                     model.add_field(**field)
         contacts = tuple(there[name] for name in ("contacts", "collisions", "field_contacts"))
-        before, water = (model._contacts, model._collisions, model._field_contacts), _water(model)
+        before, water = (model._contacts, model._collisions, model._field_contacts), water_entry(model)
         try:
             with _usable(name):
                 _replace_contacts(model, *contacts)
-                _take_water(model, there["water"])
+                take_water(model, there["water"])
             _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
             _replace_contacts(model, *before)
-            _take_water(model, water)
+            take_water(model, water)
             raise
     with _usable(name):
         _take(model, there)
@@ -305,7 +306,7 @@ def _description(model: Model) -> dict[str, Any]:
         "contacts": model._contacts,
         "collisions": model._collisions,
         "field_contacts": model._field_contacts,
-        "water": _water(model),
+        "water": water_entry(model),
         "absorbing": model._absorbing_state(),
         "far_field": model._border_state(),
         "implicit": None if model._control is None else vars(model._control),
@@ -317,52 +318,6 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
     own = {field["name"] for field in type(model._core).default_particle_schedule()}
     keys = ("name", "unit", "meaning", "components", "initial")
     return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
-
-
-_WATER = ("unit_weight", "modulus", "suction_limit", "kozeny_carman", "drained_surface")
-
-_MAY_BE_INFINITE = ("modulus", "suction_limit")
-
-_OF_SURFACE = ("standing", "rain")
-
-
-def _water(model: Model) -> dict[str, Any] | None:
-    """Properties and boundary conditions of the pore water."""
-    water = model._core.water
-    if water is None:
-        return None
-    values = {name: getattr(water, name) for name in _WATER}
-    texts = {name: repr(getattr(water, name)) for name in _MAY_BE_INFINITE}
-    surface = {name: [list(pair) for pair in getattr(water, name)] for name in _OF_SURFACE}
-    curves = [[values.tolist() for values in of_law] for of_law in model._retention]
-    return {
-        **values,
-        **texts,
-        **surface,
-        "conditions": [list(one) for one in model._water_conditions],
-        "retention": curves,
-        "anisotropy": [[list(row) for row in tensor] for tensor in water.anisotropy],
-    }
-
-
-def _take_water(model: Model, entry: dict[str, Any] | None) -> None:
-    model._core.water, model._water_conditions, model._retention = None, [], []
-    if entry is None:
-        return
-    water = _core.PoreWater()
-    for name in _WATER:
-        setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
-    for name in _OF_SURFACE:
-        setattr(water, name, [(time, value) for time, value in entry[name]])
-    water.anisotropy = entry["anisotropy"]
-    model._set_retention(water, [[np.asarray(values) for values in of_law] for of_law in entry["retention"]])
-    model._core.water = water
-    model._set_water_conditions(
-        [
-            (tag, [(time, number) for time, number in value], slope, held, loads)
-            for tag, value, slope, held, loads in entry["conditions"]
-        ]
-    )
 
 
 _NOT_COMPARED = ("needs_cell_size", "strength_parameters", "library", "symbol")
