@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.resting import represented
 
 import mpm_core as mpm
 
@@ -22,8 +23,7 @@ def numbers_in(model: mpm.Model, cells: np.ndarray) -> np.ndarray:
     """Numbers of the particles that are in some cells, or for which these rest. Collective."""
     p = model.particles
     rows = np.isin(model.mesh.global_cells[p.cell], cells)
-    counts = np.where(p.is_resting, p.resting, 1)[rows] if len(p) and p.is_resting.any() else np.ones(rows.sum())
-    mine = [first + np.arange(count) for first, count in zip(p.id[rows], counts.astype(int))]
+    mine = [first + np.arange(count) for first, count in zip(p.id[rows], represented(p)[rows].astype(int))]
     return np.concatenate([numbers for part in model.comm.allgather(mine) for numbers in part])
 
 

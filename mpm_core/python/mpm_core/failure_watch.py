@@ -6,7 +6,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from ._core import Integration
-from .integration import suits_mixed
+from .integration import integration_of
 from .setup_warnings import locks_at_failure
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ class FailureWatch:
         self._warning = ""
         if not options.nmd and locks_at_failure(model.laws):
             self._warning = LOCKING
-        elif options.nmd and options.integration == Integration.PARTICLES and suits_mixed(model):
+        elif (
+            options.nmd and options.integration == Integration.PARTICLES and integration_of(model) == Integration.MIXED
+        ):
             self._warning = GATHERING
         self._speaks = bool(self._warning) and model.comm.rank == 0
 

@@ -11,6 +11,7 @@ from . import _core
 from ._core import InputError
 from .ground_column import Layers
 from .mesh import cell_sizes
+from .resting import represented
 
 SAME_LEVEL = 1e-6
 """Difference in height, over that of the side, of nodes on one level"""
@@ -96,7 +97,7 @@ def _counts(model: Any) -> NDArray[np.float64]:
     """Number of particles in the cell of each particle, or for which its cell rests, (n)."""
     p = model.particles
     in_cell = np.bincount(p.cell, minlength=model.mesh.owned_cells)[p.cell]
-    return np.where(p.is_resting, p.resting if p.is_resting.any() else 0.0, in_cell)
+    return np.where(p.is_resting, represented(p), in_cell)
 
 
 def _facets_of(model: Any, tag: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from ._core import Integration
 from .checks import member
+from .resting import represented
 from .setup_warnings import with_inner_laws
 
 if TYPE_CHECKING:
@@ -31,21 +32,18 @@ def default_integration(model: Model) -> Integration:
     Args:
         model: with its particles.
     """
-    return Integration.MIXED if suits_mixed(model) else Integration.PARTICLES
+    # Rounded, as round-off and small strains change volumes.
+    mixed = all_cohesive(model.laws) and round(particles_in_cell(model)) >= LEAST_IN_CELL[model.mesh.dim]
+    return Integration.MIXED if mixed else Integration.PARTICLES
 
 
-def integration_of(model: Model, integration: Any) -> Integration:
-    """The integration that is named, or for None the default as it was when the present particles were seeded. Collective."""
+def integration_of(model: Model, integration: Any = None) -> Integration:
+    """The integration that is named, or for None the default as it was at the first use of the present particles. Collective."""
     if integration is not None:
         return member("integration", integration, Integration)
     if model._integration is None:
         model._integration = default_integration(model)
     return model._integration
-
-
-def suits_mixed(model: Model) -> bool:
-    """Whether mixed integration suits the soil and the particles of a model. Collective."""
-    return all_cohesive(model.laws) and particles_in_cell(model) >= LEAST_IN_CELL[model.mesh.dim]
 
 
 def all_cohesive(laws: Iterable[Any]) -> bool:
@@ -57,7 +55,7 @@ def all_cohesive(laws: Iterable[Any]) -> bool:
 def particles_in_cell(model: Model) -> float:
     """Mean number of particles that fill a cell, by their volumes and those of their cells. Collective."""
     p = model.particles
-    counts = np.where(p.is_resting, p.resting if p.is_resting.any() else 0, 1)
+    counts = represented(p)
     full = counts * model.cell_volumes[p.cell] / p.volume
     total, n = model.comm.allreduce(np.array([counts @ full, counts.sum()]))
     return float(total / n) if n else 0.0

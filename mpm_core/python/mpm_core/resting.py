@@ -53,6 +53,11 @@ class Conversion:
         return _core.Conversion(self.plastic_strain, self.displacement, int(self.layers))
 
 
+def represented(particles: Particles) -> NDArray[Any]:
+    """Number of particles that each row stands for: those of a resting cell, otherwise 1; shape (n,)."""
+    return np.maximum(particles.resting, 1) if particles.is_resting.any() else np.ones(len(particles))
+
+
 class RestingCells:
     """The methods of a model for cells that rest."""
 
