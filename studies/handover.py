@@ -22,7 +22,7 @@ from common.page import Page
 from common.plots import save_history
 from common.ranks import run_study
 from common.results import open_results
-from common.schemes import INTEGRATIONS, averages_strains, stable_integration
+from common.schemes import averages_strains
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope_fem import step_line, weight
 from common.summary import write_summary
@@ -80,9 +80,8 @@ def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
     """Slide to the end: (k, 3) of time [s], run-out [m] and displacement of the particle at the crest [m]; and frames."""
     a = case.args
     rows, frames = [(0.0, watch.runout(), watch.crest_displacement())], [particle_frame(case.model, 0.0)]
-    integration = INTEGRATIONS[stable_integration(a.particles_per_cell, a.cohesion > 0)]
     nmd = averages_strains("explicit", case.model.laws)
-    for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping, nmd=nmd, integration=integration):
+    for report in case.model.explicit(a.time, every=a.time / 60, damping=a.damping, nmd=nmd):
         rows.append((report.time, watch.runout(), watch.crest_displacement()))
         frames.append(particle_frame(case.model, report.time))
     return np.array(rows), frames

@@ -30,7 +30,7 @@ from .plots import DISPLACEMENT, SHEAR_STRAIN, Quantity, Scene, save_history, sa
 from .progress import Progress
 from .results import open_results
 from .scenes import scene_of
-from .schemes import INTEGRATIONS, add_particles_per_cell, add_pic, stable_integration
+from .schemes import add_particles_per_cell, add_pic
 from .site_file import read_site
 from .summary import write_summary
 
@@ -106,9 +106,7 @@ def slide(
         step: of the implicit scheme, in the place of the explicit one [s].
     """
     nmd = averages(a, model.laws)
-    cohesive = all(getattr(law, "cohesion", 1.0) > 0 for law in model.laws)
-    integration = INTEGRATIONS[stable_integration(a.particles_per_cell, cohesive)]
-    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd, "integration": integration}
+    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,
