@@ -19,7 +19,7 @@ from .hdf5 import RowsFile
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 FORMAT = 2
-"""Number of the layout, which is read alone"""
+"""Number of the layout; files of another one are refused"""
 
 
 def write_file(path: str, comm: MPI.Comm, description: str, groups: Mapping[str, Arrays]) -> None:

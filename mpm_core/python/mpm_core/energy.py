@@ -19,12 +19,12 @@ LEAST_STEPS = 32
 """Steps of a model before its energy is checked: in the first explicit steps half a time step is a large part of it"""
 
 
-ADVICE = "cell crossings and too long steps are the usual causes; docs/energy.md has the error of each scheme"
+_CAUSES = "cell crossings and too long steps are the usual causes"
+ADVICE = f"{_CAUSES}; docs/energy.md has the error of each scheme"
 """Advice for runs with unexplained energy"""
 
 ADVICE_FOR = {
-    Integration.PARTICLES: "cell crossings and too long steps are the usual causes; integration=MIXED closes the balance in soil with "
-    "cohesion (docs/howto/switches.md)",
+    Integration.PARTICLES: f"{_CAUSES}; integration=MIXED closes the balance in soil with cohesion (docs/howto/switches.md)",
     Integration.MIXED: "with mixed integration the usual causes are few particles in a cell, bodies that bend and soil that comes "
     "apart; more particles in a cell or integration=PARTICLES help (docs/integration.md)",
 }
