@@ -17,6 +17,23 @@ namespace
 /// Steps after which the moments of all cells are summed over the particles again, so that round-off does not add up.
 constexpr std::int64_t summation_interval = 64;
 
+/// Notes cells that would have no volume left.
+template <class G, int D = G::dim>
+void note_lost_volume(Model<G>& model, const Batch& batch, const BatchScratch<D>& scratch)
+{
+  const std::size_t n = batch.last_run - batch.first_run;
+  LaneMask lost{};
+  for (std::size_t r = 0; r < n; r += lanes)
+    lost |= scratch.cells[r / lanes].volumetric <= -1.0;
+  std::int64_t any = 0;
+  for (int l = 0; l < lanes; ++l)
+    any |= lost[l];
+  for (std::size_t r = 0; any && r < n; ++r)
+    if (scratch.cells[r / lanes].volumetric[r % lanes] <= -1)
+      note_failure<D>(model.failure, model.particles, Failure<D>::Kind::lost_volume,
+                      model.order.runs[batch.first_run + r].first, scratch.cell_strain(r).increment);
+}
+
 template <class Kind, class G, int D = G::dim>
 void update_stress(Model<G>& model, const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
@@ -28,6 +45,8 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
                 [&](const MaterialPoints<D>& material, LawIncrement<D>& columns, PointBatch<D>& points)
                 { Kind::deform(material, batch, scratch, columns, points); });
   model.energy.ahead += Kind::template half_work_of_batch<G>(particles, batch, scratch);
+  if constexpr (Kind::moves_moments)
+    note_lost_volume(model, batch, scratch);
 }
 
 /// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out.

@@ -152,3 +152,17 @@ def test_pic_of_implicit_steps_is_that_of_the_time_they_take(steps):
     until = 30 * model.critical_time_step()
     list(model.implicit(until, dt=until / steps, pic=0.05))
     assert np.allclose(by_id(model, "velocity"), velocity * 0.95**30, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_a_cell_that_would_lose_its_volume_ends_the_run(dim):
+    # The strain increment of a step of dt with v = -k x is -k dt in each direction; its trace is -1 at k = 1 / (dim dt).
+    def closing(rate, dt=1e-3):
+        model = mpm.Model(box([2] * dim), mpm.LinearElastic(young=1.0, poisson=0.0))
+        model.seed(density=2000.0, per_cell=4 if dim == 2 else 10)
+        model.particles.set("velocity", rate * (0.5 - model.particles.position))
+        run(model, dt, dt=dt, transfer=mpm.Transfer.AFFINE, energy_limit=None)
+
+    closing(0.9 / (dim * 1e-3))
+    with pytest.raises(mpm.RunError, match="is in a cell that would lose its volume by the strain increment"):
+        closing(1.1 / (dim * 1e-3))
