@@ -23,7 +23,8 @@ struct ExplicitOptions
   Rayleigh rayleigh;       ///< damping at small strains
   double pic_fraction = 0; ///< of a step, in [0, 1]
   Transfer transfer = Transfer::flip;
-  bool nmd = false; ///< nodal mixed discretisation
+  bool moving_cells = false; ///< cells with particles move with them
+  bool nmd = false;          ///< nodal mixed discretisation
   Integration integration = Integration::particles;
   bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
 };

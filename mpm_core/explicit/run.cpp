@@ -2,6 +2,7 @@
 
 #include "materials/laws/substeps.h"
 #include "model/contacts.h"
+#include "model/moving_cells.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
 
@@ -110,6 +111,20 @@ void require_affine(const Model<G>& model, const ExplicitOptions& options)
     throw InputError("transfer is AFFINE, expected FLIP in reproducible runs and with several velocity fields");
 }
 
+/// @throws InputError what moving cells do not cover
+template <class G>
+void require_moving_cells(const Model<G>& model, const ExplicitOptions& options)
+{
+  const std::string option = "moving_cells is True";
+  require_plain(model, options, option);
+  if (options.reproducible || model.fields.size() > 1)
+    throw InputError(option + ", expected False in reproducible runs and with several velocity fields");
+  if (options.transfer == Transfer::affine)
+    throw InputError(option + " with transfer AFFINE, expected FLIP");
+  if (!model.outflow_tags.empty())
+    throw InputError(option + " with outflow facets, expected a mesh without, since no particle reaches them");
+}
+
 template <class G>
 double next_step(const Model<G>& model, const RunOptions& run, double critical)
 {
@@ -135,8 +150,14 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
     require_plain(model, options, "reproducible is True");
   if (options.transfer == Transfer::affine)
     require_affine(model, options);
+  if (options.moving_cells)
+    require_moving_cells(model, options);
+  else
+    reset_cells(model);
   begin_transfer(model, options.transfer);
   prepare(model);
+  if (options.moving_cells)
+    begin_moving_cells(model);
   model.energy.kinetic = kinetic_energy(model.particles, 0, model.particles.size());
   ExplicitOptions of_step = options;
   std::int64_t done = 0;
@@ -157,6 +178,10 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
     if (model.failure)
       break;
     ++done;
+    if (!options.moving_cells)
+      continue;
+    if (const std::string text = end_of_moving_cells(model); !text.empty())
+      throw RunError(text);
   }
   update_resting_rows(model);
   if (model.failure)

@@ -22,6 +22,7 @@
 #include "model/cell_change.h"
 #include "model/far_field.h"
 #include "model/mapping.h"
+#include "model/moving_cells.h"
 #include "model/particle_pass.h"
 #include "model/resting_nodes.h"
 
@@ -49,6 +50,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   if (model.fields.size() > 1)
     throw InputError("the model has " + std::to_string(model.fields.size()) +
                      " velocity fields, expected one in implicit steps");
+  reset_cells(model);
   begin_transfer(model, Transfer::flip);
   prepare(model);
   model.exchange.reproducible = false; // an explicit run before may have asked for it

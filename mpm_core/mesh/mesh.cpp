@@ -57,37 +57,28 @@ void check_input(const MeshInput<D>& input)
 }
 
 template <int D>
-CellShape<D> make_shape(const Mesh<D>& mesh, Index cell)
+Matrix<D> edges_of(const Mesh<D>& mesh, Index cell)
 {
   const auto& nodes = mesh.cells[cell];
-  const Vector<D>& x0 = mesh.points[nodes[0]];
-  CellShape<D> shape{};
   Matrix<D> edges;
-  double longest = 0;
   for (int k = 0; k < D; ++k)
-  {
     for (int i = 0; i < D; ++i)
-    {
-      edges[k][i] = mesh.points[nodes[k + 1]][i] - x0[i];
-      shape.centre[i] += edges[k][i] / (D + 1);
-    }
-    longest = std::max(longest, norm<D>(edges[k]));
-  }
-  for (int i = 0; i < D; ++i)
-    shape.centre[i] += x0[i];
+      edges[k][i] = mesh.points[nodes[k + 1]][i] - mesh.points[nodes[0]][i];
+  return edges;
+}
 
-  const double det = as_eigen<D>(edges).determinant();
-  shape.volume = std::abs(det) / (D == 2 ? 2 : 6);
-  if (!(std::abs(det) > 1e-12 * std::pow(longest, D)))
+template <int D>
+CellShape<D> make_shape(const Mesh<D>& mesh, Index cell)
+{
+  const Matrix<D> edges = edges_of(mesh, cell);
+  const Vector<D>& x0 = mesh.points[mesh.cells[cell][0]];
+  double longest = 0;
+  for (const Vector<D>& edge : edges)
+    longest = std::max(longest, norm<D>(edge));
+  const CellShape<D> shape = shape_of_cell(mesh, cell);
+  if (!(shape.volume * (D == 2 ? 2 : 6) > 1e-12 * std::pow(longest, D)))
     throw InputError(show("cells: cell ", cell, " with its first node at ", show_point<D>(x0), " has ",
                           D == 2 ? "area " : "volume ", shape.volume, ", expected a positive value"));
-  const Eigen::Matrix<double, D, D> inverse = as_eigen<D>(edges).inverse(); // column k: gradient of vertex k + 1
-  for (int k = 0; k < D; ++k)
-    for (int i = 0; i < D; ++i)
-    {
-      shape.gradient[k + 1][i] = inverse(i, k);
-      shape.gradient[0][i] -= inverse(i, k);
-    }
   return shape;
 }
 
@@ -260,6 +251,28 @@ Mesh<D> make_mesh(const MeshInput<D>& input, int rank)
 }
 
 template <int D>
+CellShape<D> shape_of_cell(const Mesh<D>& mesh, Index cell)
+{
+  const Matrix<D> edges = edges_of(mesh, cell);
+  const Vector<D>& x0 = mesh.points[mesh.cells[cell][0]];
+  CellShape<D> shape{};
+  for (const Vector<D>& edge : edges)
+    for (int i = 0; i < D; ++i)
+      shape.centre[i] += edge[i] / (D + 1);
+  for (int i = 0; i < D; ++i)
+    shape.centre[i] += x0[i];
+  shape.volume = std::abs(as_eigen<D>(edges).determinant()) / (D == 2 ? 2 : 6);
+  const Eigen::Matrix<double, D, D> inverse = as_eigen<D>(edges).inverse(); // column k: gradient of vertex k + 1
+  for (int k = 0; k < D; ++k)
+    for (int i = 0; i < D; ++i)
+    {
+      shape.gradient[k + 1][i] = inverse(i, k);
+      shape.gradient[0][i] -= inverse(i, k);
+    }
+  return shape;
+}
+
+template <int D>
 double smallest_altitude(const CellShape<D>& shape)
 {
   double steepest = 0;
@@ -270,6 +283,8 @@ double smallest_altitude(const CellShape<D>& shape)
 
 template Mesh<2> make_mesh(const MeshInput<2>&, int);
 template Mesh<3> make_mesh(const MeshInput<3>&, int);
+template CellShape<2> shape_of_cell(const Mesh<2>&, Index);
+template CellShape<3> shape_of_cell(const Mesh<3>&, Index);
 template double smallest_altitude<2>(const CellShape<2>&);
 template double smallest_altitude<3>(const CellShape<3>&);
 } // namespace mpm::mesh

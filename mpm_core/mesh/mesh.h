@@ -74,6 +74,10 @@ struct Mesh
 template <int D>
 Mesh<D> make_mesh(const MeshInput<D>& input, int rank);
 
+/// Shape functions of a cell by the places of its nodes as they are.
+template <int D>
+CellShape<D> shape_of_cell(const Mesh<D>& mesh, Index cell);
+
 /// Volume of a cell [m^3 per metre or radian in two dimensions]: the integral of the geometry's thickness.
 template <class G>
 inline double cell_volume(const CellShape<G::dim>& shape)

@@ -91,10 +91,22 @@ struct Migration
   std::vector<int> far_partners; ///< ranks beyond the neighbours that exchange particles after this pass
 };
 
+/// Of cells that have moved with the body, the mesh as it was; empty when none have. See model/moving_cells.h.
+template <int D>
+struct MovedCells
+{
+  std::vector<Vector<D>> initial_points;
+  Array<CellShape<D>> initial_shapes;
+  std::vector<Index> watched;       ///< nodes at the surface of the body, which may meet the boundary of the mesh
+  std::vector<Index> watched_cells; ///< for each of them an owned cell near its place, for the next search
+  double travel = 0;                ///< since their places were looked at, over the smallest altitude of a cell
+};
+
 template <class G, int D = G::dim>
 struct Model
 {
-  Mesh<D> mesh;
+  Mesh<D> mesh; ///< with its nodes where they are now
+  MovedCells<D> moved_cells;
   NodeExchange exchange;
   Particles<D> particles;
   std::vector<Law> laws;

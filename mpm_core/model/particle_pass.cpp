@@ -75,6 +75,16 @@ void note(const Working<G>& stress, std::size_t run, double (&by_run)[n_stress<G
     by_run[k][run] = stress[k];
 }
 
+/// The shape of a cell about its centre at the end of the step, where the cell moves with its particles; the gradients
+/// are those of the start.
+template <int D>
+CellShape<D> about_moved_centre(CellShape<D> shape, const CellMotion<D>& motion)
+{
+  for (int a = 0; a < D; ++a)
+    shape.centre[a] += motion.displacement.value[a];
+  return shape;
+}
+
 /// What the moments of a cell become when its particles move along with the nodes, whoever they are: only stresses are
 /// summed over particles, run by run, and tractions, which are rare.
 template <class G, int D = G::dim>
@@ -83,7 +93,10 @@ void update_moments(const Mesh<D>& mesh, const Particles<D>& particles, const Pa
 {
   if (run.first_in_cell && options.move)
   {
-    move<G>(moments, scratch.motion[in_batch]);
+    CellMotion<D> motion = scratch.motion[in_batch];
+    if (options.moving_cells)
+      motion.displacement.value = {}; // the centre moves as much
+    move<G>(moments, motion);
     if (options.transfer == Transfer::affine)
       add_affine_momentum<G>(carried_gradient(options, scratch.motion[in_batch]),
                              spread_about_particles(mesh, run.cell, moments), moments);
@@ -116,8 +129,9 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const CellMotion<D>& motion = scratch.motion[r - batch.first_run];
-    runs[r].out_of_order =
-        !move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
+    const bool inside =
+        move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
+    runs[r].out_of_order = !inside && !options.moving_cells;
     if (affine)
     {
       keep_gradient<D>(particles, runs[r], carried_gradient(options, motion));
@@ -142,8 +156,11 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const Run& run = runs[r];
-    const CellShape<D>& shape = model.mesh.shapes[run.cell];
     const std::size_t i = r - batch.first_run;
+    CellShape<D> moved;
+    const CellShape<D>& shape = options.moving_cells
+                                    ? moved = about_moved_centre(model.mesh.shapes[run.cell], scratch.motion[i])
+                                    : model.mesh.shapes[run.cell];
     CellMoments<G>& moments = field.moments[run.cell];
     note<G>(run.first_in_cell ? moments.stress : Working<G>{}, i, scratch.stress_before);
     if (from_particles)

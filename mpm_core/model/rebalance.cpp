@@ -1,6 +1,7 @@
 #include "model/rebalance.h"
 
 #include "model/mapping.h"
+#include "model/moving_cells.h"
 #include "parallel/redistribution.h"
 
 namespace mpm::model
@@ -8,6 +9,7 @@ namespace mpm::model
 template <class G, int D>
 void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalIndex> owners)
 {
+  reset_cells(model);
   prepare(model); // so that ranks agree on which columns there are
   std::vector<GlobalIndex> cells, ranks;
   for (Index cell : model.particles.cell)

@@ -2,6 +2,7 @@
 
 #include "materials/laws/stored_energy.h"
 #include "model/mapping.h"
+#include "model/moving_cells.h"
 #include "model/resting_nodes.h"
 
 #include <algorithm>
@@ -75,6 +76,7 @@ void for_each_number(M& model, F&& f)
   f("seeded_particles", Kind::common, model.inventory.particles);
   f("seeded_mass", Kind::common, model.inventory.mass);
   f("particle_steps", Kind::sum, model.totals.particle_steps);
+  f("cell_travel", Kind::common, model.moved_cells.travel);
   f("outflow_particles", Kind::sum, model.totals.outflow_particles);
   f("outflow_mass", Kind::sum, model.totals.outflow_mass);
   f("converted_cells", Kind::sum, model.totals.converted_cells);
@@ -175,8 +177,8 @@ bool may_be_unknown(const Model<G>& model, std::string_view name)
 /// Whether a number cannot be below 0.
 bool is_positive(std::string_view name)
 {
-  constexpr std::array names{"last_dt", "seeded_mass", "outflow_mass", "energy_start_kinetic",
-                             "energy_outflow_kinetic"};
+  constexpr std::array names{"last_dt",      "cell_travel",          "seeded_mass",
+                             "outflow_mass", "energy_start_kinetic", "energy_outflow_kinetic"};
   return std::ranges::find(names, name) != names.end() || name.starts_with("least_mass");
 }
 } // namespace
@@ -208,6 +210,8 @@ std::vector<Table> cell_state(const Model<G>& model)
     if (!field.tractions.empty())
       tables.push_back(table_of(model.mesh, field, numbered("traction_moments", k), field.tractions));
   }
+  if (!model.moved_cells.initial_points.empty())
+    tables.push_back(moved_corners(model));
   return tables;
 }
 
@@ -220,6 +224,7 @@ std::vector<Table> empty_cell_state(const Model<G>& model)
     tables.push_back({numbered("moments", k), moments_width<CellMoments<G>> + 1, {}});
     tables.push_back({numbered("traction_moments", k), moments_width<TractionMoments<D>> + 1, {}});
   }
+  tables.push_back(no_moved_corners<D>());
   return tables;
 }
 

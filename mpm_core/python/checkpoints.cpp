@@ -1,3 +1,4 @@
+#include "model/moving_cells.h"
 #include "model/state.h"
 #include "parallel/agreement.h"
 #include "parallel/redistribution.h"
@@ -173,7 +174,6 @@ void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, 
                            rank_tables = tables_of(rank_state(model), ranks);
   agree(refusal);
   place(model, numbers, owners, restored);
-  check_positions(refusal, model.mesh, restored);
   for (const Table& table : cell_tables)
   {
     check_cells(refusal, model.mesh, table);
@@ -181,6 +181,15 @@ void restore(Model<G>& model, const py::dict& particles, const py::dict& cells, 
       refusal.note("/cells/" + table.name, "the particles have no traction");
   }
   agree(refusal);
+  Mesh<D> mesh = initial_mesh(model);
+  MovedCells<D> moved;
+  for (const Table& table : cell_tables)
+    if (table.name == no_moved_corners<D>().name)
+      moved = take_corners(owned_cell_numbers(mesh), table, mesh);
+  check_positions(refusal, mesh, restored);
+  agree(refusal);
+  model.mesh = std::move(mesh);
+  model.moved_cells = std::move(moved);
   if (owners.is_none())
     restore_same(model, std::move(restored), rank_tables, cell_tables);
   else

@@ -6,6 +6,7 @@
 #include "model/contacts.h"
 #include "model/far_field.h"
 #include "model/mapping.h"
+#include "model/moving_cells.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
 #include "model/resting.h"
@@ -98,6 +99,7 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def("seed_cells",
            [](M& model, std::optional<Index> tag, int per_cell, Index material, double density, GlobalIndex first_id)
            {
+             reset_cells(model);
              changed(model);
              return seed_cells<G>(model.mesh, tag, per_cell, {material, density}, first_id, model.particles);
            })
@@ -108,6 +110,7 @@ void bind_model(py::module_& m, const std::string& suffix)
              check_array<double>("points", points, {-1, D});
              check_array<double>("volumes", volumes, {points.shape(0)});
              check_array<GlobalIndex>("ids", ids, {points.shape(0)});
+             reset_cells(model);
              changed(model);
              return seed_points<D>(model.mesh, values<double>(points), values<double>(volumes),
                                    values<GlobalIndex>(ids), {material, density}, model.particles);
@@ -115,6 +118,7 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def("load_facets",
            [](M& model, Index facet_tag, const Vector<D>& traction)
            {
+             reset_cells(model);
              model.ready = false;
              return load_facets<G>(model.mesh, facet_tag, traction, model.particles);
            })
@@ -196,6 +200,20 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def_property_readonly("steps", [](const M& model) { return model.totals.steps; })
       .def_property_readonly("sorts", [](const M& model) { return model.totals.sorts; })
       .def_property_readonly("last_dt", [](const M& model) { return model.last.dt; })
+      .def_property_readonly("node_positions",
+                             [](const M& model) {
+                               return py::array_t<double>({static_cast<py::ssize_t>(model.mesh.points.size()), py::ssize_t{D}},
+                                                          model.mesh.points.data()->data());
+                             })
+      .def_property_readonly("cell_volumes",
+                             [](const M& model)
+                             {
+                               std::vector<double> volumes;
+                               for (const auto& shape : model.mesh.shapes)
+                                 volumes.push_back(cell_volume<G>(shape));
+                               return copied(volumes);
+                             })
+      .def_property_readonly("has_moved_cells", [](const M& model) { return !model.moved_cells.initial_points.empty(); })
       .def("critical_time_step",
            [](M& model)
            {
@@ -268,12 +286,14 @@ void bind_model(py::module_& m, const std::string& suffix)
            [](M& model, const py::array& positions)
            {
              check_array<double>("position", positions, {static_cast<py::ssize_t>(model.particles.size()), D});
+             reset_cells(model);
              place_particles<G>(model, values<double>(positions));
            })
       .def("rest_cells",
            [](M& model, const py::array& chosen)
            {
              check_array<std::uint8_t>("chosen", chosen, {static_cast<py::ssize_t>(model.mesh.owned_cells)});
+             reset_cells(model);
              rest_cells(model, values<std::uint8_t>(chosen));
            })
       .def("convert_cells",

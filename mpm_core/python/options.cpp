@@ -122,6 +122,7 @@ void bind_options(py::module_& m)
             options.rayleigh = {std::get<0>(given), std::get<1>(given), std::get<2>(given)};
           })
       .def_readwrite("nmd", &ExplicitOptions::nmd)
+      .def_readwrite("moving_cells", &ExplicitOptions::moving_cells)
       .def_readwrite("transfer", &ExplicitOptions::transfer)
       .def_readwrite("integration", &ExplicitOptions::integration)
       .def_readwrite("reproducible", &ExplicitOptions::reproducible);

@@ -104,11 +104,19 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
 
     @property
     def cell_volumes(self) -> NDArray[np.float64]:
-        """Volume of each cell of the mesh (cells,) [m^D]; in axial symmetry of one radian [m3], the integral of r dA."""
-        volumes = self.mesh.cell_volumes
-        if self.geometry == Geometry.AXISYMMETRIC:
-            volumes = volumes * self.mesh.points[self.mesh.cells, 0].mean(axis=1)
-        return volumes
+        """Volume of each cell of the mesh as it is now (cells,) [m^D]; in axial symmetry of one radian [m3], the integral of r dA.
+
+        After steps with ``moving_cells`` only those of cells with particles of this rank are those of now.
+        """
+        return self._core.cell_volumes
+
+    @property
+    def node_positions(self) -> NDArray[np.float64]:
+        """Positions of the nodes of the mesh (nodes, D) [m], where steps with ``moving_cells`` have moved them.
+
+        Those of cells without particles of this rank may be where they were before.
+        """
+        return self._core.node_positions
 
     # --- particles -----------------------------------------------------------------------------------------------
 

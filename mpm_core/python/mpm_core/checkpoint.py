@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 _OWNED_CELLS = "owned_cells"
 """Table of the cells that each rank owns, where the mesh has been repartitioned: a restart can then have the same partition."""
 
+_MOVED_CORNERS = "moved_corners"
+"""Table of the corners of the cells with particles, where these cells have moved with them"""
+
 
 def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
@@ -179,7 +182,12 @@ def _state(
     own = _own_cells(model)
     owners, _ = find_items(comm, own, np.arange(len(own)), particles["cell"])
     collectively(comm, lambda: _require_owners(path, particles, owners), RunError)
-    return particles, {}, totals, np.ascontiguousarray(owners)
+    return (
+        particles,
+        file.rows_of_cells(_MOVED_CORNERS, widths["cells"][_MOVED_CORNERS], own),
+        totals,
+        np.ascontiguousarray(owners),
+    )
 
 
 def _require_totals(model: Model, path: str, totals: Arrays, there: dict[str, Any]) -> None:

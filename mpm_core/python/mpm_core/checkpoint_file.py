@@ -215,3 +215,10 @@ class CheckpointFile:
             for name, width in widths.items()
             if name in there
         }
+
+    def rows_of_cells(self, name: str, width: int, cells: NDArray[np.integer]) -> Arrays:
+        """The rows of some cells in a table that any rank wrote, by its name; none where the file has no such table."""
+        if name not in self.names("cells"):
+            return {}
+        rows = self.rows(f"cells/{name}", slice(0, self.length(f"cells/{name}")), width)
+        return {name: np.ascontiguousarray(rows[np.isin(rows[:, 0], cells)])}

@@ -40,7 +40,7 @@ def critical_cell(model: Model) -> CriticalCell:
     found, p, mesh = None, model.particles, model.mesh
     if k >= 0:
         cell = p.cell[k]
-        centre = tuple(map(float, mesh.points[mesh.cells[cell]].mean(axis=0)))
+        centre = tuple(map(float, model.node_positions[mesh.cells[cell]].mean(axis=0)))
         number, material = int(mesh.global_cells[cell]), int(p.material[k])
         found = CriticalCell(number, centre, altitude, altitude / time_step, material, time_step)
     of_ranks = [cell for cell in model.comm.allgather(found) if cell is not None]

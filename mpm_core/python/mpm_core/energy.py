@@ -26,7 +26,7 @@ ADVICE = f"{_CAUSES}; docs/energy.md has the error of each scheme"
 ADVICE_FOR = {
     Integration.PARTICLES: f"{_CAUSES}; integration=MIXED closes the balance in soil with cohesion (docs/howto/switches.md)",
     Integration.MIXED: "with mixed integration the usual causes are few particles in a cell, bodies that bend and soil that comes "
-    "apart; more particles in a cell or integration=PARTICLES help (docs/integration.md)",
+    "apart; more particles in a cell or integration=PARTICLES help, and in bodies that bend moving_cells=True (docs/integration.md)",
 }
 """Advice for explicit runs, by the integration of stresses; for others see `ADVICE`"""
 
@@ -97,7 +97,7 @@ def _noise(report: Report, energy: float) -> str:
     return (
         f"at t = {report.time:.6g} s {fraction:.3g} % of the energy at work is motion of the particles against their nodes, "
         "which the noise of cell crossings excites. A body in tension or bending then sags and does not give its strain energy "
-        "back: take more particles per cell (24 in triangles; docs/integration.md)"
+        "back: use moving_cells=True, with which no particle crosses, or more particles per cell (24 in triangles; docs/integration.md)"
     )
 
 

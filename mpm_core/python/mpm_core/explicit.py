@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from .partition import keep_balance
 from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
 from .report import Report
-from .space import SpaceWatch, swollen
+from .space import SpaceWatch, count_parts, swollen
 
 if TYPE_CHECKING:
     from .model import Model
@@ -32,6 +33,7 @@ def explicit_options(
     rayleigh: Rayleigh,
     reproducible: bool,
     transfer: Any,
+    moving_cells: bool,
 ) -> Any:
     """The core's options of the scheme; see `Model.explicit`."""
     options = _core.ExplicitOptions()
@@ -39,10 +41,22 @@ def explicit_options(
     options.nmd = flag("nmd", nmd)
     options.transfer = member("transfer", transfer, Transfer)
     options.integration = integration
+    options.moving_cells = flag("moving_cells", moving_cells)
     options.stress_update = member("stress_update", stress_update, StressUpdate)
     options.reproducible = flag("reproducible", reproducible)
     options.rayleigh = rayleigh._as_core()
     return options
+
+
+def warn_of_parts(model: Model) -> None:
+    """Warn where a body whose cells are to move with it consists of several parts. Collective."""
+    count = count_parts(model)
+    if count > 1 and model.comm.rank == 0:
+        warnings.warn(
+            f"the body consists of {count} parts, which do not feel each other while cells move with them (moving_cells=True)",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def run_options(dt: float | None, courant: float, pic: float, allow_unstable: bool) -> Any:

@@ -22,6 +22,7 @@ from .explicit import (
     run_explicit,
     run_options,
     steps_between,
+    warn_of_parts,
 )
 from .far_field import refuse_far_field
 from .ghost import GhostPenalty
@@ -168,6 +169,7 @@ class Model(ContactMethods, Body):
         integration: Integration | None = None,
         stress_update: StressUpdate = StressUpdate.MODIFIED_LAST,
         transfer: Transfer = Transfer.FLIP,
+        moving_cells: bool = False,
         allow_unstable: bool = False,
         rebalance: float | None = None,
         energy_limit: float | None = 0.2,
@@ -197,6 +199,12 @@ class Model(ContactMethods, Body):
                 `default_integration` says: MIXED in soil with cohesion and six or more particles in a cell, otherwise PARTICLES.
             stress_update: when stresses are updated: MODIFIED_LAST (MUSL), LAST (USL) or FIRST (USF).
             transfer: which velocities particles carry: FLIP or AFFINE; see `Transfer`.
+            moving_cells: let the cells that hold particles move with them, so that no particle leaves its cell (total Lagrangian
+                MPM). For elastic bodies that bend or stretch, which need many particles in a cell otherwise. The body keeps the
+                boundary conditions of the nodes of its cells, and does not feel others, nor parts of itself that touch: the run
+                ends with an error before it meets the boundary of the mesh, or when a cell is too distorted. Any other run begins
+                with the mesh as it was. With FLIP and MODIFIED_LAST only, without water, contact, resting cells, outflow facets
+                and absorbing sides.
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
@@ -207,13 +215,17 @@ class Model(ContactMethods, Body):
                 program on the same kind of processor; sums in reports differ by round-off.
 
         Raises:
-            InputError: an argument out of its range; ``reproducible`` or ``transfer`` with what it does not cover; ``dt``
-                above the critical time step, with both numbers.
-            RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; or the unexplained
-                energy reached its limit.
+            InputError: an argument out of its range; ``reproducible``, ``transfer`` or ``moving_cells`` with what it does not
+                cover; ``dt`` above the critical time step, with both numbers.
+            RunError: a particle left the mesh, a value is not finite, or a law failed, with the position; the unexplained
+                energy reached its limit; or ``moving_cells`` cannot go on, with the reason, after a whole step.
         """
         refuse_far_field(self, "the explicit scheme")
         damped = collectively(self.comm, lambda: checked_rayleigh(rayleigh))
+        if moving_cells and rebalance is not None:
+            raise InputError(
+                f"rebalance is {rebalance} with moving_cells, expected None: particles do not change their ranks then"
+            )
         if damping and self._free_fields:
             raise InputError(
                 f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
@@ -222,7 +234,9 @@ class Model(ContactMethods, Body):
         options, run, times, threshold, steps, limit, _ = collectively(
             self.comm,
             lambda: (
-                explicit_options(damping, nmd, integration, stress_update, damped, reproducible, transfer),
+                explicit_options(
+                    damping, nmd, integration, stress_update, damped, reproducible, transfer, moving_cells
+                ),
                 run_options(dt, courant, pic, allow_unstable),
                 report_times(self, until, every, since),
                 rebalance_threshold(rebalance),
@@ -235,6 +249,8 @@ class Model(ContactMethods, Body):
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         warn_of_setup(self, nmd)
+        if moving_cells:
+            warn_of_parts(self)
         reports = run_explicit(self, options, run, times, watch, threshold, steps, limit, damped)
         return Reports(reports, "explicit", self, until)
 

@@ -136,7 +136,7 @@ class PointProbe:
     def __init__(self, model: Model, points: ArrayLike) -> None:
         self.model = model
         self._points = collectively(model.comm, lambda: floats("points", points, (None, model.mesh.dim)))
-        outside = np.flatnonzero(model.comm.allreduce((self._own_cells() >= 0).astype(int)) == 0)
+        outside = np.flatnonzero(model.comm.allreduce((self._initial_cells() >= 0).astype(int)) == 0)
         if len(outside):
             raise InputError(f"points has {self._points[outside[0]]} at row {outside[0]}, which is outside of the mesh")
         dim = model.mesh.dim
@@ -149,10 +149,15 @@ class PointProbe:
     def __repr__(self) -> str:
         return f"<PointProbe: at {', '.join(map(str, self._points))} m; {', '.join(self._columns)}>"
 
-    def _own_cells(self) -> NDArray[np.int32]:
+    def _initial_cells(self) -> NDArray[np.int32]:
         mesh = self.model.mesh
         cells = mesh.cells_of(self._points)
         return np.where(cells < mesh.owned_cells, cells, -1)
+
+    def _own_cells(self) -> NDArray[np.integer]:
+        if self.model._core.has_moved_cells:
+            return _filled_cells_of(self.model, self._points)
+        return self._initial_cells()
 
     def values(self) -> dict[str, float]:
         """Numbers by name; velocity and stress are NaN in an empty cell."""
@@ -170,9 +175,24 @@ class PointProbe:
             sums[k] = [1.0, volumes[cell], v.sum(), *moments]
         # A point on a side between the cells of two ranks is seen by both: the mean of the two.
         sums = model.comm.allreduce(sums)
+        sums[sums[:, 0] == 0, 1] = 1.0  # where cells have moved away there is none
         with np.errstate(invalid="ignore", divide="ignore"):
             rows = np.column_stack([sums[:, 2] / sums[:, 1], sums[:, 3:] / sums[:, 2:3]])
         return {"time_s": model.time, **_numbered(rows, self._columns)}
+
+
+def _filled_cells_of(model: Model, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Cells with particles of this rank that contain the points where they are now, -1 for none."""
+    filled = np.unique(model.particles.cell)
+    corners = model.node_positions[model.mesh.cells[filled]]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    cells = np.full(len(points), -1, np.int64)
+    for k, point in enumerate(points):
+        n = np.linalg.solve(edges, (point - corners[:, 0])[..., None])[..., 0]
+        inside = np.flatnonzero((n >= 0).all(axis=1) & (n.sum(axis=1) <= 1))
+        if len(inside):
+            cells[k] = filled[inside[0]]
+    return cells
 
 
 class SectionProbe:
@@ -200,6 +220,7 @@ class SectionProbe:
         self._normal /= length
         self._box = None if box is None else np.sort(floats("box", box, (2, dim)), axis=0)
         self._mesh: Mesh | None = None  # whose cells are known to be cut or not
+        self._cells_move = False  # since then
 
     def __repr__(self) -> str:
         box = "" if self._box is None else f", within {self._box[0]} to {self._box[1]} m"
@@ -207,7 +228,7 @@ class SectionProbe:
 
     def _cut(self, mesh: Mesh) -> None:
         """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition."""
-        corners = mesh.points[mesh.cells[: mesh.owned_cells]]
+        corners = self.model.node_positions[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
         cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))
         if self._box is not None:
@@ -217,12 +238,13 @@ class SectionProbe:
         edges = corners[cells, 1:] - corners[cells, :1]
         rising = (before[cells, 1:].astype(float) - before[cells, :1])[..., None]
         self._mesh, self._is_cut, self._gradient = mesh, cut, np.zeros((len(cut), mesh.dim))
+        self._cells_move = self.model._core.has_moved_cells
         self._gradient[cells] = np.linalg.solve(edges, rising)[..., 0]
 
     def values(self) -> dict[str, float]:
         """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
         model, dim = self.model, self.model.mesh.dim
-        if self._mesh is not model.mesh:
+        if self._mesh is not model.mesh or self._cells_move or model._core.has_moved_cells:
             self._cut(model.mesh)
         inside = model.particles[self._is_cut[model.particles.cell]]
         stress = _matrices(inside.stress, dim) * inside.volume[:, None, None]

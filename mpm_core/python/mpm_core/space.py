@@ -87,6 +87,12 @@ def parts(model: Model) -> NDArray[np.float64]:
     return model.comm.bcast(found)
 
 
+def count_parts(model: Model) -> int:
+    """Number of the pieces of the body that have more than `LEAST_PART` of its mass. Collective."""
+    masses = parts(model)
+    return int(np.sum(masses >= LEAST_PART * masses.sum()))
+
+
 def _piece_masses(cells: NDArray, masses: NDArray) -> NDArray[np.float64]:
     """Masses of the sets of cells that nodes connect."""
     _, nodes = np.unique(cells, return_inverse=True)
@@ -115,19 +121,15 @@ class SpaceWatch:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._parts = self._count()
+        self._parts = count_parts(model)
         self._steps = model.steps
-
-    def _count(self) -> int:
-        masses = parts(self._model)
-        return int(np.sum(masses >= LEAST_PART * masses.sum()))
 
     def look(self) -> None:
         """Warn if the body has come apart, or takes up too little space. Collective."""
         if self._model.steps - self._steps < STEPS_BETWEEN:
             return
         self._steps = self._model.steps
-        now, volumes = self._count(), space(self._model)
+        now, volumes = count_parts(self._model), space(self._model)
         if self._model.comm.rank != 0:
             return
         if now > self._parts:
