@@ -3,6 +3,7 @@
 #include "materials/laws/substeps.h"
 #include "model/contacts.h"
 #include "model/moving_cells.h"
+#include "model/moving_limits.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
 

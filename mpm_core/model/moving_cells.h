@@ -14,13 +14,6 @@
 
 namespace mpm::model
 {
-/// A cell is too distorted when its smallest altitude, to which the critical time step is in proportion, is below this
-/// fraction of the initial one.
-inline constexpr double least_altitude = 0.1;
-
-/// The places of nodes are looked at again when one may have moved by this fraction of the smallest altitude of a cell.
-inline constexpr double longest_travel = 0.1;
-
 /// Notes the initial places of the nodes, unless cells have moved already, and which nodes may meet the boundary.
 /// @pre prepare(model) has been called
 /// @note Collective
@@ -31,14 +24,6 @@ void begin_moving_cells(Model<G>& model);
 /// @post the moments of these cells are about their new centres
 template <class G>
 void move_cells(Model<G>& model, double dt);
-
-/// What is in the way of more steps with moving cells, the same text on all ranks; empty if nothing: a cell that is too
-/// distorted, or a body about to meet the boundary of the mesh. It would not feel the boundary conditions of the nodes
-/// there, which are not among those of its cells.
-/// @pre a whole step has been taken
-/// @note Collective
-template <class G>
-std::string end_of_moving_cells(Model<G>& model);
 
 /// Moves all nodes back to their initial places, and searches the cells of the particles there. Does nothing when no
 /// cell has moved.
