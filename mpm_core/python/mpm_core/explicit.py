@@ -126,7 +126,9 @@ def run_explicit(
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     advice = ADVICE_FOR.get(options.integration, ADVICE)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice)
+    energy = EnergyWatch(
+        energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice, noisy=options.moving_cells
+    )
     failure = FailureWatch(model, options)
     penetration = PenetrationWatch(model)
     if model._space_watch is None:

@@ -208,8 +208,8 @@ class Model(ContactMethods, Body):
             allow_unstable: take ``dt`` even above the critical time step.
             rebalance: load imbalance (maximum over mean number of particles per rank), above 1, at which the mesh is
                 repartitioned (see the method ``rebalance``); checked every 32 steps. By default the partition does not change.
-            energy_limit: `Report.unexplained_fraction` at which the run ends with an error; None for no limit. Above 0.01
-                there is an `EnergyWarning`.
+            energy_limit: `Report.unexplained_energy` over the largest `Report.energy_scale` of the run so far, at which the run
+                ends with an error; None for no limit. Above 0.01 there is an `EnergyWarning`.
             conversion: when resting cells turn into particles (see ``rest``); None if only those do that a particle enters.
             reproducible: compute the same particles to the last bit on any number of ranks, from the same start and by the same
                 program on the same kind of processor; sums in reports differ by round-off.

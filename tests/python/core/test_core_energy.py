@@ -1,10 +1,12 @@
 """Energy at the particles: what is stored, what plastic flow, PIC and damping take, and what is left unexplained."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from core_cases import DIMS, averaged_over_nodes, box, by_id, run, strain_energy
+from mpm_core.energy import EnergyWatch
 from mpm_core.space import swollen
 
 import mpm_core as mpm
@@ -258,3 +260,18 @@ def test_a_beam_that_sags_by_the_noise_of_cell_crossings_is_named(per_cell, nois
         warnings.simplefilter("always", mpm.EnergyWarning)
         run(model, 1.5, every=0.05, energy_limit=None)
     assert any("against their nodes" in str(w.message) for w in caught) == noisy
+
+
+def test_unexplained_energy_is_compared_with_the_largest_energy_so_far():
+    # A body that has swung back has hardly any energy at work: 1 J of 2 J is not an error if 1000 J were at work before.
+    model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0)
+    at_work = replace(model.report(), steps=100, unexplained_energy=1.0, energy_scale=1000.0)
+    swung_back = replace(at_work, energy_scale=2.0)
+    watch = EnergyWatch(0.2, True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        watch.look(at_work)
+        watch.look(swung_back)
+    with pytest.raises(mpm.RunError, match="50 % of the energy at work .*: 1 J of 2 J, above energy_limit, 20 %"):
+        EnergyWatch(0.2, True).look(swung_back)
