@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from core_cases import DIMS, box, by_id, run
+from scipy.optimize import brentq
 
 import mpm_core as mpm
 from mpm_core import probes
@@ -61,11 +62,39 @@ def test_a_beam_swings_back_with_few_particles_in_a_cell(per_cell):
     assert unexplained < 1e-3
 
 
-@pytest.mark.filterwarnings("ignore::mpm_core.EnergyWarning")  # where it has swung back, hardly any energy is at work
 def test_finer_cells_change_a_swinging_beam_by_little():
     lowest = [swing(cells, 3, moving_cells=True)[0].min() for cells in (4, 8, 16)]
     first, second = np.abs(np.diff(lowest))
     assert second < first / 2 and second < 0.03 * abs(lowest[-1])
+
+
+def hung(cells, **options):
+    """A bar of 1 m that hangs at rest under its weight, and how far the particles in its lowest cells have moved down."""
+    size = 1.0 / cells
+    body = ([0.25, 1.0], [0.5, 2.0])
+    model = mpm.Model(
+        box([round(0.75 / size), 2 * cells], [0.75, 2.0], body=body),
+        mpm.Hencky(mpm.LinearElastic(young=80e3, poisson=0.0)),
+    )
+    model.seed(density=2000.0, per_cell=3, cell_tag=1)
+    model.fix(4)
+    model.set_gravity((0, -10))
+    run(model, 4.0, damping=0.75, energy_limit=None, **options)
+    p = model.particles
+    return model, -p.displacement[p.initial_position[:, 1] < 1 + size, 1].mean()
+
+
+@pytest.mark.parametrize("cells", [8, 16, 32])
+def test_a_bar_that_hangs_stretches_as_it_should_on_any_mesh(cells):
+    # Poisson's ratio 0: E ln(l) / l = rho_0 g (1 - X) at the distance X from the top, where l is the stretch, 1.43 at the top.
+    x = (np.arange(1000) + 0.5) / 1000
+    stretch = np.array([brentq(lambda s: 80e3 * np.log(s) / s - 2000.0 * 10 * (1 - at), 1, np.e) for at in x])
+    lowest = 1 - 0.5 / cells  # middle of the lowest cells
+    expected = (stretch[x < lowest] - 1).sum() / 1000
+    model, elongation = hung(cells, moving_cells=True)
+    assert stretch[0] == pytest.approx(1.43, abs=0.01)
+    assert elongation == pytest.approx(expected, rel=0.01)
+    assert model.report().is_quasi_static(2e-3)
 
 
 # --- Identities -----------------------------------------------------------------------------------------------------
