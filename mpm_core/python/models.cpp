@@ -146,6 +146,7 @@ void bind_model(py::module_& m, const std::string& suffix)
              std::vector<AbsorbingSide> sides;
              for (const auto& [tag, normal, shear, thickness, free_field] : given)
                sides.push_back({tag, normal, shear, thickness, free_field});
+             reset_cells(model);
              set_absorbing_sides(model, sides, gravity_at(model, model.time));
            })
       .def("set_incoming_wave",
@@ -182,6 +183,7 @@ void bind_model(py::module_& m, const std::string& suffix)
               const py::array& held, const py::array& displacement)
            {
              const auto n = static_cast<py::ssize_t>(nodes.size());
+             reset_cells(model);
              check_array<double>("stiffness", stiffness, {n * D, n * D});
              check_array<double>("mass", mass, {n, D, D});
              check_array<double>("held", held, {n, D});

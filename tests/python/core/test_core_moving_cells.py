@@ -204,7 +204,7 @@ def test_a_run_on_cells_that_stay_finds_particles_in_other_cells():
     ).all()
 
 
-@pytest.mark.parametrize("after", ["implicit", "seed", "equilibrate", "place"])
+@pytest.mark.parametrize("after", ["implicit", "seed", "equilibrate", "place", "absorb"])
 def test_all_else_begins_with_the_mesh_as_it_was(after):
     model = block(2, lambda x: 0 * x + 0.1)
     run(model, 0.1, moving_cells=True)
@@ -212,6 +212,9 @@ def test_all_else_begins_with_the_mesh_as_it_was(after):
         *_, _ = model.implicit(0.11, dt=0.01)
     elif after == "seed":
         model.seed_points([[0.1, 0.1]], [1e-3], density=2000.0)
+    elif after == "absorb":
+        with pytest.raises(mpm.InputError, match="no soil at its facets"):
+            model.absorb(1)
     elif after == "place":
         model.place(model.particles.position)
     else:
