@@ -219,15 +219,15 @@ class SectionProbe:
             raise InputError("normal of the section has no length, expected a direction")
         self._normal /= length
         self._box = None if box is None else np.sort(floats("box", box, (2, dim)), axis=0)
-        self._mesh: Mesh | None = None  # whose cells are known to be cut or not
-        self._cells_move = False  # since then
+        self._mesh: Mesh | None = None  # whose cells are known to be cut or not, unless they move
 
     def __repr__(self) -> str:
         box = "" if self._box is None else f", within {self._box[0]} to {self._box[1]} m"
         return f"<SectionProbe: plane through {self._point} m with the normal {self._normal}{box}>"
 
     def _cut(self, mesh: Mesh) -> None:
-        """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition."""
+        """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition, and
+        each time while cells move."""
         corners = self.model.node_positions[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
         cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))
@@ -237,14 +237,14 @@ class SectionProbe:
         cells = np.flatnonzero(cut)
         edges = corners[cells, 1:] - corners[cells, :1]
         rising = (before[cells, 1:].astype(float) - before[cells, :1])[..., None]
-        self._mesh, self._is_cut, self._gradient = mesh, cut, np.zeros((len(cut), mesh.dim))
-        self._cells_move = self.model._core.has_moved_cells
+        self._mesh = None if self.model._core.has_moved_cells else mesh
+        self._is_cut, self._gradient = cut, np.zeros((len(cut), mesh.dim))
         self._gradient[cells] = np.linalg.solve(edges, rising)[..., 0]
 
     def values(self) -> dict[str, float]:
         """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
         model, dim = self.model, self.model.mesh.dim
-        if self._mesh is not model.mesh or self._cells_move or model._core.has_moved_cells:
+        if self._mesh is not model.mesh or model._core.has_moved_cells:
             self._cut(model.mesh)
         inside = model.particles[self._is_cut[model.particles.cell]]
         stress = _matrices(inside.stress, dim) * inside.volume[:, None, None]
