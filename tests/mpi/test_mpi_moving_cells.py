@@ -1,8 +1,10 @@
 """Cells that move with the body, over several ranks."""
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from mpm_core.output import ModelOutput
 from partitions import all_by_id, bands, scattered, spread_box
 
 import mpm_core as mpm
@@ -68,3 +70,30 @@ def test_all_ranks_see_that_the_body_is_about_to_meet_the_boundary(comm, owners_
     time = thrown(comm, owners_of)
     assert time == pytest.approx(thrown(MPI.COMM_SELF), rel=1e-9)
     assert 0.9 < time < 2.25 / 2.0
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_frames_have_the_nodes_where_they_are(comm, shared_path, owners_of):
+    # A block that flies with one velocity: each of its nodes moves by v t.
+    mesh = spread_box([8, 8], [2.0, 2.0], comm, owners_of, body=([0.5, 0.5], [1.5, 1.5]))
+    model = mpm.Model(mesh, mpm.LinearElastic(young=2e5, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3, cell_tag=1)
+    velocity = np.array([1.0, 0.5])
+    model.particles.set("velocity", np.tile(velocity, (len(model.particles.id), 1)))
+    model.report()
+    with ModelOutput(model, mesh=shared_path / "mesh", nodal_fields=["velocity"], float32=False) as output:
+        output.write()
+        for report in model.explicit(0.2, every=0.1, moving_cells=True):
+            output.write()
+        model.explicit(0.21).last()  # the nodes have gone back
+        output.write()
+    with h5py.File(shared_path / "mesh/mesh.h5") as file:
+        initial, cells, tags = file["points"][:, :2], file["cells"][()], file["tag"][()]
+    body = cells[tags == 1]
+    assert len(body) == 32
+    for frame, time in ((1, 0.1), (2, 0.2)):
+        with h5py.File(shared_path / f"mesh/00000{frame}.h5") as file:
+            np.testing.assert_allclose(file["points"][:, :2][body], initial[body] + velocity * time, atol=1e-12)
+    for frame in (0, 3):
+        with h5py.File(shared_path / f"mesh/00000{frame}.h5") as file:
+            assert set(file) == {"velocity"}

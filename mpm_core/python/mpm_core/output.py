@@ -23,7 +23,7 @@ from ._core import Geometry, InputError, RunError
 from .body_output import BodyOutput
 from .collective import collectively
 from .model import Model
-from .output_checks import agreed, checked_mesh, narrowest, particle_fields, real_fields
+from .output_checks import agreed, checked_mesh, moved_points, narrowest, particle_fields, real_fields
 from .series import Output, Series, padded
 
 PARTICLE_FIELDS = (
@@ -133,21 +133,22 @@ class MeshOutput(Output):
         nodes, self._cells = comm.allgather(len(points)), comm.allgather(len(cells))
         self._nodes = nodes
         fields, _ = agreed(comm, lambda: real_fields(fixed or {}, len(cells)))
-        dim, first = points.shape[1], sum(nodes[: comm.rank])
+        self._dim, first = points.shape[1], sum(nodes[: comm.rank])
         numbers = (cells + first).astype(narrowest(sum(nodes)))
         with series.single() as frame:
             topology = frame.add_data("cells", numbers, self._cells)
-            place = frame.add_data("points", padded(points, series.real), nodes)
-            frame.add_grid("Triangle" if dim == 2 else "Tetrahedron", topology, sum(self._cells), dim + 1, place)
+            self._grid = "Triangle" if self._dim == 2 else "Tetrahedron", topology, sum(self._cells), self._dim + 1
+            frame.add_grid(*self._grid, frame.add_data("points", padded(points, series.real), nodes))
             for name, values in fields.items():
                 frame.add_field(name, "Cell", values, self._cells)
-        self._start = "".join(frame.text)
+        self._start, self._fixed = "".join(frame.text), frame.text[1:]
 
     def write(
         self,
         time: float,
         node_fields: Mapping[str, np.ndarray] | None = None,
         cell_fields: Mapping[str, np.ndarray] | None = None,
+        points: np.ndarray | None = None,
     ) -> None:
         """Write one frame of fields, which is on disk when this returns.
 
@@ -155,16 +156,21 @@ class MeshOutput(Output):
             time: s.
             node_fields: arrays with a row for each of ``points``, by name.
             cell_fields: arrays with a row for each of ``cells``, by name.
+            points: positions of the nodes in this frame, m, if they have moved, on all ranks or on none; stored with the frame.
 
         Raises:
-            InputError: a field is of another length or not numeric.
+            InputError: a field, or ``points``, is of another length or not numeric.
             RunError: the frame cannot be written.
         """
         comm = self._series.comm
         n, m = self._nodes[comm.rank], self._cells[comm.rank]
         at_nodes, _ = agreed(comm, lambda: real_fields(node_fields or {}, n))
         in_cells, _ = agreed(comm, lambda: real_fields(cell_fields or {}, m)) if cell_fields else ({}, [])
-        with self._series.frame(time, self._start) as frame:
+        moved, _ = agreed(comm, lambda: moved_points(points, n, self._dim))
+        with self._series.frame(time, "" if moved else self._start) as frame:
+            for positions in moved.values():
+                frame.add_grid(*self._grid, frame.add_data("points", padded(positions, self._series.real), self._nodes))
+                frame.text += self._fixed
             for name, values in at_nodes.items():
                 frame.add_field(name, "Node", values, self._nodes)
             for name, values in in_cells.items():
@@ -269,7 +275,7 @@ class ModelOutput:
                 elif isinstance(output, BodyOutput):
                     output.write()
                 else:
-                    output.write(self._model.time, self._nodal_fields())
+                    output.write(self._model.time, self._nodal_fields(), points=self._moved_nodes())
             except RunError as failure:  # the other one may still be written
                 failures.append(failure)
         if failures:
@@ -279,6 +285,11 @@ class ModelOutput:
         """Nodal fields on the mesh as it was at the start. Collective."""
         model = self._model
         return {name: self._start.nodal_of(model.mesh, model.nodal(name)) for name in self._nodal}
+
+    def _moved_nodes(self) -> np.ndarray | None:
+        """Positions of the nodes of the mesh as it was at the start, if cells have moved with the body. Collective."""
+        model = self._model
+        return self._start.nodal_of(model.mesh, model.node_positions) if model._core.has_moved_cells else None
 
     def close(self) -> None:
         """Complete the files; nothing can be written after that.

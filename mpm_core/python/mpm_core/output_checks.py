@@ -89,6 +89,15 @@ def particle_fields(fields: Arrays) -> dict[str, np.ndarray]:
     return {"position": position, **_checked_fields(others, len(position))}
 
 
+def moved_points(points: np.ndarray | None, n: int, dim: int) -> dict[str, np.ndarray]:
+    """The positions of nodes that have moved, by the name ``points``; nothing for None."""
+    if points is None:
+        return {}
+    if np.shape(points) != (n, dim):
+        raise InputError(f"points has shape {np.shape(points)}, expected ({n}, {dim})")
+    return real_fields({"points": points}, n)
+
+
 def checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points = np.asarray(points)
     cells = np.asarray(cells)

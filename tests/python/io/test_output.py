@@ -148,6 +148,22 @@ def test_fixed_fields_are_stored_once_and_are_in_every_frame(tmp_path):
         MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES, fixed={"tag": np.ones(3)})
 
 
+def test_nodes_that_have_moved_are_stored_with_their_frame(tmp_path):
+    moved = SQUARE * np.array([2.0, 0.5])
+    with MeshOutput(
+        tmp_path / "mesh", COMM, SQUARE, TRIANGLES, float32=False, fixed={"tag": np.array([3, 5])}
+    ) as output:
+        for step, points in enumerate((None, moved, None)):
+            output.write(float(step), {"mass": np.full(len(SQUARE), step)}, points=points)
+    frames = ElementTree.parse(tmp_path / "mesh.xdmf").findall(".//Grid[@Name='frame']")
+    for frame, expected in zip(frames, (SQUARE, moved, SQUARE), strict=True):
+        file, name = frame.find("Geometry/DataItem").text.split(":/")
+        with h5py.File(tmp_path / file) as stored_points:
+            np.testing.assert_array_equal(stored_points[name], padded(expected))
+        assert frame.find("Topology/DataItem").text == "mesh/mesh.h5:/cells"
+        assert [field.get("Name") for field in frame.findall("Attribute")] == ["tag", "mass"]
+
+
 def test_all_files_are_valid_while_the_run_goes_on(tmp_path):
     with ParticleOutput(tmp_path / "particles", COMM) as output:
         for step in range(3):

@@ -136,3 +136,10 @@ BAD_MESHES = [
 def test_bad_meshes_are_named(tmp_path, points, cells, message):
     with pytest.raises(InputError, match=message):
         MeshOutput(tmp_path / "mesh", COMM, points, cells)
+
+
+def test_positions_of_nodes_of_another_mesh_are_named(tmp_path):
+    with MeshOutput(tmp_path / "mesh", COMM, SQUARE, TRIANGLES) as output:
+        with pytest.raises(InputError, match=r"points has shape \(3, 2\), expected \(4, 2\)"):
+            output.write(0.0, {}, points=SQUARE[:3])
+        output.write(0.0, {}, points=SQUARE)
