@@ -23,12 +23,11 @@ inline void prefetch(const T& object)
 }
 
 /// The motions of the runs of a batch.
-/// @param velocity_of  what vertex k of a cell strains it with; a callable (Index, int) -> Vector<D>
-template <class G, class VelocityOf, int D = G::dim>
+/// @param value_of  of vertex k of a cell; a callable (nodal, Index, int) -> Vector<D>
+template <class G, class ValueOf, int D = G::dim>
 void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
-                  const PassOptions& options, const Batch& batch, VelocityOf&& velocity_of, BatchScratch<D>& scratch)
+                  const PassOptions& options, const Batch& batch, ValueOf&& value_of, BatchScratch<D>& scratch)
 {
-  const auto change = [&](Index i) -> const Vector<D>& { return field.velocity_change[i]; };
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const Index cell = runs[r].cell;
@@ -38,12 +37,16 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
       prefetch(mesh.shapes[next]);
       prefetch(field.moments[next]);
     }
-    const AffineField<D> velocity =
-        affine_field_of_vertices<D>(mesh.shapes[cell], [&](int k) { return velocity_of(cell, k); });
+    const auto in_cell = [&](const std::vector<Vector<D>>& nodal)
+    {
+      return affine_field_of_vertices<D>(mesh.shapes[cell],
+                                         [&](int k) -> decltype(auto) { return value_of(nodal, cell, k); });
+    };
+    const AffineField<D> velocity = in_cell(field.velocity);
     if (options.transfer == Transfer::affine)
       scratch.motion[r - batch.first_run] = {0, velocity, scaled<D>(velocity, options.dt)};
     else
-      scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, affine_field<D>(mesh, cell, change),
+      scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, in_cell(field.velocity_change),
                                              scaled<D>(velocity, options.dt)};
   }
 }
@@ -53,8 +56,8 @@ template <class G, int D>
 void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                   const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
 {
-  with_velocity_of_vertices(
-      mesh, field, [&](auto&& velocity_of) { find_motions(mesh, field, runs, options, batch, velocity_of, scratch); });
+  with_values_of_vertices(mesh, field,
+                          [&](auto&& value_of) { find_motions(mesh, field, runs, options, batch, value_of, scratch); });
 }
 
 namespace

@@ -133,7 +133,7 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 {
   constexpr int D = G::dim;
   const DualWeights<D> weights = dual_weights<D>(mesh.shapes[cell], position);
-  const auto velocity = [&](int k) { return velocity_of_vertex(mesh, field, cell, k); };
+  const auto velocity = [&](int k) { return value_of_vertex(mesh, field, field.velocity, cell, k); };
   Matrix<D> gradient = affine_field_of_vertices<D>(mesh.shapes[cell], velocity).gradient;
   if (!field.integration.whole[cell])
     return gradient;

@@ -196,7 +196,8 @@ void map_to_nodes(Model<G>& model)
 }
 
 template <class G>
-Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell)
+Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field,
+                                   const std::vector<Vector<G::dim>>& nodal, Index cell)
 {
   constexpr int D = G::dim;
   Vector<D> mean{};
@@ -206,7 +207,7 @@ Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField
     {
       ++heavy;
       for (int a = 0; a < D; ++a)
-        mean[a] += field.velocity[node][a];
+        mean[a] += nodal[node][a];
     }
   for (double& component : mean)
     component /= std::max(heavy, 1);
@@ -243,24 +244,24 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
   const bool known = !field.integration.averaged_by_law.empty() && !field.integration.strains_in_full;
   const auto volume_of = [&](Index c)
   { return known ? field.integration.mean_stress_of_cell[c].volume : averaged_strain_volume(mesh, field, c); };
-  with_velocity_of_vertices(mesh, field,
-                            [&](auto&& velocity_of)
+  with_values_of_vertices(mesh, field,
+                          [&](auto&& value_of)
+                          {
+                            const auto strain_of = [&](Index c, double volume)
                             {
-                              const auto strain_of = [&](Index c, double volume)
+                              double divergence = 0;
+                              for (int k = 0; k <= D; ++k)
                               {
-                                double divergence = 0;
-                                for (int k = 0; k <= D; ++k)
-                                {
-                                  const Vector<D>& v = velocity_of(c, k);
-                                  divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
-                                  if constexpr (G::has_hoop)
-                                    divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
-                                }
-                                return dt * divergence * volume;
-                              };
-                              average_over_nodes(mesh, field.part, volume_of, strain_of, exchange,
-                                                 field.volumetric_strain);
-                            });
+                                const Vector<D>& v = value_of(field.velocity, c, k);
+                                divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
+                                if constexpr (G::has_hoop)
+                                  divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
+                              }
+                              return dt * divergence * volume;
+                            };
+                            average_over_nodes(mesh, field.part, volume_of, strain_of, exchange,
+                                               field.volumetric_strain);
+                          });
 }
 
 template <class G, int D>
@@ -282,7 +283,8 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
   template void particles_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                       \
                                    const std::vector<Run>&, VelocityField<G>&);                                        \
   template void map_to_nodes(Model<G>&);                                                                               \
-  template Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>&, const VelocityField<G>&, Index);                    \
+  template Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>&, const VelocityField<G>&,                            \
+                                              const std::vector<Vector<G::dim>>&, Index);                              \
   template void find_start_velocity(VelocityField<G>&);                                                                \
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
   template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \

@@ -35,32 +35,36 @@ inline bool is_light(const VelocityField<G>& field, Index node)
   return !(field.nodes[node].mass > field.least_mass);
 }
 
-/// Mean velocity of the nodes of a cell that are not light.
+/// Mean of the values at the nodes of a cell that are not light.
 template <class G>
-Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell);
+Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field,
+                                   const std::vector<Vector<G::dim>>& nodal, Index cell);
 
-/// The velocity by which a vertex strains a cell: that of its node, or, where the node is light, the mean of the other
-/// vertices. Particles are then within round-off of the facet opposite to the node; they would be strained at once if
-/// it stood still.
+/// The velocity, or its change, at a vertex as the particles of a cell take it: that of its node, or, where the node is
+/// light, the mean of the other vertices. Particles are then within round-off of the facet opposite to the node; they
+/// would be strained at once if it stood still.
+/// @param nodal  one of the nodal velocities of the field
 template <class G>
-inline Vector<G::dim> velocity_of_vertex(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Index cell, int k)
+inline Vector<G::dim> value_of_vertex(const Mesh<G::dim>& mesh, const VelocityField<G>& field,
+                                      const std::vector<Vector<G::dim>>& nodal, Index cell, int k)
 {
   const Index node = mesh.cells[cell][k];
   if (field.has_light_nodes && is_light(field, node)) [[unlikely]]
-    return mean_of_heavy_nodes(mesh, field, cell);
-  return field.velocity[node];
+    return mean_of_heavy_nodes(mesh, field, nodal, cell);
+  return nodal[node];
 }
 
-/// Calls work with `velocity_of_vertex`, a callable (cell, k) -> Vector<D>, decided once for all cells on whether the
-/// field may have light nodes.
-template <class G, class Work>
-inline void with_velocity_of_vertices(const Mesh<G::dim>& mesh, const VelocityField<G>& field, Work&& work)
+/// Calls work with `value_of_vertex`, a callable (nodal, cell, k) -> Vector<D>, decided once for all cells on whether
+/// the field may have light nodes.
+template <class G, class Work, int D = G::dim>
+inline void with_values_of_vertices(const Mesh<D>& mesh, const VelocityField<G>& field, Work&& work)
 {
-  using Velocity = Vector<G::dim>;
+  using Nodal = std::vector<Vector<D>>;
   if (field.has_light_nodes) [[unlikely]]
-    work([&](Index cell, int k) -> Velocity { return velocity_of_vertex(mesh, field, cell, k); });
+    work([&](const Nodal& nodal, Index cell, int k) -> Vector<D>
+         { return value_of_vertex(mesh, field, nodal, cell, k); });
   else
-    work([&](Index cell, int k) -> const Velocity& { return field.velocity[mesh.cells[cell][k]]; });
+    work([&](const Nodal& nodal, Index cell, int k) -> const Vector<D>& { return nodal[mesh.cells[cell][k]]; });
 }
 
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.

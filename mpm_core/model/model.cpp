@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mpm::model
 {
@@ -144,21 +145,40 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
   field.tractions.assign(loaded ? cells : 0, TractionMoments<G::dim>{});
 }
 
-/// Only particles within round-off of the opposite facet touch a node with less than this fraction of the mass of a
-/// whole particle.
+/// The fraction of a particle's mass below which a node is light, from the cells of this rank.
+///
+/// A particle at the distance N h from the facet opposite to a node gives it the mass N m, and its second moment about
+/// the facet is N^2 h^2 m. Moments have a round-off of eps |x| h m, since positions have one of eps |x|. Below
+/// N = sqrt(eps |x| / h) the momentum that a change of the node's velocity adds is round-off, and grows from step to
+/// step.
+template <int D>
+double light_fraction(const Mesh<D>& mesh)
+{
+  double ratio = 1; // |x| / h
+  for (const CellShape<D>& shape : mesh.shapes)
+    ratio = std::max(ratio, std::sqrt(dot<D>(shape.centre, shape.centre)) / smallest_altitude(shape));
+  return std::sqrt(std::numeric_limits<double>::epsilon() * ratio);
+}
+
+/// Nodes are light below a fraction of the mass of the lightest particle, so that those of light particles beside heavy
+/// ones move, but not below the round-off of the heaviest.
 /// @note Collective
 template <class G>
 void find_least_masses(Model<G>& model)
 {
-  for (VelocityField<G>& field : model.fields)
-    field.least_mass = 0;
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  std::vector<double> values(2 * model.fields.size() + 1, -infinite); // -lightest and heaviest of each field, fraction
   for (Index p = 0; p < model.particles.size(); ++p)
   {
-    double& least = field_of(model, model.particles.material[p]).least_mass;
-    least = std::max(least, 1e-12 * model.particles.mass[p]);
+    const auto k = static_cast<std::size_t>(&field_of(model, model.particles.material[p]) - model.fields.data());
+    values[2 * k] = std::max(values[2 * k], -model.particles.mass[p]);
+    values[2 * k + 1] = std::max(values[2 * k + 1], model.particles.mass[p]);
   }
-  for (VelocityField<G>& field : model.fields)
-    MPI_Allreduce(MPI_IN_PLACE, &field.least_mass, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+  values.back() = light_fraction(model.mesh);
+  MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+  for (std::size_t k = 0; k < model.fields.size(); ++k)
+    model.fields[k].least_mass =
+        values[2 * k + 1] > 0 ? std::max(-values.back() * values[2 * k], 1e-12 * values[2 * k + 1]) : 0;
 }
 } // namespace
 

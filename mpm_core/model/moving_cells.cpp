@@ -22,7 +22,7 @@ void move_light_nodes(const VelocityField<G>& field, double dt, Mesh<D>& mesh)
       if (field.moments[c].mass > 0 && is_light(field, node))
       {
         auto& [velocity, count] = sums[node];
-        const Vector<D> mean = mean_of_heavy_nodes(mesh, field, c);
+        const Vector<D> mean = mean_of_heavy_nodes(mesh, field, field.velocity, c);
         for (int a = 0; a < D; ++a)
           velocity[a] += mean[a];
         ++count;
@@ -65,7 +65,7 @@ void move_cells(Model<G>& model, double dt)
     Vector<D> left = difference<D>(centre, mesh.shapes[c].centre); // of the motion that the particles have had
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
-        left[a] += dt * velocity_of_vertex(mesh, field, c, k)[a] / (D + 1);
+        left[a] += dt * value_of_vertex(mesh, field, field.velocity, c, k)[a] / (D + 1);
     move<G>(field.moments[c], {1, {}, {left, {}}});
   }
 }

@@ -30,7 +30,7 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   const auto change = [&](Index i) -> const Vector<D>& { return water.motion.velocity_change[i]; };
   double divergence = 0;
   for (int k = 0; k <= D; ++k)
-    divergence += dot<D>(velocity_of_vertex(mesh, soil, cell, k), mesh.shapes[cell].gradient[k]);
+    divergence += dot<D>(value_of_vertex(mesh, soil, soil.velocity, cell, k), mesh.shapes[cell].gradient[k]);
   const CellMoments<G>& moments = water.motion.moments[cell];
   const PoreMoments<D>& pores = water.cells[cell];
   const double content = moments.mass / pores.pores;
