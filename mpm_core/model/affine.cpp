@@ -13,6 +13,10 @@ namespace
 /// that their trace allows.
 constexpr double least_moment = 1e-3;
 
+/// The second moments of a cell's particles about their centre are round-off where they are below this part of those
+/// about the centre of the cell: it has one particle, or several at one point.
+constexpr double least_spread = 1e-8;
+
 /// The gradient of the velocities of a cell's particles by least squares, weighted by mass.
 template <class G, int D = G::dim>
 Matrix<D> fitted_gradient(const CellMoments<G>& moments)
@@ -26,7 +30,11 @@ Matrix<D> fitted_gradient(const CellMoments<G>& moments)
           moments.mass_xixi[symmetric_index<D>(i, j)] - moments.mass_xi[i] * moments.mass_xi[j] / moments.mass;
       product(i, j) = moments.momentum_xi[i][j] - moments.momentum[i] * moments.mass_xi[j] / moments.mass;
     }
-  if (!(second.determinant() > least_moment * std::pow(second.trace() / D, D)))
+  double about_cell = 0;
+  for (int i = 0; i < D; ++i)
+    about_cell += moments.mass_xixi[symmetric_index<D>(i, i)];
+  const double spread = second.trace();
+  if (!(spread > least_spread * about_cell && second.determinant() > least_moment * std::pow(spread / D, D)))
     return {};
   const Square found = product * second.inverse();
   Matrix<D> gradient;

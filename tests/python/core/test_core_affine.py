@@ -33,6 +33,21 @@ def test_nodes_get_an_affine_velocity_back(dim, transfer):
     assert error < 1e-9 if transfer == AFFINE else error > 0.05
 
 
+@pytest.mark.parametrize("dim", DIMS)
+def test_a_particle_alone_in_its_cell_begins_without_a_gradient(dim):
+    # The velocities of one particle tell nothing of their gradient: its second moment is round-off.
+    mesh = box([8] * dim, [0.8] * dim)
+    points = 0.025 * (np.indices([32] * dim).reshape(dim, -1).T + 0.5)  # its spread may be below zero
+    points = points[np.unique(mesh.cells_of(points), return_index=True)[1]]
+    model = mpm.Model(mesh, ELASTIC)
+    model.seed_points(points, np.random.default_rng(5).uniform(0.5e-5, 1e-5, len(points)), density=2000.0)
+    velocity = np.tile(np.arange(1.0, dim + 1), (len(points), 1))
+    model.particles.set("velocity", velocity)
+    run(model, 1e-10, dt=1e-10, transfer=AFFINE)
+    np.testing.assert_allclose(model.particles.velocity, velocity, rtol=1e-9)
+    assert np.abs(model.particles.velocity_gradient).max() < 1e-6
+
+
 def vibrating_bar(courant, **options):
     """Energy that is left, over that at the start, of the first longitudinal mode after five periods."""
     model = mpm.Model(box([16, 2], [1.0, 0.125]), mpm.LinearElastic(young=200e3, poisson=0.0))
