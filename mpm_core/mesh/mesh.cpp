@@ -239,8 +239,14 @@ Mesh<D> make_mesh(const MeshInput<D>& input, int rank)
       throw InputError(show("cell_owners: owned cell ", c, " comes after a ghost cell, expected owned cells first"));
 
   mesh.shapes.reserve(m);
+  double farthest = 1; // |x| / h
   for (Index c = 0; c < mesh.n_cells(); ++c)
+  {
     mesh.shapes.push_back(make_shape<D>(mesh, c));
+    const CellShape<D>& shape = mesh.shapes.back();
+    farthest = std::max(farthest, std::sqrt(dot<D>(shape.centre, shape.centre)) / smallest_altitude(shape));
+  }
+  mesh.round_off *= farthest;
   std::array<Index, D + 1> no;
   no.fill(none);
   mesh.neighbours.assign(m, no);

@@ -5,7 +5,7 @@
 #include "base/geometry.h"
 
 #include <cmath>
-
+#include <limits>
 #include <span>
 
 namespace mpm::mesh
@@ -53,6 +53,9 @@ struct Mesh
   std::vector<Index> cell_owners;
   /// Cells [0, owned_cells) belong to this rank, the others are ghosts
   Index owned_cells = 0;
+  /// Round-off of shape functions, since positions have one: eps |x| / h, at least eps, where it is largest on this
+  /// rank
+  double round_off = std::numeric_limits<double>::epsilon();
 
   /// Bins of a regular grid over the mesh that hold the cells whose boxes touch them; for points far from any guess.
   struct Bins

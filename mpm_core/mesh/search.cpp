@@ -31,7 +31,7 @@ Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x)
     bin = bin * static_cast<std::size_t>(bins.counts[i]) + static_cast<std::size_t>(k);
   }
   Index best = none;
-  double best_value = -inside_tolerance;
+  double best_value = -inside_tolerance_of(mesh);
   for (Index j = bins.offsets[bin]; j < bins.offsets[bin + 1]; ++j)
   {
     const Index c = bins.cells[static_cast<std::size_t>(j)];
@@ -52,13 +52,14 @@ Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start)
   Index c = start;
   // A straight walk crosses a few cells for each bin on its way; far more than that is a circle, which only bins can
   // end.
+  const double tolerance = inside_tolerance_of(mesh);
   Index longest_walk = 64;
   for (Index count : mesh.bins.counts)
     longest_walk += 4 * count;
   for (Index step = 0; c != none && step < longest_walk; ++step)
   {
     const auto [value, vertex] = smallest<D>(mesh.shapes[c], x);
-    if (value >= -inside_tolerance)
+    if (value >= -tolerance)
     {
       location.cell = c;
       return location;

@@ -4,10 +4,19 @@
 
 #include "mesh/mesh.h"
 
+#include <algorithm>
+
 namespace mpm::mesh
 {
 /// A point belongs to a cell when no shape function is below minus this: points on a facet must not fall between cells.
+/// It is more where coordinates are far from their origin, as those of maps are; see `inside_tolerance_of`.
 inline constexpr double inside_tolerance = 1e-10;
+
+template <int D>
+inline double inside_tolerance_of(const Mesh<D>& mesh)
+{
+  return std::max(inside_tolerance, 10 * mesh.round_off); // a shape function is a sum of some products with this error
+}
 
 /// Where a point is.
 struct Location

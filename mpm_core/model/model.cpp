@@ -145,23 +145,13 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
   field.tractions.assign(loaded ? cells : 0, TractionMoments<G::dim>{});
 }
 
-/// The fraction of a particle's mass below which a node is light, from the cells of this rank.
+/// The masses below which nodes are light: a fraction of that of the lightest particle, so that nodes of light
+/// particles beside heavy ones move, but not below the round-off of the heaviest.
 ///
 /// A particle at the distance N h from the facet opposite to a node gives it the mass N m, and its second moment about
 /// the facet is N^2 h^2 m. Moments have a round-off of eps |x| h m, since positions have one of eps |x|. Below
 /// N = sqrt(eps |x| / h) the momentum that a change of the node's velocity adds is round-off, and grows from step to
 /// step.
-template <int D>
-double light_fraction(const Mesh<D>& mesh)
-{
-  double ratio = 1; // |x| / h
-  for (const CellShape<D>& shape : mesh.shapes)
-    ratio = std::max(ratio, std::sqrt(dot<D>(shape.centre, shape.centre)) / smallest_altitude(shape));
-  return std::sqrt(std::numeric_limits<double>::epsilon() * ratio);
-}
-
-/// Nodes are light below a fraction of the mass of the lightest particle, so that those of light particles beside heavy
-/// ones move, but not below the round-off of the heaviest.
 /// @note Collective
 template <class G>
 void find_least_masses(Model<G>& model)
@@ -174,7 +164,7 @@ void find_least_masses(Model<G>& model)
     values[2 * k] = std::max(values[2 * k], -model.particles.mass[p]);
     values[2 * k + 1] = std::max(values[2 * k + 1], model.particles.mass[p]);
   }
-  values.back() = light_fraction(model.mesh);
+  values.back() = std::sqrt(model.mesh.round_off);
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX, model.exchange.comm);
   for (std::size_t k = 0; k < model.fields.size(); ++k)
     model.fields[k].least_mass =

@@ -74,7 +74,9 @@ def test_particles_near_sides_of_cells_are_not_strained(scheme, distance, cells)
     # that strained the particle, its stress threw it out of the mesh.
     model = mpm.Model(box((cells, 4), (float(cells), 4.0)), ELASTIC)
     places = np.arange(cells - 12, cells - 3, 3) + distance
-    points = np.concatenate([np.stack([places + 0.3, np.full(3, 1.3)], 1), np.stack([places - 0.5, np.full(3, 1.5)], 1)])
+    points = np.concatenate(
+        [np.stack([places + 0.3, np.full(3, 1.3)], 1), np.stack([places - 0.5, np.full(3, 1.5)], 1)]
+    )
     model.seed_points(points, np.full(6, 0.1), density=DENSITY)
     velocity = np.tile([1.0, 1.0], (6, 1))
     model.particles.set("velocity", velocity)

@@ -75,3 +75,17 @@ def test_nodes_share_the_mass_of_the_particles(dim):
     assert mass.min() >= 0
     assert mass.sum() == pytest.approx(3 * volumes.sum(), rel=1e-13)
     assert mass @ mesh.points == pytest.approx(3 * volumes @ points, rel=1e-12)
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_points_on_facets_are_found_where_coordinates_are_those_of_a_map(dim):
+    # Positions have a round-off of 1e-9 m there, 1e-8 of these cells; particles on a regular grid lie on facets.
+    origin = np.array([691000.0, 5335000.0, 700.0])[:dim]
+    near = box([8] * dim, [0.8] * dim)
+    mesh = mpm.Mesh(near.points + origin, near.cells)
+    points = 0.025 * (np.indices([32] * dim).reshape(dim, -1).T + 0.5) + origin
+    found = mesh.cells_of(points)
+    assert (found >= 0).all()
+    assert smallest_shape_functions(mesh, points[::7])[np.arange(len(points[::7])), found[::7]].min() > -1e-7
+    outside = points[points[:, 0] > origin[0] + 0.78] + 0.025 * np.eye(dim)[0]
+    assert (mesh.cells_of(outside) == -1).all()
