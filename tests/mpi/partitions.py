@@ -22,12 +22,13 @@ def one_does_all(centres, size):
     return np.full(len(centres), size - 1)
 
 
-def spread_box(counts, lengths, comm, owners_of=bands, keep=None, **options):
+def spread_box(counts, lengths, comm, owners_of=bands, keep=None, origin=0.0, **options):
     """``core_cases.box`` with its cells spread over the ranks, and the cells across their facets as ghosts.
 
     Args:
         owners_of: gives each cell its rank, from the cells' centres and the number of ranks.
         keep: tells which cells the mesh has, from their centres; all by default.
+        origin: position of the box's corner.
     """
     whole = box(counts, lengths, **options)
     lengths = np.asarray(lengths, dtype=float)
@@ -49,7 +50,7 @@ def spread_box(counts, lengths, comm, owners_of=bands, keep=None, **options):
     local = np.zeros(len(whole.points), dtype=np.int32)
     local[nodes] = np.arange(len(nodes))
     return mpm.Mesh(
-        whole.points[nodes],
+        whole.points[nodes] + origin,
         cells.reshape(-1, whole.dim + 1).astype(np.int32),
         cell_tags=whole.cell_tags[held],
         facets=local[whole.facets[kept]],

@@ -87,6 +87,27 @@ def test_a_models_particles_are_written_as_copies_of_them_are(comm, shared_path,
         assert len(file["id"]) == report.particles > 0 and np.abs(file["displacement"][:, 1]).max() > 0
 
 
+@pytest.mark.parametrize("background", [True, False])
+def test_a_models_positions_on_a_map_are_stored_in_double_precision(comm, shared_path, background):
+    origin = np.array([691000.0, 5335000.0])
+    mesh = spread_box((6, 4), (3.0, 2.0), comm, scattered, origin=origin)
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=1)
+    model.add_contact(mpm.Disc(centre=origin - 5.0, radius=1.0), friction=0.3)
+    model.report()
+    paths = [shared_path / name for name in ("particles", "mesh", "bodies")]
+    with ModelOutput(model, *paths[:2], bodies=paths[2], background=background) as output:
+        output.write()
+    assert sum(comm.allgather(len(model.particles))) == 48
+    placed = np.concatenate(comm.allgather(model.particles.position))
+    with h5py.File(shared_path / "particles/000000.h5") as file:
+        np.testing.assert_array_equal(file["position"][:, :2], placed)
+        assert file["velocity"].dtype == np.float32
+    for name in ("mesh/mesh", "bodies/000000"):
+        with h5py.File(shared_path / f"{name}.h5") as file:
+            assert file["points"].dtype == np.float64
+
+
 def small_model(comm):
     model = mpm.Model(spread_box((4, 2), (2.0, 1.0), comm), mpm.LinearElastic(young=1e6, poisson=0.3))
     model.seed(density=2000.0, per_cell=1)

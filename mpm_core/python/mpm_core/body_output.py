@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError
 from .collective import collectively
+from .output_checks import type_of_positions
 from .series import Output, Series, padded
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class BodyOutput(Output):
             self._body.append(np.full(len(of_surface), number, np.int32))
             first += len(points)
         self._cells = np.concatenate(cells).astype(np.int32)
+        start = np.concatenate([contact.outline()[0] for contact in self._contacts])
+        self._position_type = type_of_positions(model.comm, start, self._series.real)
 
     def write(self) -> None:
         """Write a frame of the surfaces as they are now, which is on disk when this returns.
@@ -77,7 +80,7 @@ class BodyOutput(Output):
                 "stored", (b"", "", "")
             )  # points; where they and the cells are
             if points.tobytes() != before:  # surfaces that rest are stored once
-                place = frame.add_data("points", *self._rows(padded(points, self._series.real)))
+                place = frame.add_data("points", *self._rows(padded(points, self._position_type)))
                 topology = topology or frame.add_data("cells", *self._rows(self._cells))
             frame.add_grid("Polyline" if dim == 2 else "Triangle", topology, len(self._cells), dim, place)
             for name, center, values in fields:

@@ -23,7 +23,15 @@ from ._core import Geometry, InputError, RunError
 from .body_output import BodyOutput
 from .collective import collectively
 from .model import Model
-from .output_checks import agreed, checked_mesh, moved_points, narrowest, particle_fields, real_fields
+from .output_checks import (
+    agreed,
+    checked_mesh,
+    moved_points,
+    narrowest,
+    particle_fields,
+    real_fields,
+    type_of_positions,
+)
 from .series import Output, Series, padded
 
 PARTICLE_FIELDS = (
@@ -46,7 +54,8 @@ class ParticleOutput(Output):
         path: of the XDMF file and of the folder of frames, without suffix; the folder around them must exist. What an
             earlier series left there is removed.
         comm: communicator of the ranks that have rows; all call the methods.
-        float32: store real numbers in single precision; in double precision if false.
+        float32: store real numbers in single precision; in double precision if false. Positions are stored in double
+            precision where single precision does not resolve them, as with coordinates of a map.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
 
     Raises:
@@ -62,6 +71,7 @@ class ParticleOutput(Output):
     ) -> None:
         super().__init__(Series(path, comm, "particles", float32, compression))
         self._out_of_plane = "zz"
+        self._position_type: np.dtype | None = None
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
         """Write one frame, which is on disk when this returns.
@@ -80,7 +90,10 @@ class ParticleOutput(Output):
         """
         arrays, counts = agreed(self._series.comm, lambda: particle_fields(fields))
         n, before = sum(counts), sum(counts[: self._series.comm.rank])
-        position = padded(arrays.pop("position"), self._series.real)
+        position = arrays.pop("position")
+        if self._position_type is None and n:
+            self._position_type = type_of_positions(self._series.comm, position, self._series.real)
+        position = padded(position, self._position_type or self._series.real)
         with self._series.frame(time) as frame:
             stored, vertices = self._series.shared.get("vertices", (-1, ""))  # how many, and where they are
             if stored != n:  # they are stored again only when their number changes
@@ -104,7 +117,8 @@ class MeshOutput(Output):
         comm: communicator of the ranks that have rows; all call the methods.
         points: (n, 2) or (n, 3), nodes of this rank's cells, m. A node that several ranks give is stored once for each.
         cells: (m, 3) or (m, 4), rows of ``points`` for each triangle or tetrahedron of this rank.
-        float32: store real numbers in single precision; in double precision if false.
+        float32: store real numbers in single precision; in double precision if false. Positions are stored in double
+            precision where single precision does not resolve them, as with coordinates of a map.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
         fixed: fields on the cells that are the same in all frames, by name; stored once.
 
@@ -138,7 +152,8 @@ class MeshOutput(Output):
         with series.single() as frame:
             topology = frame.add_data("cells", numbers, self._cells)
             self._grid = "Triangle" if self._dim == 2 else "Tetrahedron", topology, sum(self._cells), self._dim + 1
-            frame.add_grid(*self._grid, frame.add_data("points", padded(points, series.real), nodes))
+            self._position_type = type_of_positions(comm, points, series.real)
+            frame.add_grid(*self._grid, frame.add_data("points", padded(points, self._position_type), nodes))
             for name, values in fields.items():
                 frame.add_field(name, "Cell", values, self._cells)
         self._start, self._fixed = "".join(frame.text), frame.text[1:]
@@ -169,7 +184,9 @@ class MeshOutput(Output):
         moved, _ = agreed(comm, lambda: moved_points(points, n, self._dim))
         with self._series.frame(time, "" if moved else self._start) as frame:
             for positions in moved.values():
-                frame.add_grid(*self._grid, frame.add_data("points", padded(positions, self._series.real), self._nodes))
+                frame.add_grid(
+                    *self._grid, frame.add_data("points", padded(positions, self._position_type), self._nodes)
+                )
                 frame.text += self._fixed
             for name, values in at_nodes.items():
                 frame.add_field(name, "Node", values, self._nodes)
@@ -196,7 +213,8 @@ class ModelOutput:
         particle_fields: attributes of ``model.particles``, such as ``velocity``, and ``displacement``, ``plastic_strain``; the
             position is always written.
         nodal_fields: as ``Model.nodal`` gives them.
-        float32: store real numbers in single precision; in double precision if false.
+        float32: store real numbers in single precision; in double precision if false. Positions are stored in double
+            precision where single precision does not resolve them, as with coordinates of a map.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
         background: a thread of the first rank writes a frame while the next steps go on. `write` returns at once, and `close` and
             the next `write` wait for the frame and raise its error. Until then no other thread may use HDF5, but by h5py.
@@ -233,6 +251,7 @@ class ModelOutput:
             particle_output = ParticleOutput(particles, start.comm, float32, compression)
             if model.geometry == Geometry.AXISYMMETRIC:
                 particle_output._out_of_plane = "hoop"
+            particle_output._position_type = type_of_positions(start.comm, start.points, particle_output._series.real)
             self._outputs.append(particle_output)
         if mesh is not None:
             own = slice(start.owned_cells)
@@ -271,6 +290,8 @@ class ModelOutput:
             try:
                 if isinstance(output, ParticleOutput):
                     fields = self._model._core.copied_fields(self._fields, self._float32, padded=True)
+                    if output._position_type != output._series.real:
+                        fields |= self._model._core.copied_fields([], single=False, padded=True)  # the position
                     output.write(self._model.time, {**fields, **more})
                 elif isinstance(output, BodyOutput):
                     output.write()

@@ -98,6 +98,25 @@ def moved_points(points: np.ndarray | None, n: int, dim: int) -> dict[str, np.nd
     return real_fields({"points": points}, n)
 
 
+def type_of_positions(comm: MPI.Comm, points: np.ndarray, real: np.dtype) -> np.dtype:
+    """The type in which positions are stored. Collective.
+
+    Double precision where single precision does not resolve a hundred-thousandth of their extent: coordinates of a map, such as
+    UTM, are known to half a metre by it.
+
+    Args:
+        comm: the ranks that have positions.
+        points: of this rank (n, D) [m].
+        real: the type of other real numbers.
+    """
+    points = points.astype(np.float64, copy=False)
+    corners = np.concatenate([-points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)])
+    comm.Allreduce(MPI.IN_PLACE, corners, MPI.MAX)
+    highest, lowest = corners[points.shape[1] :], -corners[: points.shape[1]]
+    extent, farthest = np.max(highest - lowest), np.abs(corners).max()
+    return np.dtype(np.float64) if farthest * np.finfo(np.float32).eps / 2 > 1e-5 * extent > 0 else real
+
+
 def checked_mesh(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points = np.asarray(points)
     cells = np.asarray(cells)

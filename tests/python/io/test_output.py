@@ -49,6 +49,26 @@ def test_h5py_reads_what_was_written(tmp_path, dimension, float32):
                 np.testing.assert_allclose(file[name][()], values, rtol=2.0**-24 if float32 and real else 0)
 
 
+def test_positions_on_a_map_are_stored_in_double_precision(tmp_path):
+    # Single precision has 24 binary digits: half a metre of a northing of 5335 km, and the particles of a slide are closer.
+    fields = particle_fields(7, 2)
+    near, far = fields["position"], fields["position"] + [691000.0, 5335000.0]
+    for name, position in (("near", near), ("far", far)):
+        with ParticleOutput(tmp_path / name, COMM) as output:
+            output.write(0.0, fields | {"position": position})
+        with MeshOutput(tmp_path / f"{name}_mesh", COMM, position, TRIANGLES) as output:
+            output.write(0.0, {}, points=position + 0.25)
+        for file, key, shift in ((f"{name}/000000", "position", 0), (f"{name}_mesh/mesh", "points", 0),
+                                 (f"{name}_mesh/000000", "points", 0.25)):  # fmt: skip
+            with h5py.File(tmp_path / f"{file}.h5") as stored_frame:
+                stored_positions = stored_frame[key][()]
+                assert stored_positions.dtype == (np.float64 if name == "far" else np.float32)
+                np.testing.assert_allclose(
+                    stored_positions, padded(position + shift), rtol=1e-15 if name == "far" else 1e-7
+                )
+                assert name == "near" or "velocity" not in stored_frame or stored_frame["velocity"].dtype == np.float32
+
+
 def test_meshio_reads_the_particles_over_time(tmp_path):
     frames = [particle_fields(6, 2, seed=step) for step in range(3)]
     with ParticleOutput(tmp_path / "particles.xdmf", COMM, float32=False) as output:
