@@ -44,11 +44,17 @@ function niceTicks(low, high, most) {
   return ticks;
 }
 
-function shown(value, digits = 4) {
+// A number in four digits, or in as many as it takes where numbers differ by a small part of their size only, as
+// coordinates of a map do: two digits more than their span needs.
+function shown(value, span = 0) {
   if (!Number.isFinite(value)) return "\u2013";
   const size = Math.abs(value);
-  const text = size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(digits - 2) : String(+value.toPrecision(digits));
+  let text;
+  if (span > 0 && size > 100 * span) text = String(+value.toFixed(Math.min(20, Math.max(0, 2 - Math.floor(Math.log10(span))))));
+  else text = size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(2) : String(+value.toPrecision(4));
   return text.replace("-", "\u2212");
 }
+
+const spanOf = (numbers) => numbers.at(-1) - numbers[0];
 
 const withUnit = (text, unit) => (unit === "-" || unit === "" ? text : `${text} ${unit}`);

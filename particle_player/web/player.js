@@ -224,7 +224,8 @@ class Player {
   describe(view, i) {
     const { k, fraction } = view.now, { fields, count, ids } = view.movie;
     const at = (name) => valueAt(fields[name], count, i, k, fraction);
-    const lines = [`particle ${ids ? ids[i] : i}`, `at (${shown(at("x"))}, ${shown(at("y"))}) m`];
+    const place = (name) => shown(at(name), 65534 * fields[name].step);
+    const lines = [`particle ${ids ? ids[i] : i}`, `at (${place("x")}, ${place("y")}) m`];
     for (const [key, q] of Object.entries(this.data.quantities)) {
       if (fields[key]) lines.push(`${q.name}: ${withUnit(shown(at(key)), q.unit)}`);
     }

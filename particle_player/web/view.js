@@ -173,7 +173,7 @@ class View {
       const px = this.ox + this.s * x;
       c.moveTo(px, bottom);
       c.lineTo(px, bottom + 4);
-      c.fillText(shown(x), px, bottom + 15);
+      c.fillText(shown(x, spanOf(ticksX)), px, bottom + 15);
     }
     c.fillText(this.movie.axes[0], (MARGIN.left + right) / 2, bottom + 29);
     c.textAlign = "right";
@@ -181,7 +181,7 @@ class View {
       const py = this.oy - this.s * y;
       c.moveTo(MARGIN.left, py);
       c.lineTo(MARGIN.left - 4, py);
-      c.fillText(shown(y), MARGIN.left - 7, py + 4);
+      c.fillText(shown(y, spanOf(ticksY)), MARGIN.left - 7, py + 4);
     }
     c.stroke();
     c.save();

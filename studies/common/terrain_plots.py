@@ -40,4 +40,6 @@ def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
         )
         figure.colorbar(colours, ax=ax, label=label, shrink=0.9)
         ax.set(xlabel="$x$ [m]", ylabel="$y$ [m]", aspect="equal")
+        ax.ticklabel_format(useOffset=False, style="plain")  # coordinates of a map as they are read there
+        ax.locator_params(axis="x", nbins=5)
         save_figure(figure, path)

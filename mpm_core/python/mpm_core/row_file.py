@@ -15,7 +15,7 @@ from ._core import InputError
 from .collective import on_first_rank, write_on_first_rank
 
 ROUNDING = 1e-8
-"""Relative; times in the file have nine digits."""
+"""Relative; more than that of times in the file, which have twelve digits."""
 
 
 class RowFile:
@@ -71,7 +71,7 @@ class RowFile:
         """
 
         def write() -> None:
-            self._writer.writerow([f"{value:.9g}" for value in values])
+            self._writer.writerow([f"{value:.12g}" for value in values])
             self._file.flush()
 
         write_on_first_rank(self._comm, self.path, write)

@@ -71,7 +71,7 @@ class Triangles:
             OSError: the file cannot be written.
         """
         with open(path, "w") as file:
-            np.savetxt(file, self.vertices, fmt="v %.9g %.9g %.9g")
+            np.savetxt(file, self.vertices, fmt="v %.12g %.12g %.12g")
             np.savetxt(file, self.triangles + 1, fmt="f %d %d %d")
 
     def __repr__(self) -> str:

@@ -35,15 +35,20 @@ class Curve {
     element.querySelector("span").textContent = withUnit(curve.name, curve.unit === "-" ? "" : `[${curve.unit}]`);
     this.output = element.querySelector("output");
     host.append(element);
-    const finite = curve.values.filter(Number.isFinite);
-    let low = Math.min(0, ...finite), high = Math.max(...finite, low);
+    const finite = curve.values.some(Number.isFinite) ? curve.values.filter(Number.isFinite) : [0];
+    let low = Math.min(...finite), high = Math.max(...finite);
+    if (!(high - low < 0.05 * Math.abs(high))) [low, high] = [Math.min(low, 0), Math.max(high, low)]; // else zero is far off
     if (!(high > low)) high = low + 1;
+    this.span = high - low;
     const start = Math.min(...times), end = Math.max(...times) > start ? Math.max(...times) : start + 1;
-    const { width, height, left, right, top, bottom } = CHART;
+    const { width, height, right, top, bottom } = CHART;
+    const ticksX = niceTicks(start, end, 6), ticksY = niceTicks(low, high, 4);
+    const left = Math.max(CHART.left, 10 + 6.5 * Math.max(...ticksY.map((v) => shown(v, this.span).length)));
+    Object.assign(this, { left });
     this.x = (t) => left + ((t - start) / (end - start)) * (width - left - right);
     this.y = (v) => height - bottom - ((v - low) / (1.05 * (high - low))) * (height - top - bottom);
     this.svg = svgElement("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": curve.name });
-    this.grid(niceTicks(start, end, 6), niceTicks(low, high, 4));
+    this.grid(ticksX, ticksY);
     const points = curve.values.map((v, k) => (Number.isFinite(v) ? `${this.x(times[k]).toFixed(1)},${this.y(v).toFixed(1)}` : "")).filter(Boolean);
     this.svg.append(svgElement("polyline", { points: points.join(" "), fill: "none", stroke: "#0b559f", "stroke-width": 1.6, "stroke-linejoin": "round" }));
     this.line = svgElement("line", { y1: top, y2: height - bottom, stroke: "#d8321e", "stroke-width": 1 });
@@ -60,14 +65,14 @@ class Curve {
   }
 
   grid(ticksX, ticksY) {
-    const { width, height, left, right, bottom } = CHART;
+    const { width, height, right, bottom } = CHART, left = this.left;
     for (const t of ticksX) {
-      this.svg.append(svgElement("text", { x: this.x(t), y: height - bottom + 15, "text-anchor": "middle" }, shown(t)));
+      this.svg.append(svgElement("text", { x: this.x(t), y: height - bottom + 15, "text-anchor": "middle" }, shown(t, spanOf(ticksX))));
     }
     this.svg.append(svgElement("text", { x: (left + width - right) / 2, y: height - 4, "text-anchor": "middle" }, `${this.along.name} [${this.along.unit}]`));
     for (const v of ticksY) {
       this.svg.append(svgElement("line", { x1: left, x2: width - right, y1: this.y(v), y2: this.y(v), stroke: "#e3e7eb" }));
-      this.svg.append(svgElement("text", { x: left - 6, y: this.y(v) + 4, "text-anchor": "end" }, shown(v)));
+      this.svg.append(svgElement("text", { x: left - 6, y: this.y(v) + 4, "text-anchor": "end" }, shown(v, this.span)));
     }
   }
 
@@ -79,6 +84,6 @@ class Curve {
     this.line.setAttribute("x2", this.x(this.times[k]));
     this.dot.setAttribute("cx", this.x(this.times[k]));
     this.dot.setAttribute("cy", Number.isFinite(value) ? this.y(value) : -10);
-    this.output.textContent = withUnit(shown(value), this.curve.unit);
+    this.output.textContent = withUnit(shown(value, this.span), this.curve.unit);
   }
 }

@@ -42,7 +42,7 @@ def page(tmp_path_factory):
     Image.new("RGB", (8, 8), "red").save(folder / "figure.png")
     save_report(folder / "report.html", Report(
         "Shear </script> & <b>", "A block", {"moved": "1 m"}, movies, figures={folder / "figure.png": "A figure"},
-        curves={"History": {"time_s": TIMES, "crest_displacement_m": 0.5 * TIMES}},
+        curves={"History": {"time_s": TIMES, "crest_displacement_m": 0.5 * TIMES, "centre_y_m": 5335020.0 + 8.0 * TIMES}},
         parameters=[Parameter("height", 1.0, "m", "height of the block")], results={"steps": 10},
     ))  # fmt: skip
     (folder / "figure.png").unlink()  # the page must not need it
@@ -147,6 +147,23 @@ def test_both_panels_show_the_same_part_and_the_curves_follow(browser):
     assert [k for _, _, k in views] == [5, 0]
     assert browser.execute_script("return document.querySelector('.curve output').textContent") == "0.5 m"
     assert browser.get_log("browser") == []
+
+
+def test_coordinates_of_a_map_are_drawn_where_they_are_and_in_all_digits(browser):
+    move_slider(browser, 5)
+    curve = "document.querySelectorAll('.curve')[1]"
+    assert (
+        browser.execute_script(f"return {curve}.querySelector('output').textContent")
+        == f"{5335020 + 8 * TIMES[5]:.0f} m"
+    )
+    ticks = browser.execute_script(
+        f"return [...{curve}.querySelectorAll('text[text-anchor=end]')].map((t) => t.textContent)"
+    )
+    assert [float(t) for t in ticks] == sorted({float(t) for t in ticks}) and 5335020 <= float(ticks[0]) <= 5335024
+    first = browser.execute_script(
+        "return [shown(0), shown(1e-5), shown(-2.5e7), shown(3.14159), shown(691024.271, 30)]"
+    )
+    assert first == ["0", "1.00e\u22125", "\u22122.50e+7", "3.142", "691024.3"]
 
 
 # --- 100,000 particles -----------------------------------------------------------------------------------------------
