@@ -67,6 +67,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   explicit_scheme::choose_forces(model, options.integration, averages_of(options));
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
+  find_start_of_light_nodes(model.mesh, model.exchange, field);
   field.has_light_nodes = false; // the equations give them velocities, too
   if (options.quasi_static)
     std::ranges::fill(field.start_velocity, Vector<G::dim>{});

@@ -2,6 +2,7 @@
 
 #include "implicit/inertia.h"
 #include "implicit/nodal_stiffness.h"
+#include "model/mapping.h"
 
 #include <algorithm>
 
@@ -22,6 +23,28 @@ void find_active(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Velocit
   sum_shared(exchange, filled.data(), 1);
   step.active.resize(filled.size());
   std::ranges::transform(filled, step.active.begin(), [](double f) { return f > 0 ? 1 : 0; });
+}
+
+template <class G>
+void find_start_of_light_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field)
+{
+  constexpr int D = G::dim;
+  std::vector<Vector<D + 1>> sums(mesh.points.size()); // of velocities, and how many
+  for (Index c : field.part.cells)
+    for (Index node : mesh.cells[c])
+      if (field.moments[c].mass > 0 && is_light(field, node))
+      {
+        const Vector<D> mean = mean_of_heavy_nodes(mesh, field, field.start_velocity, c);
+        for (int a = 0; a < D; ++a)
+          sums[node][a] += mean[a];
+        sums[node][D] += 1;
+      }
+  sum_shared(exchange, sums);
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    for (int a = 0; a < D && sums[i][D] > 0; ++a)
+      field.start_velocity[i][a] = sums[i][a] / sums[i][D];
+  for (const Support<D>& support : field.supports)
+    impose<D>(support, field.start_velocity[support.node]);
 }
 
 template <class G>
@@ -46,6 +69,7 @@ void make_halos_once(const Mesh<G::dim>& mesh, const NodeExchange& exchange, Imp
 }
 #define INSTANTIATE(G)                                                                                                 \
   template void find_active(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);            \
+  template void find_start_of_light_nodes(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                      \
   template void find_frequencies(const Mesh<G::dim>&, NodeExchange&, const MaterialPoints<G::dim>&,                    \
                                  const VelocityField<G>&, ImplicitStep<G>&);                                           \
   template void make_halos_once(const Mesh<G::dim>&, const NodeExchange&, ImplicitStep<G>&);

@@ -13,6 +13,13 @@ template <class G>
 void find_active(const Mesh<G::dim>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
                  ImplicitStep<G>& step);
 
+/// Gives the nodes with too little mass for a velocity of their own the mean of those of the other vertices of their
+/// cells, from which their acceleration counts.
+/// @pre the field's start velocities are those of the other nodes
+/// @note Collective
+template <class G>
+void find_start_of_light_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field);
+
 /// Elastic stiffness of the nodes, and the frequencies that damping acts on (T5).
 /// @note Collective
 template <class G>
