@@ -45,9 +45,11 @@ from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import (
+    add_damping,
     add_pic,
-    averages_strains,
     add_scheme_options,
+    averages_strains,
+    check_damping,
     check_scheme_options,
     run_scheme,
     stable_integration,
@@ -70,8 +72,8 @@ COLUMNS = [
     "unbalanced_ratio", "plastic_fraction", "dt_s",
 ]  # fmt: skip
 MAY_CHANGE = {
-    "time", "dt", "damping", "pic", "nmd", "solver", "second-order", "integration", "transfer", "frames", "frame-steps",
-    "rebalance", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
+    "time", "dt", "damping", "mass-damping", "pic", "nmd", "solver", "second-order", "integration", "transfer", "frames",
+    "frame-steps", "rebalance", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
 
@@ -89,7 +91,7 @@ def parser() -> ArgumentParser:
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
     add_number(start, "--initial-unit-weight", 18e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     slide = p.add_argument_group("slide")
-    add_number(slide, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    add_damping(slide)
     add_pic(slide, 0.0)
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil locks: "
                "dilation angle below the friction angle, with implicit schemes 0; friction angle 0, undrained, Poisson's ratio above "
@@ -132,9 +134,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
             lambda: f"--integration is {options.integration}, expected particles with --paper",
         )
         check(p, options.transfer == "flip", lambda: "--transfer is affine, expected flip with --paper")
+        check(p, options.mass_damping == 0, lambda: "--mass-damping is given, expected --damping alone with --paper")
         options.initial, options.dt = "zero", 1e-4
     check(p, options.ensemble == 1 or (options.restart is None and options.site is None),
           lambda: f"--ensemble is {options.ensemble}, expected 1 with --restart or --site")  # fmt: skip
+    check_damping(p, options)
     check_scheme_options(p, options)
     if options.nmd is None and options.site is None:
         options.nmd = not options.paper and averages_strains(options.scheme, [law_of(options)])

@@ -61,6 +61,7 @@ def parser() -> ArgumentParser:
     add_choice(p, "--initial", "zero", ("fem", "elastic", "k0", "zero"), "initial stresses; fem is elasto-plastic")
     add_number(p, "--initial-unit-weight", 18e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     add_number(p, "--damping", 0.75, "-", "local damping", at_least=0, below=1)
+    p.set_defaults(mass_damping=0.0)
     add_pic(p, 0.0)
     add_discretisation(p)
     add_switch(p, "--nmd", False, "average volumetric strains over nodes, against locking")

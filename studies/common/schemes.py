@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 from mpm_core.integration import LEAST_IN_CELL
@@ -52,6 +53,28 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
                "PIC fraction: fraction of a particle's velocity that is replaced by the nodal one in a critical time step "
                "(0 is FLIP)",
                at_least=0, at_most=1)  # fmt: skip
+
+
+def add_damping(parser: argparse.ArgumentParser) -> None:
+    """Options ``--damping`` and ``--mass-damping``."""
+    add_number(parser, "--damping", None, "-", "local damping (default: 0.75; 0 with --mass-damping)", at_least=0, below=1)  # fmt: skip
+    add_number(parser, "--mass-damping", 0.0, "1/s", "forces against the motion, this number times the momentum, with which a "
+               "slide depends less on the cells than with local damping (explicit)", at_least=0)  # fmt: skip
+
+
+def rayleigh_of(options: argparse.Namespace) -> mpm.Rayleigh | None:
+    """The damping by ``--mass-damping``, in yielding soil too."""
+    return mpm.Rayleigh(mass=options.mass_damping, plastic_strain=math.inf) if options.mass_damping > 0 else None
+
+
+def check_damping(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Fill in ``damping``, and end with an error where ``mass_damping`` does not fit."""
+    if options.damping is None:
+        options.damping = 0.0 if options.mass_damping > 0 else 0.75
+    check(parser, options.mass_damping == 0 or (options.scheme == "explicit" and options.transfer == "flip"),
+          lambda: f"--mass-damping is {options.mass_damping:g}, expected --scheme explicit and --transfer flip with it")  # fmt: skip
+    check(parser, options.mass_damping == 0 or options.site is None,
+          lambda: f"--mass-damping is {options.mass_damping:g}, expected 0 with --site")  # fmt: skip
 
 
 def stable_integration(per_cell: int, cohesive: bool) -> str:
@@ -131,7 +154,7 @@ def run_scheme(
     """Run a model to ``--time`` by the scheme asked for; yields reports.
 
     Args:
-        options: with those of `add_scheme_options` and time, damping, pic and nmd.
+        options: with those of `add_scheme_options` and time, damping, mass_damping, pic and nmd.
         every: time between reports, counted from zero [s].
         watch: called between steps; true ends the run after a report.
         rebalance: see ``Model.explicit``.
@@ -153,7 +176,7 @@ def run_scheme(
         "integration": INTEGRATIONS[a.integration],
     }
     if a.scheme == "explicit":
-        return model.explicit(a.time, dt=dt, transfer=TRANSFERS[a.transfer], **common)
+        return model.explicit(a.time, dt=dt, transfer=TRANSFERS[a.transfer], rayleigh=rayleigh_of(a), **common)
     return model.implicit(
         a.time,
         dt=dt,

@@ -10,6 +10,9 @@ On a smooth base the slope slides as one body without shear bands, and the resul
 as well; they are compared after 0.6 s, also with cells that move with the soil, which no particle crosses. Under 80 kN/m³, with viscosity and the affine transfer, the results converge without
 damping while the slope comes to rest; they are compared after 4 s, and the crest moves by another tenth until 8 s.
 
+Local damping acts on the oscillations of the mesh, so that a slide with it depends on the cells. Forces against the motion of
+5 /s times the momentum brake a slide as well, and its crest then does not depend on them; compared after 4 s.
+
 The particles cross cells all the time, which the energy balance shows: if stresses are summed over particles, the crossings
 dissipate a part of the energy, which grows as cells become smaller. Implicit steps of second order follow the explicit slide,
 with viscosity and without.
@@ -34,7 +37,9 @@ import mpm_core as mpm
 VISCOUS = ["--material", "viscoplastic", "--viscosity", "1000"]
 END, STEP = 2.0, 0.05  # s: of the slide, of the implicit scheme
 SMOOTH_END = 0.6  # s: of the slide on a smooth base
-HEAVY, REST_END = "80e3", 4.0  # N/m3, s: of the slide that comes to rest
+HEAVY, REST_END = "80e3", 4.0  # N/m3, s: of the slides that come to rest
+BRAKE = mpm.Rayleigh(mass=5.0, plastic_strain=np.inf)  # 1/s: forces against the motion, in yielding soil too
+BRAKE_PIC = 0.02  # takes the noise of the particles, which no force at the nodes damps
 MIXED, PARTICLES = mpm.Integration.MIXED, mpm.Integration.PARTICLES
 CROSSINGS = (
     "Particles that cross cells dissipate energy if stresses are summed over particles; mixed integration avoids this."
@@ -71,15 +76,17 @@ def slide(
     smooth=False,
     to_rest=False,
     moving_cells=False,
+    braked=False,
 ) -> Slide:
     """The slide of one variant; courant: step over the critical one; smooth: the base; to_rest: of heavier soil, longer, by the
-    affine transfer; moving_cells: as in `Model.explicit`. Collective."""
+    affine transfer; moving_cells: as in `Model.explicit`; braked: heavier soil, longer, with forces against the motion.
+    Collective."""
     parser = study_parser(__doc__)
     add_slope_options(parser)
     soil = VISCOUS if viscous else ["--dilation-angle", "0"]
     options = [
         "--unit-weight",
-        HEAVY if to_rest else "60e3",
+        HEAVY if to_rest or braked else "60e3",
         *soil,
         "--cell-size",
         str(cell),
@@ -91,13 +98,20 @@ def slide(
     case = build_slope(parser.parse_args(options), MPI.COMM_WORLD)
     if smooth:
         on_smooth_base(case)
-    watch, end = Watch(case), REST_END if to_rest else SMOOTH_END if smooth else END
+    watch, end = Watch(case), REST_END if to_rest or braked else SMOOTH_END if smooth else END
     transfer = mpm.Transfer.AFFINE if to_rest else mpm.Transfer.FLIP
     if implicit:
         report = case.model.implicit(end, dt=STEP, second_order=True, nmd=nmd, integration=integration).last()
     else:
+        brake = {"rayleigh": BRAKE, "pic": BRAKE_PIC} if braked else {}
         run = case.model.explicit(
-            end, courant=courant, nmd=nmd, integration=integration, transfer=transfer, moving_cells=moving_cells
+            end,
+            courant=courant,
+            nmd=nmd,
+            integration=integration,
+            transfer=transfer,
+            moving_cells=moving_cells,
+            **brake,
         )
         report = run.last()
     return Slide(watch.crest_displacement(), watch.runout(), report.unexplained_fraction)
@@ -179,11 +193,23 @@ def run(quick: bool, folder: Path) -> Result:
         for name, other in variants.items():
             checks += alike(f"to rest, {name}", resting[middle], slide(middle, to_rest=True, **other), 0.03)
 
-    # --- 6. Sums over particles, for comparison ---------------------------------------------------------------------
+    # --- 6. A slide that forces in proportion to momentum brake; its toe moves by a few cells, to half a cell ------------
+    braked = {cell: slide(cell, braked=True) for cell in cells}
+    variants = {
+        f"cells of {middle:g} m against half of that": braked[cells[-1]],
+        "a quarter of the step": slide(middle, braked=True, courant=0.125),
+        "twelve particles in a cell for six": slide(middle, braked=True, per_cell=12),
+        "unstructured mesh": slide(middle, braked=True, mesh="gmsh"),
+    }
+    for name, other in variants.items():
+        checks += alike(f"braked, {name}", other, braked[middle], 0.15 if quick else 0.03)[:1]
+    checks += [balanced(f"braked, cells of {cell:g} m", one) for cell, one in braked.items()]
+
+    # --- 7. Sums over particles, for comparison ---------------------------------------------------------------------
     summed = {cell: slide(cell, integration=PARTICLES) for cell in cells}
     checks += [balanced(f"cells of {cell:g} m, sums over particles", one, CROSSINGS) for cell, one in summed.items()]
 
-    # --- 7. Picture -------------------------------------------------------------------------------------------------
+    # --- 8. Picture -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
         curves = {}
         for name, runs in (("mixed", found), ("sums over particles", summed)):

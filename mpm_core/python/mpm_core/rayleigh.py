@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
-from .checks import positive
+from .checks import positive, within
 from .mesh import floats
 
 
@@ -24,7 +24,8 @@ class Rayleigh:
         stiffness: beta [s]. It shortens the critical time step to ``sqrt(1 + x**2) - x`` times that without, with ``x`` some
             ``stiffness`` over that step: to a fifth for x = 2.4.
         plastic_strain: accumulated plastic deviatoric strain of a point above which its cell is no longer damped [-]; the
-            stresses of ``stiffness`` would strengthen a shear band, and the forces of ``mass`` brake a slide.
+            stresses of ``stiffness`` would strengthen a shear band, and the forces of ``mass`` brake a slide. Infinite where they
+            are to brake it, as in the place of local damping (docs/integration.md).
 
     Raises:
         InputError: a number that is negative.
@@ -41,7 +42,7 @@ class Rayleigh:
     def __post_init__(self) -> None:
         positive("mass", self.mass, "1/s", zero=True)
         positive("stiffness", self.stiffness, "s", zero=True)
-        positive("plastic_strain", self.plastic_strain, "(a strain)", zero=True)
+        within("plastic_strain", self.plastic_strain, 0, np.inf)
 
     @classmethod
     def of_ratio(cls, ratio: float, frequencies: ArrayLike, plastic_strain: float = 1e-3) -> Rayleigh:

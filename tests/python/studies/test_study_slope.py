@@ -69,6 +69,20 @@ def test_a_short_run_writes_all_it_promises(tmp_path):
     assert len(history(tmp_path)["time_s"]) == 4
 
 
+def test_forces_in_proportion_to_momentum_take_the_place_of_local_damping(tmp_path):
+    options = ("--mass-damping", "5", "--time", "0.5", "--frames", "3", "--no-pictures")
+    assert slope(tmp_path, *options).returncode == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["parameters"]["damping"] == 0 and summary["parameters"]["mass_damping"] == 5
+    # Soil that yields is braked, too, and the work is booked: with local damping alone there would be none.
+    energy = summary["energy_J_per_m"]
+    assert energy["damping_work"] > energy["kinetic_energy"] > 0
+    assert abs(summary["unexplained_fraction_of_energy"]) < 0.01
+    for wrong in (("--transfer", "affine"), ("--scheme", "implicit"), ("--paper",)):
+        refused = slope(tmp_path / "refused", *options, *wrong)
+        assert refused.returncode == 2 and "--mass-damping is" in refused.stderr
+
+
 def test_a_slope_that_fails_warns_of_nothing_at_its_defaults(tmp_path):
     # In half a second without damping it fails. The message is there where strains are not averaged.
     for name, options in (("default", []), ("plain", ["--no-nmd"])):
