@@ -57,7 +57,7 @@ def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
 
 def add_damping(parser: argparse.ArgumentParser) -> None:
     """Options ``--damping`` and ``--mass-damping``."""
-    add_number(parser, "--damping", None, "-", "local damping (default: 0.75; 0 with --mass-damping)", at_least=0, below=1)  # fmt: skip
+    add_number(parser, "--damping", None, "-", "local damping (default: 0.75; 0 with mass damping)", at_least=0, below=1)  # fmt: skip
     add_number(parser, "--mass-damping", 0.0, "1/s", "forces against the motion, this number times the momentum, with which a "
                "slide depends less on the cells than with local damping (explicit)", at_least=0)  # fmt: skip
 
