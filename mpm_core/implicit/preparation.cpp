@@ -30,15 +30,13 @@ void find_start_of_light_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange,
 {
   constexpr int D = G::dim;
   std::vector<Vector<D + 1>> sums(mesh.points.size()); // of velocities, and how many
-  for (Index c : field.part.cells)
-    for (Index node : mesh.cells[c])
-      if (field.moments[c].mass > 0 && is_light(field, node))
-      {
-        const Vector<D> mean = mean_of_heavy_nodes(mesh, field, field.start_velocity, c);
-        for (int a = 0; a < D; ++a)
-          sums[node][a] += mean[a];
-        sums[node][D] += 1;
-      }
+  for_each_light_vertex(mesh, field, field.start_velocity,
+                        [&](Index node, const Vector<D>& mean)
+                        {
+                          for (int a = 0; a < D; ++a)
+                            sums[node][a] += mean[a];
+                          sums[node][D] += 1;
+                        });
   sum_shared(exchange, sums);
   for (std::size_t i = 0; i < sums.size(); ++i)
     for (int a = 0; a < D && sums[i][D] > 0; ++a)

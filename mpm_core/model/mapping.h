@@ -40,6 +40,18 @@ template <class G>
 Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>& mesh, const VelocityField<G>& field,
                                    const std::vector<Vector<G::dim>>& nodal, Index cell);
 
+/// Calls visit(node, mean) for each light vertex of each cell with particles: its node, and the mean of the nodal
+/// values of the other vertices.
+template <class G, class Visit>
+void for_each_light_vertex(const Mesh<G::dim>& mesh, const VelocityField<G>& field,
+                           const std::vector<Vector<G::dim>>& nodal, Visit&& visit)
+{
+  for (Index c : field.part.cells)
+    for (Index node : mesh.cells[c])
+      if (field.moments[c].mass > 0 && is_light(field, node))
+        visit(node, mean_of_heavy_nodes(mesh, field, nodal, c));
+}
+
 /// The velocity, or its change, at a vertex as the particles of a cell take it: that of its node, or, where the node is
 /// light, the mean of the other vertices. Particles are then within round-off of the facet opposite to the node; they
 /// would be strained at once if it stood still.

@@ -17,16 +17,14 @@ template <class G, int D = G::dim>
 void move_light_nodes(const VelocityField<G>& field, double dt, Mesh<D>& mesh)
 {
   std::map<Index, std::pair<Vector<D>, int>> sums;
-  for (Index c : field.part.cells)
-    for (Index node : mesh.cells[c])
-      if (field.moments[c].mass > 0 && is_light(field, node))
-      {
-        auto& [velocity, count] = sums[node];
-        const Vector<D> mean = mean_of_heavy_nodes(mesh, field, field.velocity, c);
-        for (int a = 0; a < D; ++a)
-          velocity[a] += mean[a];
-        ++count;
-      }
+  for_each_light_vertex(mesh, field, field.velocity,
+                        [&](Index node, const Vector<D>& mean)
+                        {
+                          auto& [velocity, count] = sums[node];
+                          for (int a = 0; a < D; ++a)
+                            velocity[a] += mean[a];
+                          ++count;
+                        });
   for (const auto& [node, sum] : sums)
     for (int a = 0; a < D; ++a)
       mesh.points[node][a] += dt * sum.first[a] / sum.second;
