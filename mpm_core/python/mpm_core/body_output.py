@@ -51,15 +51,15 @@ class BodyOutput(Output):
         collectively(model.comm, require_contact)
         super().__init__(Series(path, model.comm, "bodies", float32, compression))
         self._contacts = model.contacts
-        cells, self._body, first = [], [], 0
+        cells, outlines, self._body, first = [], [], [], 0
         for number, contact in enumerate(self._contacts):
             points, of_surface = contact.outline()
             cells.append(of_surface + first)
+            outlines.append(points)
             self._body.append(np.full(len(of_surface), number, np.int32))
             first += len(points)
         self._cells = np.concatenate(cells).astype(np.int32)
-        start = np.concatenate([contact.outline()[0] for contact in self._contacts])
-        self._position_type = type_of_positions(model.comm, start, self._series.real)
+        self._position_type = type_of_positions(model.comm, np.concatenate(outlines), self._series.real)
 
     def write(self) -> None:
         """Write a frame of the surfaces as they are now, which is on disk when this returns.

@@ -44,7 +44,7 @@ class Curve {
     const { width, height, right, top, bottom } = CHART;
     const ticksX = niceTicks(start, end, 6), ticksY = niceTicks(low, high, 4);
     const left = Math.max(CHART.left, 10 + 6.5 * Math.max(...ticksY.map((v) => shown(v, this.span).length)));
-    Object.assign(this, { left });
+    this.left = left;
     this.x = (t) => left + ((t - start) / (end - start)) * (width - left - right);
     this.y = (v) => height - bottom - ((v - low) / (1.05 * (high - low))) * (height - top - bottom);
     this.svg = svgElement("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": curve.name });
