@@ -10,6 +10,8 @@ Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, doub
   const double resolved = left_by_backward_euler(step.frequency[node] * step.length);
   Inertia inertia =
       damped_inertia(mass, start, end, step.stage.dt, step.options.damping, step.frequency[node], resolved);
+  inertia.force += step.options.mass_damping * mass * end;
+  inertia.derivative += step.options.mass_damping * mass;
   inertia.derivative /= step.stage.weight;
   return inertia;
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// Inertia of an implicit step, with what local damping adds to it: a term of its residual, and of its tangent.
+/// Inertia of an implicit step, with what damping adds to it: a term of its residual, and of its tangent.
 
 #include "implicit/damped_inertia.h"
 #include "implicit/entries.h"
@@ -12,7 +12,7 @@ namespace mpm::implicit
 template <class G>
 Inertia stage_inertia(const ImplicitStep<G>& step, double mass, Index node, double start, double end);
 
-/// M (v1 - v0) / dt + D of the iterate `field.velocity`; nothing in a quasi-static step.
+/// M (v1 - v0) / dt + D + alpha M v1 of the iterate `field.velocity`; nothing in a quasi-static step.
 /// @param owned  per node: 1 on exactly one of the ranks that share it
 template <class G, int D = G::dim>
 void add_inertia_forces(const VelocityField<G>& field, const ImplicitStep<G>& step,

@@ -15,6 +15,7 @@ namespace mpm::implicit
 struct ImplicitOptions
 {
   double damping = 0;          ///< local damping alpha, in [0, 1), see damped_inertia.h; not used in quasi-static steps
+  double mass_damping = 0;     ///< forces against the motion over the momentum [1/s]; not used in quasi-static steps
   double pic = 0;              ///< PIC fraction of a critical time step, in [0, 1]
   bool nmd = false;            ///< nodal mixed discretisation
   bool average_stress = false; ///< with nodal mixed discretisation: forces of averaged mean stresses, see mapping.h
@@ -86,7 +87,7 @@ struct NodalForces
   Vector<D> external; ///< f_ext (15)
   Vector<D> internal; ///< f_int (14), pore pressures included
   Vector<D> ghost;    ///< of the ghost penalty
-  Vector<D> inertia;  ///< M (v1 - v0) / dt, with what local damping adds to it
+  Vector<D> inertia;  ///< M (v1 - v0) / dt, with what damping adds to it
 };
 
 /// What a stage has of the ones before it. The iterate v is the mean velocity over the step so far, u / dt; that of the

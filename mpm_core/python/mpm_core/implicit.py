@@ -16,6 +16,7 @@ from .failure_watch import FailureWatch
 from .explicit import is_report_due
 from .ghost import GhostPenalty
 from .partition import keep_balance
+from .rayleigh import Rayleigh, implicit_mass_damping
 from .report import ImplicitReport
 from .setup_warnings import dilates
 from .solution import Solution
@@ -44,11 +45,13 @@ def implicit_options(
     ghost: GhostPenalty | None,
     small_displacements: bool = False,
     second_order: bool = False,
+    rayleigh: Rayleigh | None = None,
     averaged_forces: bool = False,
 ) -> Any:
     """The core's options of the scheme; see `Model.implicit` and `Model.equilibrate`."""
     options = _core.ImplicitOptions()
     options.damping = within("damping", damping, 0, 1, open_above=True)
+    options.mass_damping = implicit_mass_damping(rayleigh)
     options.pic = within("pic", pic, 0, 1)
     options.nmd = flag("nmd", nmd)
     if integration == Integration.DUAL_DOMAIN:

@@ -266,6 +266,7 @@ class Model(ContactMethods, Body):
         watch: Callable[[], bool] | None = None,
         quasi_static: bool = False,
         damping: float = 0.0,
+        rayleigh: Rayleigh | None = None,
         pic: float = 0.0,
         nmd: bool = False,
         integration: Integration | None = None,
@@ -293,6 +294,7 @@ class Model(ContactMethods, Body):
             quasi_static: leave inertia out. Loads and supports depend on time, and the particles are at rest at the end.
             damping: local damping alpha, in [0, 1). Its effect on elastic oscillations that the step does not resolve
                 is a drag on the slide, as in the explicit scheme. Without effect in quasi-static runs.
+            rayleigh: damping as by ``Rayleigh(mass=5.0, plastic_strain=np.inf)``, the only kind; not in quasi-static runs.
             pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
                 the step.
@@ -333,7 +335,7 @@ class Model(ContactMethods, Body):
             self.comm,
             lambda: (
                 implicit_options(
-                    damping, pic, nmd, integration, quasi_static, ghost, small_displacements, second_order
+                    damping, pic, nmd, integration, quasi_static, ghost, small_displacements, second_order, rayleigh
                 ),
                 positive("dt", dt, "s"),
                 report_times(self, until, every, since),

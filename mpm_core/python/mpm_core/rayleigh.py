@@ -88,3 +88,20 @@ def checked_rayleigh(rayleigh: Rayleigh | None) -> Rayleigh:
     if rayleigh is not None and not isinstance(rayleigh, Rayleigh):
         raise InputError(f"rayleigh is {rayleigh!r}, expected a Rayleigh or None")
     return rayleigh or NO_DAMPING
+
+
+def implicit_mass_damping(rayleigh: Rayleigh | None) -> float:
+    """The forces over the momentum [1/s] that implicit steps take from a damping.
+
+    Raises:
+        InputError: forces by stiffness, or only where soil does not yield, which implicit steps do not have.
+    """
+    damping = checked_rayleigh(rayleigh)
+    if damping.stiffness > 0:
+        raise InputError(f"rayleigh.stiffness is {damping.stiffness:g} s, expected 0 with the implicit scheme")
+    if damping.mass > 0 and damping.plastic_strain < np.inf:
+        raise InputError(
+            f"rayleigh.plastic_strain is {damping.plastic_strain:g}, expected inf with the implicit scheme, which damps soil that "
+            "yields as well"
+        )
+    return damping.mass
