@@ -1,11 +1,12 @@
 """The paper's slope: initial stresses by FEM, then failure and slide by MPM, explicit or implicit.
 
 Finite elements (DOLFINx) give the elasto-plastic equilibrium of the soil body under its initial unit weight, and its stresses
-are transferred to particles. Then the unit weight is raised at once, and the slope slides until its geometry has changed
-enough to carry it. Slope, soil and damping are those of section 6 of the paper. Stresses are integrated over whole cells and
-strains averaged over nodes, since plain linear cells lock where soil fails without dilation; --paper repeats the published run
-instead, with zero initial stress and a time step of 1e-4 s. With --site a mesh of your own with its soils replaces the slope; it
-slides when the strength of all soils is divided by --factor.
+are transferred to particles. Then the unit weight is raised at once, and the slope slides until its geometry has changed enough
+to carry it. The slope is that of section 6 of the paper; its soil also has a viscosity, and forces in proportion to the
+momentum brake the slide, so that run-out and crest hardly depend on the size of the cells. Stresses are integrated over whole
+cells and strains averaged over nodes, since plain linear cells lock where soil fails without dilation; --paper repeats the
+published run instead, without viscosity and with local damping, zero initial stress and a time step of 1e-4 s. With --site a
+mesh of your own with its soils replaces the slope; it slides when the strength of all soils is divided by --factor.
 """
 
 from __future__ import annotations
@@ -46,11 +47,10 @@ from common.ranks import run_study
 from common.results import open_results
 from common.schemes import (
     add_damping,
-    add_pic,
     add_scheme_options,
     averages_strains,
-    check_damping,
     check_scheme_options,
+    choose_damping,
     run_scheme,
     stable_integration,
 )
@@ -85,18 +85,20 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_flag(p, "--paper", "repeat the paper exactly: zero initial stress, time step 1e-4 s")
-    add_slope_options(p)
+    add_slope_options(
+        p, material=None, about=" (default: viscoplastic; mohr-coulomb for the paper's run and quasi-static steps)"
+    )
     start = p.add_argument_group("initial state")
     add_choice(start, "--initial", None, ("fem", "elastic", "k0", "zero"),
                "initial stresses; fem is elasto-plastic (default: fem; zero with --scheme quasi-static)")  # fmt: skip
     add_number(start, "--initial-unit-weight", 18e3, "N/m3", "unit weight that balances the initial stresses", above=0)
     slide = p.add_argument_group("slide")
     add_damping(slide)
-    add_pic(slide, 0.0)
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil locks: "
                "dilation angle below the friction angle, with implicit schemes 0; friction angle 0, undrained, Poisson's ratio above "
                "0.45. Not with --paper, and for a site not for its dilation angles)")  # fmt: skip
-    add_number(slide, "--time", 34.8, "s", "duration of the slide", above=0)
+    add_number(slide, "--time", None, "s", "duration of the slide (default: 16; 34.8 for the paper's run, a site and quasi-static steps)",
+               above=0)  # fmt: skip
     add_scheme_options(slide, integration=None)
     add_number(slide, "--rebalance", 1.2, "-",
                "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
@@ -134,16 +136,29 @@ def parse(arguments: list[str] | None = None) -> Namespace:
             lambda: f"--integration is {options.integration}, expected particles with --paper",
         )
         check(p, options.transfer == "flip", lambda: "--transfer is affine, expected flip with --paper")
-        check(p, options.mass_damping == 0, lambda: "--mass-damping is given, expected --damping alone with --paper")
+        check(p, not options.mass_damping or options.restart is not None,
+              lambda: f"--mass-damping is {options.mass_damping:g}, expected 0 with --paper")  # fmt: skip
         options.initial, options.dt = "zero", 1e-4
     check(p, options.ensemble == 1 or (options.restart is None and options.site is None),
           lambda: f"--ensemble is {options.ensemble}, expected 1 with --restart or --site")  # fmt: skip
-    check_damping(p, options)
+    choose_slide(p, options)
     check_scheme_options(p, options)
     if options.nmd is None and options.site is None:
         options.nmd = not options.paper and averages_strains(options.scheme, [law_of(options)])
     check_restart(p, options, MAY_CHANGE)
     return options
+
+
+def choose_slide(p: ArgumentParser, options: Namespace) -> None:
+    """Fill in law, damping and duration: those with which the slope comes to rest at a place that hardly depends on the cells
+    (docs/integration.md), or the paper's.
+    """
+    as_in_paper = options.paper or options.site is not None or options.scheme == "quasi-static"
+    if options.material is None:
+        options.material = "mohr-coulomb" if as_in_paper else "viscoplastic"
+    if options.time is None:
+        options.time = 34.8 if as_in_paper else 16.0
+    choose_damping(p, options, local=as_in_paper)
 
 
 # --- 2. The slide ----------------------------------------------------------------------------------------------------
@@ -301,7 +316,8 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
         "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",
         "simulated": f"{summary['time_s']:.4g} s", "particles": f"{summary['particles']:,}",
     }  # fmt: skip
-    subtitle = (f"{a.height:g} m high, inclined by {a.angle:g} degrees, unit weight {a.unit_weight / 1e3:g} kN/m\u00b3. Initial "
+    viscosity = f", viscosity {a.viscosity:g} Pa s" if a.material == "viscoplastic" else ""
+    subtitle = (f"{a.height:g} m high, inclined by {a.angle:g} degrees, unit weight {a.unit_weight / 1e3:g} kN/m\u00b3{viscosity}. Initial "
                 f"stresses: {a.initial}; slide by the {a.scheme} material point method.")  # fmt: skip
     return Page(movies=movies if scene else (), facts=facts, subtitle=subtitle, captions=captions)
 

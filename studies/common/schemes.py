@@ -47,19 +47,22 @@ def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> Non
     )
 
 
-def add_pic(parser: argparse.ArgumentParser, default: float) -> None:
-    """Option ``--pic``."""
+def add_pic(parser: argparse.ArgumentParser, default: float | None, about: str = "") -> None:
+    """Option ``--pic``; ``about`` says what it is by default where that depends on others."""
     add_number(parser, "--pic", default, "-",
                "PIC fraction: fraction of a particle's velocity that is replaced by the nodal one in a critical time step "
-               "(0 is FLIP)",
+               f"(0 is FLIP{about})",
                at_least=0, at_most=1)  # fmt: skip
 
 
 def add_damping(parser: argparse.ArgumentParser) -> None:
-    """Options ``--damping`` and ``--mass-damping``."""
-    add_number(parser, "--damping", None, "-", "local damping (default: 0.75; 0 with mass damping)", at_least=0, below=1)  # fmt: skip
-    add_number(parser, "--mass-damping", 0.0, "1/s", "forces against the motion, this number times the momentum, with which a "
-               "slide depends less on the cells than with local damping (explicit)", at_least=0)  # fmt: skip
+    """Options ``--damping``, ``--mass-damping`` and ``--pic``, which `choose_damping` fills in."""
+    add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run, a site and quasi-static steps)",
+               at_least=0, below=1)  # fmt: skip
+    add_number(parser, "--mass-damping", None, "1/s", "forces against the motion, this number times the momentum; a slide depends "
+               "less on the cells with them than with local damping (default: 5; 0 with local damping or affine transfer, for the "
+               "paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
+    add_pic(parser, None, about="; default: 0.02 with mass damping, otherwise 0")
 
 
 def rayleigh_of(options: argparse.Namespace) -> mpm.Rayleigh | None:
@@ -67,12 +70,20 @@ def rayleigh_of(options: argparse.Namespace) -> mpm.Rayleigh | None:
     return mpm.Rayleigh(mass=options.mass_damping, plastic_strain=math.inf) if options.mass_damping > 0 else None
 
 
-def check_damping(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Fill in ``damping``, and end with an error where ``mass_damping`` does not fit."""
+def choose_damping(parser: argparse.ArgumentParser, options: argparse.Namespace, local: bool) -> None:
+    """Fill in ``damping``, ``mass_damping`` and ``pic``, and end with an error where ``mass_damping`` does not fit.
+
+    Args:
+        local: local damping by default, as in the paper.
+    """
+    if options.mass_damping is None:
+        options.mass_damping = 0.0 if local or options.damping is not None or options.transfer == "affine" else 5.0
     if options.damping is None:
-        options.damping = 0.0 if options.mass_damping > 0 else 0.75
-    check(parser, options.mass_damping == 0 or (options.scheme == "explicit" and options.transfer == "flip"),
-          lambda: f"--mass-damping is {options.mass_damping:g}, expected --scheme explicit and --transfer flip with it")  # fmt: skip
+        options.damping = 0.75 if local and options.mass_damping == 0 else 0.0
+    if options.pic is None:
+        options.pic = 0.02 if options.mass_damping > 0 else 0.0
+    check(parser, options.mass_damping == 0 or (options.scheme != "quasi-static" and options.transfer == "flip"),
+          lambda: f"--mass-damping is {options.mass_damping:g}, expected --scheme explicit or implicit and --transfer flip with it")  # fmt: skip
     check(parser, options.mass_damping == 0 or options.site is None,
           lambda: f"--mass-damping is {options.mass_damping:g}, expected 0 with --site")  # fmt: skip
 
@@ -171,12 +182,13 @@ def run_scheme(
         "since": 0.0,
         "watch": watch,
         "damping": a.damping,
+        "rayleigh": rayleigh_of(a),
         "pic": a.pic,
         "nmd": a.nmd,
         "integration": INTEGRATIONS[a.integration],
     }
     if a.scheme == "explicit":
-        return model.explicit(a.time, dt=dt, transfer=TRANSFERS[a.transfer], rayleigh=rayleigh_of(a), **common)
+        return model.explicit(a.time, dt=dt, transfer=TRANSFERS[a.transfer], **common)
     return model.implicit(
         a.time,
         dt=dt,

@@ -25,15 +25,19 @@ SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 """Supports of the finite elements of the slope; those of the particles are the same."""
 
 
-def add_slope_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6."""
+def add_slope_options(parser: argparse.ArgumentParser, **law: str | None) -> None:
+    """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6.
+
+    Args:
+        law: of `add_law_options`.
+    """
     slope = parser.add_argument_group("slope and soil")
     add_geometry_options(slope, cell_size=0.1)
     add_number(slope, "--runout-length", 2.0, "m", "length of the background mesh beyond the toe", above=0)
     add_particles_per_cell(slope, 10)
     add_number(slope, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
     add_soil_options(slope, dilation_angle=0.0)
-    add_law_options(parser)
+    add_law_options(parser, **law)
 
 
 def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> None:

@@ -25,13 +25,17 @@ MATERIALS = (
 )
 
 
-def add_law_options(parser: argparse.ArgumentParser) -> None:
-    """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation."""
+def add_law_options(parser: argparse.ArgumentParser, material: str | None = MATERIALS[0], about: str = "") -> None:
+    """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation.
+
+    Args:
+        material: the law by default; None where it depends on other options, and ``about`` says how.
+    """
     p = parser.add_argument_group("law of the soil")
-    add_choice(p, "--material", MATERIALS[0], MATERIALS,
-               "law of the soil; Tresca and von Mises: the cohesion is the shear strength")  # fmt: skip
+    add_choice(p, "--material", material, MATERIALS,
+               "law of the soil; Tresca and von Mises: the cohesion is the shear strength" + about)  # fmt: skip
     add_parameter(p, mpm.MohrCoulomb, "tension_cutoff", None)
-    add_parameter(p, mpm.ViscoplasticMohrCoulomb, "viscosity", 1e4, "viscoplastic: ")
+    add_parameter(p, mpm.ViscoplasticMohrCoulomb, "viscosity", 1e3, "viscoplastic: ")
     for name, default in [("residual_cohesion", 200.0), ("residual_friction_angle", 15.0), ("softening_strain", 0.3),
                           ("reference_length", 0.1)]:  # fmt: skip
         add_parameter(p, mpm.SofteningMohrCoulomb, name, default, "softening: ")

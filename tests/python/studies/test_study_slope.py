@@ -1,6 +1,7 @@
 """The study slope: the paper's number, its files, its errors and its end by Ctrl-C."""
 
 import csv
+import importlib
 import json
 import os
 import re
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
 FILES = ["figure_2_mesh.png", "figure_3_displacement.png", "figure_4_shear_strain.png", "figure_5_vertical_stress.png",
          "figure_6_crest.png", "particles/000000.h5", "particles.xdmf", "mesh/mesh.h5", "mesh.xdmf", "history.csv",
          "summary.json"]  # fmt: skip
@@ -36,9 +38,9 @@ def history(folder):
 def test_the_papers_slope_slides_as_far_as_in_an_independent_code(tmp_path):
     # Independent explicit code of the standard method, same data, any time step from 1e-4 to 4e-3 s: 0.11 m at 0.9 s, 0.28 m
     # at 8.7 s, 0.36 m at 17 s, 0.41 to 0.42 m at 34.8 s, rising fast at first and creeping later.
-    result = slope(
-        tmp_path, "--initial", "zero", "--integration", "particles", "--no-nmd", "--dt", "4e-3", "--frames", "50"
-    )
+    soil = "--material mohr-coulomb --damping 0.75 --time 34.8 --initial zero"
+    options = f"{soil} --integration particles --no-nmd --dt 4e-3 --frames 50"
+    result = slope(tmp_path, *options.split())
     assert result.returncode == 0, result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["soil_cells"] == 640 and summary["particles"] == 6400 and summary["steps"] == 8700
@@ -70,17 +72,48 @@ def test_a_short_run_writes_all_it_promises(tmp_path):
 
 
 def test_forces_in_proportion_to_momentum_take_the_place_of_local_damping(tmp_path):
-    options = ("--mass-damping", "5", "--time", "0.5", "--frames", "3", "--no-pictures")
+    options = ("--mass-damping", "4", "--time", "0.5", "--frames", "3", "--no-pictures")
     assert slope(tmp_path, *options).returncode == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["parameters"]["damping"] == 0 and summary["parameters"]["mass_damping"] == 5
+    assert summary["parameters"]["damping"] == 0 and summary["parameters"]["mass_damping"] == 4
     # Soil that yields is braked, too, and the work is booked: with local damping alone there would be none.
     energy = summary["energy_J_per_m"]
     assert energy["damping_work"] > energy["kinetic_energy"] > 0
     assert abs(summary["unexplained_fraction_of_energy"]) < 0.01
-    for wrong in (("--transfer", "affine"), ("--scheme", "implicit"), ("--paper",)):
+    for wrong in (("--transfer", "affine"), ("--scheme", "quasi-static"), ("--paper",)):
         refused = slope(tmp_path / "refused", *options, *wrong)
         assert refused.returncode == 2 and "--mass-damping is" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "material", "damping", "mass_damping", "pic", "time"),
+    [
+        ((), "viscoplastic", 0, 5, 0.02, 16),
+        (("--scheme", "implicit"), "viscoplastic", 0, 5, 0.02, 16),
+        (("--transfer", "affine"), "viscoplastic", 0, 0, 0, 16),
+        (("--damping", "0.5", "--material", "softening"), "softening", 0.5, 0, 0, 16),
+        (("--damping", "0", "--time", "2"), "viscoplastic", 0, 0, 0, 2),
+        (("--mass-damping", "0", "--pic", "0.1"), "viscoplastic", 0, 0, 0.1, 16),
+        (("--paper",), "mohr-coulomb", 0.75, 0, 0, 34.8),
+        (("--scheme", "quasi-static"), "mohr-coulomb", 0.75, 0, 0, 34.8),
+    ],
+)
+def test_what_brakes_a_slide_unless_told_otherwise(options, material, damping, mass_damping, pic, time):
+    a = importlib.import_module("slope").parse(list(options))
+    assert (a.material, a.damping, a.mass_damping, a.pic, a.time) == (material, damping, mass_damping, pic, time)
+
+
+def test_the_slope_comes_to_rest_where_smaller_cells_have_it(tmp_path):
+    # On cells of 0.1, 0.05, 0.025 and 0.0125 m: docs/integration.md
+    crest = {}
+    for cell in ("0.1", "0.05"):
+        folder = tmp_path / cell
+        assert slope(folder, "--cell-size", cell, "--frames", "8", "--no-pictures").returncode == 0
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["energy_J_per_m"]["kinetic_energy"] < 1e-5 * summary["energy_J_per_m"]["external_work"]
+        assert abs(summary["unexplained_fraction_of_energy"]) < 0.01
+        crest[cell] = summary["crest_displacement_m"]
+    assert crest["0.1"] == pytest.approx(crest["0.05"], rel=0.1)
 
 
 def test_a_slope_that_fails_warns_of_nothing_at_its_defaults(tmp_path):
