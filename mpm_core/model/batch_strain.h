@@ -15,6 +15,7 @@ template <int D>
 struct BatchScratch
 {
   std::array<CellMotion<D>, batch_size> motion;               ///< per run
+  std::array<Matrix<D>, batch_size> carried;                  ///< per run: gradients that its particles carry (affine)
   std::array<CellStrain<D, Lanes>, batch_size / lanes> cells; ///< per run, `lanes` of them together
   /// Per particle, one column per component; that out of plane stays zero
   alignas(64) double strain[n_stress<D>][batch_size + lanes];

@@ -49,10 +49,28 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
     note_lost_volume(model, batch, scratch);
 }
 
-/// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out.
-template <int D>
-Matrix<D> carried_gradient(const PassOptions& options, const CellMotion<D>& motion)
+/// A vertex with less than this part of a particle's mass counts as light.
+constexpr double part_of_light_vertex = 0.2;
+
+/// Whether few particles are in a cell, one of whose vertices is light. The second mapping (19) gives such a vertex the
+/// mean of the particles' changes of velocity, and nothing of their gradient: stresses hardly resist a gradient that is
+/// carried on, and a particle at the surface, which goes to and fro between two cells, is shaken ever more by it.
+template <class G, int D = G::dim>
+bool is_sparse(const Mesh<D>& mesh, const VelocityField<G>& field, const Particles<D>& particles, const Run& run)
 {
+  const double least = part_of_light_vertex * particles.mass[run.first];
+  const auto is_light = [&](Index node) { return field.nodes[node].mass < least; };
+  return run.last - run.first <= D && std::ranges::any_of(mesh.cells[run.cell], is_light);
+}
+
+/// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out, and in sparse
+/// cells it is zero.
+template <class G, int D = G::dim>
+Matrix<D> carried_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const Particles<D>& particles,
+                           const PassOptions& options, const Run& run, const CellMotion<D>& motion)
+{
+  if (is_sparse(mesh, field, particles, run))
+    return {};
   return scaled<D>(motion.change, 1 - options.pic_fraction).gradient;
 }
 
@@ -98,8 +116,7 @@ void update_moments(const Mesh<D>& mesh, const Particles<D>& particles, const Pa
       motion.displacement.value = {}; // the centre moves as much
     move<G>(moments, motion);
     if (options.transfer == Transfer::affine)
-      add_affine_momentum<G>(carried_gradient(options, scratch.motion[in_batch]),
-                             spread_about_particles(mesh, run.cell, moments), moments);
+      add_affine_momentum<G>(scratch.carried[in_batch], spread_about_particles(mesh, run.cell, moments), moments);
   }
   if (run.first_in_cell && options.stress)
   {
@@ -118,7 +135,7 @@ void update_moments(const Mesh<D>& mesh, const Particles<D>& particles, const Pa
 /// Moves the particles of a batch, and marks the runs that some have left.
 template <class G, int D = G::dim>
 void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOptions& options, const Batch& batch,
-                const BatchScratch<D>& scratch)
+                BatchScratch<D>& scratch)
 {
   auto& runs = model.order.runs;
   Particles<D>& particles = model.particles;
@@ -129,14 +146,17 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
   for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
   {
     const CellMotion<D>& motion = scratch.motion[r - batch.first_run];
+    if (affine)
+    {
+      Matrix<D>& carried = scratch.carried[r - batch.first_run];
+      carried = carried_gradient(model.mesh, field, particles, options, runs[r], motion);
+      keep_gradient<D>(particles, runs[r], carried);
+    }
     const bool inside =
         move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
     runs[r].out_of_order = !inside && !options.moving_cells;
     if (affine)
-    {
-      keep_gradient<D>(particles, runs[r], carried_gradient(options, motion));
       model.energy.kinetic += kinetic_energy(particles, runs[r].first, runs[r].last);
-    }
   }
 }
 

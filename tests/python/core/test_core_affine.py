@@ -129,16 +129,36 @@ def test_what_affine_transfer_does_not_cover_is_refused_by_name(options, what):
         run(thrown_block(2, lambda x: x), 0.1, transfer=AFFINE, **options)
 
 
-def test_energy_that_the_transfer_generates_is_not_called_a_loss():
-    # A steep heap that collapses crowds its particles, and nodes get back more than they gave. What then is missing in the balance
-    # is all unexplained, but for half a step of the work of the stresses.
+def test_a_collapsing_heap_gets_no_energy_from_the_transfer():
+    # A steep heap that falls apart has single particles at its surface, whose gradients once gave the nodes more than they had
+    # taken, 4 % of the energy. What is missing in the balance beyond the loss is unexplained, but for half a step of works.
     soil = mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=500.0, friction_angle=25.0)
-    model = mpm.Model(box([16, 8], [2.0, 1.0], body=([0.0, 0.0], [0.6, 0.8]), shake=0.1), soil)
+    model = mpm.Model(box([32, 16], [2.0, 1.0], body=([0.0, 0.0], [0.6, 0.8]), shake=0.1), soil)
     model.seed(density=2000.0, per_cell=6, cell_tag=1)
     model.roller(1, normal=(1, 0))
     model.fix(3)
     model.set_gravity((0, -30.0))
-    report = run(model, 0.5, transfer=AFFINE, energy_limit=None)
+    report = run(model, 0.35, transfer=AFFINE, energy_limit=None)
     missing = report.external_work - report.kinetic_energy - report.stress_work
-    assert report.pic_loss < -0.01 * report.energy_scale
-    assert report.unexplained_energy == pytest.approx(missing, abs=0.005 * report.energy_scale)
+    assert report.pic_loss > 0
+    assert report.unexplained_energy == pytest.approx(missing - report.pic_loss, abs=0.005 * report.energy_scale)
+    assert abs(report.unexplained_fraction) < 0.02
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_a_particle_alone_on_a_side_of_cells_is_not_shaken_ever_more(dim):
+    # Two cells share it, as it goes to and fro, and each of them moves it in a direction of its own. A gradient that it carried
+    # from one to the other, where stresses do not resist it, strained it to more than twenty times the energy that it began with.
+    h, speed = 0.1, 0.02
+    model = mpm.Model(box([4] * dim, [4 * h] * dim, body=([0.0] * dim, [4 * h] * (dim - 1) + [2 * h])), ELASTIC)
+    model.seed(density=2000.0, per_cell={2: 6, 3: 4}[dim], cell_tag=1)
+    above = np.full(dim, 2 * h) + np.array([1e-8 * (1 + a) for a in range(dim - 1)] + [0.004])
+    model.seed_points(above[None], [h**dim / {2: 12, 3: 24}[dim]], density=2000.0)
+    alone = np.argmax(model.particles.position[:, -1])
+    velocity = np.zeros((len(model.particles), dim))
+    velocity[alone] = speed
+    model.particles.set("velocity", velocity)
+    start = 0.5 * model.particles.mass[alone] * dim * speed**2
+    report = run(model, 0.5, transfer=AFFINE, energy_limit=None)
+    assert report.kinetic_energy + report.stored_energy < start
+    assert abs(report.unexplained_energy) < 0.05 * start
