@@ -64,14 +64,20 @@ bool is_sparse(const Mesh<D>& mesh, const VelocityField<G>& field, const Particl
 }
 
 /// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out, and in sparse
-/// cells it is zero.
+/// cells only the spin is left, without which a body that turns would lose its angular momentum.
 template <class G, int D = G::dim>
 Matrix<D> carried_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const Particles<D>& particles,
                            const PassOptions& options, const Run& run, const CellMotion<D>& motion)
 {
+  Matrix<D> gradient = scaled<D>(motion.change, 1 - options.pic_fraction).gradient;
   if (is_sparse(mesh, field, particles, run))
-    return {};
-  return scaled<D>(motion.change, 1 - options.pic_fraction).gradient;
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b <= a; ++b)
+      {
+        gradient[a][b] = 0.5 * (gradient[a][b] - gradient[b][a]);
+        gradient[b][a] = -gradient[a][b];
+      }
+  return gradient;
 }
 
 /// Gives the particles of a run the gradient of their velocity.
