@@ -86,7 +86,11 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_flag(p, "--paper", "repeat the paper exactly: zero initial stress, time step 1e-4 s")
     add_slope_options(
-        p, material=None, about=" (default: viscoplastic; mohr-coulomb for the paper's run and quasi-static steps)"
+        p,
+        material=None,
+        about=" (default: viscoplastic; mohr-coulomb for the paper's run and quasi-static steps)",
+        viscosity=None,
+        viscosity_about=" (default: 1000 for a height of 1 m under 80 kN/m3, in proportion to height^1.5 and unit weight)",
     )
     start = p.add_argument_group("initial state")
     add_choice(start, "--initial", None, ("fem", "elastic", "k0", "zero"),
@@ -97,7 +101,8 @@ def parser() -> ArgumentParser:
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil locks: "
                "dilation angle below the friction angle, with implicit schemes 0; friction angle 0, undrained, Poisson's ratio above "
                "0.45. Not with --paper, and for a site not for its dilation angles)")  # fmt: skip
-    add_number(slide, "--time", None, "s", "duration of the slide (default: 16; 34.8 for the paper's run, a site and quasi-static steps)",
+    add_number(slide, "--time", None, "s", "duration of the slide (default: 16 for a height of 1 m, in proportion to its square "
+               "root; 34.8 for the paper's run, a site and quasi-static steps)",
                above=0)  # fmt: skip
     add_scheme_options(slide, integration=None)
     add_number(slide, "--rebalance", 1.2, "-",
@@ -151,14 +156,18 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 def choose_slide(p: ArgumentParser, options: Namespace) -> None:
     """Fill in law, damping and duration: those with which the slope comes to rest at a place that hardly depends on the cells
-    (docs/integration.md), or the paper's.
+    (docs/integration.md), or the paper's. Slopes of one shape slide alike, in times in proportion to the square root of
+    their height; a viscosity is a stress multiplied by a time.
     """
+    slowness = math.sqrt(options.height)  # of the slope relative to one of 1 m
     as_in_paper = options.paper or options.site is not None or options.scheme == "quasi-static"
     if options.material is None:
         options.material = "mohr-coulomb" if as_in_paper else "viscoplastic"
     if options.time is None:
-        options.time = 34.8 if as_in_paper else 16.0
-    choose_damping(p, options, local=as_in_paper)
+        options.time = 34.8 if as_in_paper else 16.0 * slowness
+    if options.viscosity is None:
+        options.viscosity = 1e3 * options.unit_weight / 80e3 * options.height * slowness
+    choose_damping(p, options, local=as_in_paper, mass=5.0 / slowness)
 
 
 # --- 2. The slide ----------------------------------------------------------------------------------------------------

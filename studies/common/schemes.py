@@ -60,8 +60,8 @@ def add_damping(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run, a site and quasi-static steps)",
                at_least=0, below=1)  # fmt: skip
     add_number(parser, "--mass-damping", None, "1/s", "forces against the motion, this number times the momentum; a slide depends "
-               "less on the cells with them than with local damping (default: 5; 0 with local damping or affine transfer, for the "
-               "paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
+               "less on the cells with them than with local damping (default: 5 for a height of 1 m, over its square root; 0 with local damping "
+               "or affine transfer, for the paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
     add_pic(parser, None, about="; default: 0.02 with mass damping, otherwise 0")
 
 
@@ -70,14 +70,15 @@ def rayleigh_of(options: argparse.Namespace) -> mpm.Rayleigh | None:
     return mpm.Rayleigh(mass=options.mass_damping, plastic_strain=math.inf) if options.mass_damping > 0 else None
 
 
-def choose_damping(parser: argparse.ArgumentParser, options: argparse.Namespace, local: bool) -> None:
+def choose_damping(parser: argparse.ArgumentParser, options: argparse.Namespace, local: bool, mass: float) -> None:
     """Fill in ``damping``, ``mass_damping`` and ``pic``, and end with an error where ``mass_damping`` does not fit.
 
     Args:
         local: local damping by default, as in the paper.
+        mass: mass damping by default where there is no local damping [1/s].
     """
     if options.mass_damping is None:
-        options.mass_damping = 0.0 if local or options.damping is not None or options.transfer == "affine" else 5.0
+        options.mass_damping = 0.0 if local or options.damping is not None or options.transfer == "affine" else mass
     if options.damping is None:
         options.damping = 0.75 if local and options.mass_damping == 0 else 0.0
     if options.pic is None:

@@ -25,7 +25,7 @@ SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 """Supports of the finite elements of the slope; those of the particles are the same."""
 
 
-def add_slope_options(parser: argparse.ArgumentParser, **law: str | None) -> None:
+def add_slope_options(parser: argparse.ArgumentParser, **law: str | float | None) -> None:
     """Options of the slope's geometry, mesh, particles and soil; the defaults are the paper's, section 6.
 
     Args:

@@ -25,17 +25,24 @@ MATERIALS = (
 )
 
 
-def add_law_options(parser: argparse.ArgumentParser, material: str | None = MATERIALS[0], about: str = "") -> None:
+def add_law_options(
+    parser: argparse.ArgumentParser,
+    material: str | None = MATERIALS[0],
+    about: str = "",
+    viscosity: float | None = 1e3,
+    viscosity_about: str = "",
+) -> None:
     """The law of the soil and what the laws need beyond elasticity, cohesion, friction and dilation.
 
     Args:
-        material: the law by default; None where it depends on other options, and ``about`` says how.
+        material, viscosity [Pa s]: by default; None where they depend on other options, and ``about`` and ``viscosity_about``
+            say how.
     """
     p = parser.add_argument_group("law of the soil")
     add_choice(p, "--material", material, MATERIALS,
                "law of the soil; Tresca and von Mises: the cohesion is the shear strength" + about)  # fmt: skip
     add_parameter(p, mpm.MohrCoulomb, "tension_cutoff", None)
-    add_parameter(p, mpm.ViscoplasticMohrCoulomb, "viscosity", 1e3, "viscoplastic: ")
+    add_parameter(p, mpm.ViscoplasticMohrCoulomb, "viscosity", viscosity, f"viscoplastic{viscosity_about}: ")
     for name, default in [("residual_cohesion", 200.0), ("residual_friction_angle", 15.0), ("softening_strain", 0.3),
                           ("reference_length", 0.1)]:  # fmt: skip
         add_parameter(p, mpm.SofteningMohrCoulomb, name, default, "softening: ")
