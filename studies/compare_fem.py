@@ -29,10 +29,10 @@ from common.slope_case import (
     SUPPORTS,
     SlopeCase,
     add_geometry_options,
-    add_slope_options,
     add_soil_options,
     build_slope,
     check_slope_options,
+    slope_options,
     soil_of,
 )
 from common.slope_fem import mesh_sizes, step_line, weight
@@ -56,7 +56,7 @@ AT_REST = 1e-4
 def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
-    add_geometry_options(p, cell_size=0.05)
+    add_geometry_options(p, "a twentieth")
     add_count(p, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_particles_per_cell(p, 10)
     add_soil_options(p, dilation_angle=None)
@@ -79,7 +79,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     options = p.parse_args(arguments)
     if options.mesh is None and options.angle in (45, 90):
         options.mesh = "fitted"  # as "crossed", for any cell size
-    check_slope_options(p, options)
+    check_slope_options(p, options, cells=20)
     return options
 
 
@@ -107,10 +107,8 @@ def finite_elements(a: Namespace) -> dict[float, bridge.QuasiStatic]:
 
 def particles_at_rest(a: Namespace, cell_size: float, unit_weight: float) -> tuple[SlopeCase, mpm.Report]:
     """Particles of a slope whose weight has risen from nothing, at rest."""
-    others = ArgumentParser()
-    add_slope_options(others)
     options = {
-        **vars(others.parse_args([])),
+        **vars(slope_options([])),
         **vars(a),
         "cell_size": cell_size,
         "unit_weight": unit_weight,

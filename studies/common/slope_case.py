@@ -32,20 +32,23 @@ def add_slope_options(parser: argparse.ArgumentParser, **law: str | float | None
         law: of `add_law_options`.
     """
     slope = parser.add_argument_group("slope and soil")
-    add_geometry_options(slope, cell_size=0.1)
-    add_number(slope, "--runout-length", 2.0, "m", "length of the background mesh beyond the toe", above=0)
+    add_geometry_options(slope, "a tenth")
+    add_number(slope, "--runout-length", None, "m", "length of the background mesh beyond the toe (default: twice the height)",
+               above=0)  # fmt: skip
     add_particles_per_cell(slope, 10)
     add_number(slope, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
     add_soil_options(slope, dilation_angle=0.0)
     add_law_options(parser, **law)
 
 
-def add_geometry_options(parser: argparse.ArgumentParser, cell_size: float) -> None:
-    """Options of the slope's shape and of the mesh; `cell_size` [m] is the default."""
+def add_geometry_options(parser: argparse.ArgumentParser, cell_size: str) -> None:
+    """Options of the slope's shape and of the mesh, which `check_slope_options` fills in; `cell_size` says which part of the
+    height a cell has by default."""
     add_number(parser, "--height", 1.0, "m", "height of the slope", above=0)
     add_number(parser, "--angle", 45.0, "degrees", "inclination of the slope", above=0, at_most=90)
-    add_number(parser, "--crest", 1.1, "m", "length of the level crest", above=0)
-    add_number(parser, "--cell-size", cell_size, "m", "side of the squares or of the triangles", above=0)
+    add_number(parser, "--crest", None, "m", "length of the level crest (default: 1.1 times the height)", above=0)
+    add_number(parser, "--cell-size", None, "m", f"side of the squares or of the triangles (default: {cell_size} of the height)",
+               above=0)  # fmt: skip
     add_choice(parser, "--mesh", None, ("crossed", "fitted", "gmsh"),
                "squares divided by their diagonals, the same stretched to fit the slope, or unstructured triangles (default: the "
                "first of these that suits the angle)")  # fmt: skip
@@ -60,8 +63,12 @@ def add_soil_options(parser: argparse.ArgumentParser, dilation_angle: float | No
                "dilation angle, at most the friction angle" + associated, at_least=0)  # fmt: skip
 
 
-def check_slope_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Fill in what follows from other options, and end with an error where they do not fit together."""
+def check_slope_options(parser: argparse.ArgumentParser, options: argparse.Namespace, cells: int = 10) -> None:
+    """Fill in what follows from other options, and end with an error where they do not fit together; by default the slope is
+    `cells` cells high."""
+    for name, length in [("crest", 1.1), ("runout_length", 2.0), ("cell_size", 1 / cells)]:
+        if getattr(options, name, 0.0) is None:
+            setattr(options, name, round(length * options.height, 12))
     if options.dilation_angle is None:
         options.dilation_angle = options.friction_angle
     check(parser, options.dilation_angle <= options.friction_angle,
@@ -69,6 +76,15 @@ def check_slope_options(parser: argparse.ArgumentParser, options: argparse.Names
                   f"{options.friction_angle:g} degrees")  # fmt: skip
     if options.mesh is None:
         options.mesh = "crossed" if options.angle in (45, 90) else "fitted" if 11.4 <= options.angle <= 78.6 else "gmsh"
+
+
+def slope_options(arguments: list[str]) -> argparse.Namespace:
+    """The options of a slope, given as on a command line, with the defaults of the others."""
+    parser = argparse.ArgumentParser()
+    add_slope_options(parser)
+    options = parser.parse_args(arguments)
+    check_slope_options(parser, options)
+    return options
 
 
 @dataclass

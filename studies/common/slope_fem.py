@@ -21,7 +21,7 @@ from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_
 
 def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
     """Options of the slope, without particles, for studies that look for its collapse."""
-    add_geometry_options(parser, cell_size=0.025)
+    add_geometry_options(parser, "a fortieth")
     add_count(parser, "--meshes", 3, "meshes, each twice as fine as the one before; the last has --cell-size")
     add_element_options(parser)
     add_soil_options(parser, dilation_angle=None)
@@ -56,7 +56,7 @@ def check_fem_slope_options(parser: argparse.ArgumentParser, options: argparse.N
     """Fill in what follows from other options, and end with an error where they do not fit together."""
     if options.mesh is None and options.angle in (45, 90):
         options.mesh = "fitted"  # as "crossed", for any cell size
-    check_slope_options(parser, options)
+    check_slope_options(parser, options, cells=40)
     check(parser, options.cell_size <= min(options.height, options.crest),
           lambda: f"--cell-size is {options.cell_size:g}, expected at most --height and --crest")  # fmt: skip
     check(

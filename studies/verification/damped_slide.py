@@ -15,10 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from _case import Check, Result
-from common.options import study_parser
 from common.plots import save_history
 from common.schemes import IMPLICIT_STEP
-from common.slope_case import GRAVITY, add_slope_options, build_slope
+from common.slope_case import GRAVITY, build_slope, slope_options
 from common.watch import Watch
 from mpi4py import MPI
 
@@ -33,9 +32,7 @@ CROSSINGS = f"{SUDDEN}; and implicit steps dissipate the noise of cell crossings
 
 def slide(cell: float, integration: mpm.Integration, ramp: float, implicit: bool) -> np.ndarray:
     """Time [s], displacement of the crest [m] and run-out [m] of a slide, (k, 3). Collective."""
-    parser = study_parser(__doc__)
-    add_slope_options(parser)
-    options = parser.parse_args(["--mesh", "crossed" if cell == 0.1 else "fitted", "--cell-size", str(cell)])
+    options = slope_options(["--mesh", "crossed" if cell == 0.1 else "fitted", "--cell-size", str(cell)])
     case = build_slope(options, MPI.COMM_WORLD)
     model, watch = case.model, Watch(case)
     model.set_gravity((0.0, -GRAVITY), ramp=ramp)

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 from _case import Check, Kind, Result
 from _plots import save_comparison
-from common.options import study_parser
-from common.slope_case import GRAVITY, SUPPORTS, SlopeCase, add_slope_options, build_slope
+from common.slope_case import GRAVITY, SUPPORTS, SlopeCase, build_slope, slope_options
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -29,10 +28,8 @@ IDENTITY = "identity on the same cells"
 
 def slope(cell: float) -> SlopeCase:
     """Particles in the cells of the slope, whose gravity is that of WEIGHT. Collective."""
-    parser = study_parser(__doc__)
-    add_slope_options(parser)
     options = ["--cell-size", str(cell), "--particles-per-cell", "6", "--unit-weight", str(WEIGHT), "--mesh", "crossed"]
-    return build_slope(parser.parse_args(options), MPI.COMM_WORLD)
+    return build_slope(slope_options(options), MPI.COMM_WORLD)
 
 
 def finite_elements(case: SlopeCase, degree: int, mesh=None) -> bridge.QuasiStatic:

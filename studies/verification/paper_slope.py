@@ -16,7 +16,6 @@ import numpy as np
 from _case import Check, Kind, Result
 from _plots import save_comparison
 from common.figures import save_figure
-from common.options import study_parser
 from common.plots import (
     DISPLACEMENT,
     SHEAR_STRAIN,
@@ -30,7 +29,7 @@ from common.plots import (
     save_mesh,
     save_particles,
 )
-from common.slope_case import add_slope_options, build_slope
+from common.slope_case import build_slope, slope_options
 from common.watch import Watch
 from matplotlib import pyplot as plt
 from matplotlib.colors import Normalize
@@ -63,9 +62,7 @@ VARIANTS = {
 def slide(until, scheme="explicit", cell=0.1, per_cell=10, nmd=False, integration=mpm.Integration.PARTICLES):
     """The background, the particles in the end on rank 0, and rows of time [s] and displacement of the crest [m]."""
     # --- 1. The slope as particles -----------------------------------------------------------------------------------
-    parser = study_parser(__doc__)
-    add_slope_options(parser)
-    options = parser.parse_args(["--cell-size", str(cell), "--particles-per-cell", str(per_cell), "--mesh", "crossed"])
+    options = slope_options(["--cell-size", str(cell), "--particles-per-cell", str(per_cell), "--mesh", "crossed"])
     case = build_slope(options, MPI.COMM_WORLD)
     watch, crest = Watch(case), [(0.0, 0.0)]
 

@@ -26,8 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from _case import Check, Result
 from _plots import save_comparison
-from common.options import study_parser
-from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope
+from common.slope_case import GRAVITY, SlopeCase, build_slope, slope_options
 from common.watch import Watch
 from mpi4py import MPI
 
@@ -81,8 +80,6 @@ def slide(
     """The slide of one variant; courant: step over the critical one; smooth: the base; to_rest: of heavier soil, longer, by the
     affine transfer; moving_cells: as in `Model.explicit`; braked: heavier soil, longer, with forces against the motion.
     Collective."""
-    parser = study_parser(__doc__)
-    add_slope_options(parser)
     soil = VISCOUS if viscous else ["--dilation-angle", "0"]
     options = [
         "--unit-weight",
@@ -95,7 +92,7 @@ def slide(
         "--mesh",
         mesh,
     ]
-    case = build_slope(parser.parse_args(options), MPI.COMM_WORLD)
+    case = build_slope(slope_options(options), MPI.COMM_WORLD)
     if smooth:
         on_smooth_base(case)
     watch, end = Watch(case), REST_END if to_rest or braked else SMOOTH_END if smooth else END
