@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from dataclasses import dataclass
 
@@ -23,6 +24,8 @@ GRAVITY = 9.81
 """[m/s2]; unit weights are turned into densities with it."""
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 """Supports of the finite elements of the slope; those of the particles are the same."""
+MANY_CELLS = 20_000
+"""Of finite elements from which on their equilibrium near the strength of the slope takes minutes (docs/howto/limits.md)."""
 
 
 def add_slope_options(parser: argparse.ArgumentParser, **law: str | float | None) -> None:
@@ -195,6 +198,15 @@ def solved_fem(case: SlopeCase, unit_weight: float, nmd: bool = False) -> bridge
     Raises InputError, on all ranks, when the slope does not carry the unit weight. Collective.
     """
     fem = soil_fem(case, nmd)
+    mesh = fem.displacement.function_space.mesh
+    cells = mesh.topology.index_map(2).size_global
+    if cells > MANY_CELLS and mesh.comm.rank == 0:
+        print(
+            f"initial stresses: finite elements on {cells:,} triangles under {unit_weight:g} N/m3; near the strength of the slope "
+            "this can take half an hour. A smaller --initial-unit-weight or --initial elastic is faster",
+            file=sys.stderr,
+            flush=True,
+        )
     fem.solve(bridge.Load(unit_weight=unit_weight))
     if not fem.converged:
         raise mpm.InputError(

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 STUDIES = Path(__file__).parents[3] / "studies"
 sys.path.insert(0, str(STUDIES))
@@ -96,6 +97,16 @@ def test_slopes_of_one_shape_slide_alike_whatever_their_height(tmp_path):
     assert crest("large", 4, 2) == pytest.approx(4 * crest("small", 1, 1), rel=1e-6)
     a = importlib.import_module("slope").parse(["--height", "10", "--crest", "15"])
     assert (a.crest, a.cell_size, a.runout_length) == (15, 1, 20)
+
+
+def test_a_start_that_may_take_long_says_so(monkeypatch, capfd):
+    case_module = importlib.import_module("common.slope_case")
+    case = case_module.build_slope(case_module.slope_options(["--particles-per-cell", "1"]), MPI.COMM_SELF)
+    case_module.solved_fem(case, 10e3)
+    assert "finite elements" not in capfd.readouterr().err
+    monkeypatch.setattr(case_module, "MANY_CELLS", 600)
+    case_module.solved_fem(case, 10e3)
+    assert "finite elements on 640 triangles under 10000 N/m3" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
