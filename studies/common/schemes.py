@@ -60,8 +60,8 @@ def add_damping(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run, a site and quasi-static steps)",
                at_least=0, below=1)  # fmt: skip
     add_number(parser, "--mass-damping", None, "1/s", "forces against the motion, this number times the momentum; a slide depends "
-               "less on the cells with them than with local damping (default: 5 for a height of 1 m, over its square root; 0 with local damping "
-               "or affine transfer, for the paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
+               "less on the cells with them than with local damping (default: 5 for a height of 1 m, in inverse "
+               "proportion to its square root; 0 with local damping or affine transfer, for the paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
     add_pic(parser, None, about="; default: 0.02 with mass damping, otherwise 0")
 
 

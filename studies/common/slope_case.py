@@ -25,7 +25,7 @@ GRAVITY = 9.81
 SUPPORTS = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
 """Supports of the finite elements of the slope; those of the particles are the same."""
 MANY_CELLS = 20_000
-"""Of finite elements from which on their equilibrium near the strength of the slope takes minutes (docs/howto/limits.md)."""
+"""Number of triangles above which finite elements may take minutes near the strength of the slope (docs/howto/limits.md)."""
 
 
 def add_slope_options(parser: argparse.ArgumentParser, **law: str | float | None) -> None:
