@@ -154,22 +154,22 @@ void bind_model(py::module_& m, const std::string& suffix)
               const Vector<D>& direction) { model.fields.front().incoming = {times, velocities, direction}; })
       .def("set_free_field", &set_free_field<G>)
       .def("dashpots",
-           [](const M& model) // by node over all ranks
+           [](const M& model) // by the place of the node, since its number depends on the partition
            {
-             std::map<GlobalIndex, std::vector<DashpotEntry<D>>> entries;
+             std::map<Vector<D>, std::vector<DashpotEntry<D>>> entries;
              for (const auto& d : model.fields.front().dashpots)
-               entries[model.mesh.global_nodes[static_cast<std::size_t>(d.node)]].push_back(
+               entries[model.mesh.points[d.node]].push_back(
                    {d.damping, d.stiffness, d.held, d.displacement, d.free_field, d.area, d.is_rigid});
-             return entries;
+             return std::vector(entries.begin(), entries.end());
            })
       .def("set_dashpots",
-           [](M& model, const std::map<GlobalIndex, std::vector<DashpotEntry<D>>>& entries)
+           [](M& model, const std::vector<std::pair<Vector<D>, std::vector<DashpotEntry<D>>>>& given)
            {
+             const std::map<Vector<D>, std::vector<DashpotEntry<D>>> entries(given.begin(), given.end());
              auto& dashpots = model.fields.front().dashpots;
              dashpots.clear();
              for (Index i = 0; i < model.mesh.n_nodes(); ++i)
-               if (const auto found = entries.find(model.mesh.global_nodes[static_cast<std::size_t>(i)]);
-                   found != entries.end())
+               if (const auto found = entries.find(model.mesh.points[i]); found != entries.end())
                  for (const auto& [damping, stiffness, held, displacement, free_field, area, is_rigid] : found->second)
                    dashpots.push_back({i, damping, stiffness, held, displacement, free_field, area, is_rigid});
            })

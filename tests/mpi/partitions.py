@@ -22,13 +22,14 @@ def one_does_all(centres, size):
     return np.full(len(centres), size - 1)
 
 
-def spread_box(counts, lengths, comm, owners_of=bands, keep=None, origin=0.0, **options):
+def spread_box(counts, lengths, comm, owners_of=bands, keep=None, origin=0.0, number_of=lambda node: node, **options):
     """``core_cases.box`` with its cells spread over the ranks, and the cells across their facets as ghosts.
 
     Args:
         owners_of: gives each cell its rank, from the cells' centres and the number of ranks.
         keep: tells which cells the mesh has, from their centres; all by default.
         origin: position of the box's corner.
+        number_of: gives each node its number over all ranks, which meshes of DOLFINx choose by the partition.
     """
     whole = box(counts, lengths, **options)
     lengths = np.asarray(lengths, dtype=float)
@@ -55,7 +56,7 @@ def spread_box(counts, lengths, comm, owners_of=bands, keep=None, origin=0.0, **
         cell_tags=whole.cell_tags[held],
         facets=local[whole.facets[kept]],
         facet_tags=facet_tags[kept].astype(np.int32),
-        global_nodes=nodes.astype(np.int64),
+        global_nodes=number_of(nodes.astype(np.int64)),
         global_cells=held.astype(np.int64),
         cell_owners=owners[held].astype(np.int32),
         comm=comm,

@@ -190,11 +190,11 @@ class AbsorbingSides:
         """State for a checkpoint: the sides, their nodes with forces and displacements, and the wave. Collective."""
         if not self._absorbing:
             return None
-        nodes = {node: entry for part in self.comm.allgather(self._core.dashpots()) for node, entry in part.items()}
+        nodes = {tuple(place): entry for part in self.comm.allgather(self._core.dashpots()) for place, entry in part}
         sides = [[tag, *map(_finite, numbers), free] for tag, *numbers, free in self._absorbing]
         return {
             "sides": sides,
-            "nodes": [[node, nodes[node]] for node in sorted(nodes)],
+            "nodes": [[place, nodes[place]] for place in sorted(nodes)],
             "incoming": self._incoming,
             "free_fields": [asdict(layers) for layers in self._free_fields],
         }
@@ -205,7 +205,7 @@ class AbsorbingSides:
         self._absorbing = [
             (tag, _given(normal), _given(shear), _given(far), free) for tag, normal, shear, far, free in state["sides"]
         ]
-        self._core.set_dashpots({node: [tuple(entry) for entry in entries] for node, entries in state["nodes"]})
+        self._core.set_dashpots([(place, [tuple(entry) for entry in entries]) for place, entries in state["nodes"]])
         self._take_incoming(state["incoming"])
         self._free_fields = [Layers(**entry) for entry in state["free_fields"]]
         self._columns, self._tables = [], []  # a run begins them anew, and brings them to the present

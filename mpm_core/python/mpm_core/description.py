@@ -173,7 +173,7 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
         "a list of collisions",
     ),
     "absorbing": (
-        AnyOf([_NONE, {"sides": [(_is_tag, _FREE, _FREE, _FREE, _is_tag)], "nodes": [(_is_count, [list])],
+        AnyOf([_NONE, {"sides": [(_is_tag, _FREE, _FREE, _FREE, _is_tag)], "nodes": [(_VECTOR, [list])],
                        "incoming": AnyOf([_NONE, list]), "free_fields": [dict]}]),
         "null, or the sides that absorb waves",
     ),  # fmt: skip
