@@ -6,6 +6,7 @@ xz; engineering shear; tension positive.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.fem.supports import Support, carried_fractions
 from fenics_bridge.types import MeshTags
 
 N_STRESS = {2: 4, 3: 6}
@@ -90,12 +91,15 @@ def part_of(function: fem.Function, collapsed: tuple[Any, Any], name: str) -> fe
 class SupportedBody:
     """The method of a body in equilibrium that returns the forces on its supports."""
 
-    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
-        """The space of displacements, external less internal forces at its local dofs, and the tags of the boundary."""
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
+        """The space of displacements, external less internal forces at its local dofs, the tags of the boundary, its supports."""
         raise NotImplementedError
 
     def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
         """Force of the body, including its pore water, on its support at the facets of a tag, summed over them. Collective.
+
+        What a node carries where tags meet is divided between them, see `carried_fractions`, so that the forces of all tags add
+        up to the load.
 
         Args:
             facet_tag: number or name of the tag.
@@ -106,12 +110,10 @@ class SupportedBody:
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
         """
-        space, forces, facet_tags = self._nodal_reactions()
-        dim = space.mesh.geometry.dim
-        facets = tagged_facets(space.mesh.comm, facet_tags, facet_tag, "facet_tag")
-        nodes = fem.locate_dofs_topological(space, dim - 1, facets)
-        mine = nodes[nodes < space.dofmap.index_map.size_local]
-        return space.mesh.comm.allreduce(forces.reshape(-1, dim)[mine].sum(axis=0))
+        space, forces, facet_tags, supports = self._nodal_reactions()
+        dim, own = space.mesh.geometry.dim, space.dofmap.index_map.size_local
+        carried = carried_fractions(space, facet_tags, supports, facet_tag) * forces.reshape(-1, dim)
+        return space.mesh.comm.allreduce(carried[:own].sum(axis=0))
 
 
 def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:

@@ -73,6 +73,8 @@ class MixedQuasiStatic(SupportedBody):
         self.law = law
         """The law in force"""
         constraints = Constraints(space.sub(0), facet_tags, supports)
+        self.supports: tuple[Support, ...] = tuple(supports)
+        """The boundary conditions"""
         require_axis_held(space.sub(0), self.geometry, constraints)
         self._loads = LoadVectors(space, facet_tags, test=ufl.TestFunctions(space)[0], radius=radius)
         number = Materials(domain, law, None).number
@@ -153,11 +155,11 @@ class MixedQuasiStatic(SupportedBody):
         """
         return raise_load(self, load, first_step, tolerance, progress)
 
-    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
         self._body.increment.x.array[:] = 0.0
         forces = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         space, dofs = self._displacements
-        return space, forces[dofs], self._facet_tags
+        return space, forces[dofs], self._facet_tags, self.supports
 
     def pressure_at(self, points: ArrayLike) -> NDArray[np.float64]:
         """Pressure at points, compression positive; the points and their cells may be on different ranks. Collective.

@@ -311,9 +311,9 @@ class QuasiStatic(SupportedBody, PointFunctions):
         warn_of_motion(self)
         return steps
 
-    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
-        return self.displacement.function_space, out_of_balance, self.facet_tags
+        return self.displacement.function_space, out_of_balance, self.facet_tags, self.supports
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.

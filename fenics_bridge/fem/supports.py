@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.compat import facet_nodes
+from fenics_bridge import compat
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.types import MeshTags
@@ -39,7 +39,7 @@ def fixed(facet_tag: int | str) -> Support:
 
 
 def roller(facet_tag: int | str, normal: ArrayLike) -> Support:
-    """Roller: no displacement along the normal, free sliding across it.
+    """Roller: no displacement along the normal, free in the tangential directions.
 
     (The finite elements prescribe components of displacements; a roller at an angle to the axes would tie several of them
     together. Particles can have one: `mpm_core.Model.roller`.)
@@ -97,6 +97,7 @@ class Constraints:
         agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
         domain.topology.create_connectivity(dim - 1, dim)
         value_of = {}
+        self.supports = supports
         self.bcs = []
         """Conditions for the assembly of matrices"""
         for support in supports:
@@ -124,6 +125,63 @@ class Constraints:
         return self.origin + fraction * self.values
 
 
+def carried_fractions(
+    space: Any, facet_tags: MeshTags, supports: Sequence[Support], facet_tag: int | str
+) -> NDArray[np.float64]:
+    """Fractions of the forces at the nodes of a body that its supports at the facets of a tag carry. Collective.
+
+    A component that the supports of several tags hold at a node, such as a corner, belongs to them in proportion to the areas
+    of their facets as seen along it: that across a side to the side, that across the base to the base.
+
+    Args:
+        space: Lagrange space of displacements.
+        facet_tags: tags of the boundary.
+        supports: the boundary conditions.
+        facet_tag: number or name of the tag.
+
+    Returns:
+        Shape (n, D), by local nodes; 0 for components that nothing holds.
+
+    Raises:
+        InputError: no facet has the tag. Raised on all ranks alike.
+    """
+    comm, dim = space.mesh.comm, space.mesh.geometry.dim
+    asked = tag_numbers(comm, facet_tags, facet_tag, "facet_tag")
+    areas = fem.Function(space), fem.Function(space)
+    carried, whole = (function.x.array.reshape(-1, dim) for function in areas)
+    holds: dict[int, NDArray[np.bool_]] = {}
+    for support in supports:
+        components = [value is not None for value in support.displacement or (0.0,) * dim]
+        for number in tag_numbers(comm, facet_tags, support.facet_tag, "supports"):
+            holds[number] = holds.get(number, False) | np.array(components)
+    for number, held in holds.items():
+        for nodes, area in _areas_of_nodes(space, facet_tags.indices[facet_tags.values == number]):
+            whole[nodes] += held * area
+            if number in asked:
+                carried[nodes] += held * area
+    for function in areas:
+        compat.add_shared(function.x)
+    return carried / np.where(whole > 0, whole, 1.0)
+
+
+def _areas_of_nodes(space: Any, facets: NDArray[np.int32]) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float64]]]:
+    """For each of these facets that this rank owns, its nodes, and its area as seen along the axes (D) [m^(D-1)]."""
+    domain, dim = space.mesh, space.mesh.geometry.dim
+    domain.topology.create_connectivity(dim - 1, dim)
+    domain.topology.create_connectivity(dim, dim - 1)
+    cells_of, facets_of = domain.topology.connectivity(dim - 1, dim), domain.topology.connectivity(dim, dim - 1)
+    own = facets[facets < domain.topology.index_map(dim - 1).size_local]
+    edges = np.diff(domain.geometry.x[compat.facet_nodes(domain, own)][:, :, :dim], axis=1)
+    across = np.cross(edges[:, 0], edges[:, 1]) if dim == 3 else edges[:, 0, ::-1]
+    seen = np.abs(across) + 1e-9 * np.linalg.norm(
+        across, axis=1, keepdims=True
+    )  # for components that slide along all of them
+    for facet, area in zip(own, seen, strict=True):
+        cell = cells_of.links(facet)[0]
+        closure = space.dofmap.dof_layout.entity_closure_dofs(dim - 1, list(facets_of.links(cell)).index(facet))
+        yield space.dofmap.cell_dofs(cell)[closure], area
+
+
 def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[float, ...] | None:
     """The axis to which all facets of a tag are at right angles. Collective.
 
@@ -139,7 +197,7 @@ def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[flo
         InputError: no facet has the tag. Raised on all ranks alike.
     """
     facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
-    corners = domain.geometry.x[facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
+    corners = domain.geometry.x[compat.facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
     size = np.ptp(domain.geometry.x, axis=0).max() if len(domain.geometry.x) else 0.0
     flat = np.ptp(corners, axis=1) <= 1e-9 * size
     along = np.flatnonzero(np.all(domain.comm.allgather(flat.all(axis=0)), axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import SupportedBody, nodal_average, part_of
 from fenics_bridge.fem.point_functions import PointFunctions
+from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.coupled import WaterTerms
@@ -35,6 +37,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
     _soils: Any
     _displacements: Any
     _facet_tags: MeshTags
+    _supports: Constraints
     _external: NDArray[np.float64]
     _inflow: NDArray[np.float64]
 
@@ -113,10 +116,10 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         """
         return self._applied.inflow(facet_tag, self._inflow)
 
-    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags]:
+    def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
         self._body.increment.x.array[:] = 0.0
         if self.motion is not None:
             self.motion.rest_on()
         forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
         space, dofs = self._displacements
-        return space, forces[dofs], self._facet_tags
+        return space, forces[dofs], self._facet_tags, self._supports.supports

@@ -65,6 +65,25 @@ def test_the_law_of_the_particles_gives_the_linear_solution(degree):
     assert np.allclose(model.displacement.x.array, linear.displacement.x.array, atol=1e-9 * scale)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_reactions_at_all_supports_add_up_to_the_load(dim, degree):
+    # A block between smooth sides on a rough base: K_0 stresses, so that a side carries K_0 gamma / 2, and no shear.
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, *(1.0,) * (dim - 1)), (4,) * dim)
+    sides = [bridge.roller(tag, np.eye(dim)[(tag - 1) // 2]) for tag in range(1, 2 * dim - 1)]
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    model = bridge.QuasiStatic(domain, law, facet_tags, [*sides, bridge.fixed(2 * dim - 1)], degree)
+    model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    forces = np.array([model.reaction(tag) for tag in range(1, 2 * dim + 1)])
+    expected = np.zeros((2 * dim, dim))
+    expected[0, 0] = -0.5 * UNIT_WEIGHT * POISSON / (1 - POISSON)
+    expected[1, 0] = -expected[0, 0]
+    if dim == 3:
+        expected[2:4, 1] = 2 * expected[:2, 0]
+    expected[2 * dim - 2, -1] = -2 * UNIT_WEIGHT
+    assert np.allclose(forces, expected, atol=1e-6 * UNIT_WEIGHT)
+
+
 def test_stages_add_up_and_pressure_acts_on_its_facets():
     model = elastic_column(2)
     model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
