@@ -135,6 +135,8 @@ class ParticleValues:
     def assign(self, material: ArrayLike) -> None:
         """Give each particle its law: numbers of laws, shape (n,), in the order of ``particles``. Not collective.
 
+        Stresses stay. Of the state variables those stay that the new law has, too, by their names; its others begin at zero.
+
         Example:
             >>> model.assign(np.where(model.particles.position[:, 1] < 2.0, 1, 0))  # layers
         """
@@ -145,4 +147,19 @@ class ParticleValues:
             )
         for number in np.unique(numbers):
             self._material(int(number))
+        state = self._state_under(numbers)
         self._core.set_materials(np.ascontiguousarray(numbers, dtype=np.int32))
+        if state is not None:
+            self.particles.set("state", state)
+
+    def _state_under(self, numbers: NDArray[Any]) -> NDArray[np.float64] | None:
+        """State variables under other laws; None if they stay as they are."""
+        here, state = self.particles.material, self.particles.state
+        new = state.copy()
+        for before, after in np.unique(np.column_stack([here, numbers])[here != numbers], axis=0):
+            rows, known = (here == before) & (numbers == after), self.laws[before].state_names
+            new[rows] = 0.0
+            for column, name in enumerate(self.laws[after].state_names):
+                if name in known:
+                    new[rows, column] = state[rows, known.index(name)]
+        return None if np.array_equal(new, state) else new

@@ -104,6 +104,21 @@ def test_layers_and_random_fields():
     ].all()
 
 
+def test_another_law_takes_over_the_state_variables_that_it_has_too():
+    model = mpm.Model(box([1, 1]), [SOFTENING, SOIL, CLAY])
+    model.seed(density=2000.0, per_cell=3)
+    assert SOFTENING.state_names == ["plastic_strain", "band_strain", "cohesion_deviation", "separation"]
+    assert SOIL.state_names == ["plastic_strain", "separation"]
+    n = len(model.particles)
+    for name, value in {"plastic_strain": 0.3, "band_strain": 0.2, "separation": 0.1}.items():
+        model.set_state(name, np.full(n, value))
+    model.assign(np.arange(n) % 3)
+    softening, soil, clay = (model.particles.state[number] for number in range(3))
+    assert softening.tolist() == [0.3, 0.2, 0.0, 0.1]
+    assert soil[:2].tolist() == [0.3, 0.1] and not soil[2:].any()
+    assert clay[0] == 0.3 and not clay[1:].any()
+
+
 def test_bad_layers_and_fields_are_named():
     model = mpm.Model(box([1, 1]), [SOIL, SOFTENING])
     model.seed(density=2000.0, per_cell=3)
