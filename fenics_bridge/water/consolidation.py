@@ -324,7 +324,7 @@ class Consolidation(ConsolidationResults):
         longest: float = np.inf,
         progress: Callable[[ConsolidationReport], Any] | None = None,
     ) -> list[ConsolidationReport]:
-        """Make steps up to a time, each longer than the one before, as long as Newton's method takes them easily. Collective.
+        """Make steps up to a time, each longer than the one before while Newton's method converges quickly. Collective.
 
         A step that fails is halved.
 

@@ -138,7 +138,7 @@ Args:
     state: state variables, likewise, shape (n, n_state).
     tangent: filled with d stress / d strain [Pa], shape (n, S, S), unless None.
     time: at the start of the increment [s].
-    dt: duration of the increment [s]; infinite, as by default, where loading is slow without limit.
+    dt: duration of the increment [s]; infinite, as by default, where loading is infinitely slow.
     cell_size: size of each point's cell [m], shape (n,); None where there is no cell.
     deformation: increment of the deformation gradient, 1 + grad u, shape (n, D, D); None for 1 + strain increment.
 

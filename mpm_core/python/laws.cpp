@@ -178,9 +178,10 @@ values of the point; DTIME is one where loading is infinitely slow, CELENT is on
 identity, because the stress has already been rotated with the material. Temperature is not supported. PNEWDT below
 one counts as a failure.)",
       &loaded_umat)
-      .def_readonly("properties", &Umat::properties)
-      .def_readonly("n_variables", &Umat::n_variables)
-      .def_readonly("plastic_strain_variable", &Umat::plastic_strain_variable)
+      .def_readonly("properties", &Umat::properties, "PROPS")
+      .def_readonly("n_variables", &Umat::n_variables, "NSTATV")
+      .def_readonly("plastic_strain_variable", &Umat::plastic_strain_variable,
+                    "Number, from one, of the STATEV with the accumulated plastic deviatoric strain; 0 for none")
       .def_readonly("code", &Umat::code, "Symbol and SHA-256 of the library's file")
       .def_property_readonly(
           "library", [](const Umat& law) { return library_file(law.function); }, "Path of the shared library")

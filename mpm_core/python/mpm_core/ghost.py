@@ -39,7 +39,7 @@ class GhostPenalty:
                 raise InputError(f"{name} is {value}, expected a number from 0 to {most}")
 
     def options(self) -> Any:
-        """Options of the core."""
+        """The penalty as the core takes it, a ``_core.GhostOptions`` with the same three numbers."""
         options = _core.GhostOptions()
         options.stiffness, options.mass, options.filled = self.stiffness, self.mass, self.filled
         return options

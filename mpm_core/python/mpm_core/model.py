@@ -131,7 +131,7 @@ class Model(ContactMethods, Body):
         nmd: bool = False,
         integration: Integration | None = None,
     ) -> float:
-        """Out-of-balance over external force of the particles as they are: |f_ext - f_int| / |f_ext| over the nodes [-].
+        """Out-of-balance ratio |f_ext - f_int| / |f_ext| of the present state, over the nodes [-].
 
         Args:
             gravity: [m/s2], shape (D,), to weigh the particles with; by default the model's own, without its ramp.

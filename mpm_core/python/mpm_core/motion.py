@@ -16,7 +16,7 @@ STANDARD_GRAVITY = 9.80665
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The velocity of a motion over time, linear in between; zero before and after.
+    """The velocity of a motion over time, interpolated linearly; zero outside the time range.
 
     Args:
         time: rising times [s], shape (n,), n at least 2.

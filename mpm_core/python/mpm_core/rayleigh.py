@@ -63,7 +63,7 @@ class Rayleigh:
         return cls(2 * ratio * one * other / (one + other), 2 * ratio / (one + other), plastic_strain)
 
     def ratio(self, frequency: ArrayLike) -> NDArray[np.float64]:
-        """Damping ratio at frequencies [Hz], of their shape."""
+        """Damping ratio at the given frequencies [Hz]; same shape."""
         omega = 2 * np.pi * np.asarray(frequency, dtype=float)
         return 0.5 * (self.mass / omega + self.stiffness * omega)
 
