@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 from pathlib import Path
 
 from talus.find import PACKAGE, SHIPPED
@@ -16,7 +17,7 @@ def begin(name: str, folder: Path) -> str:
         ValueError: the name cannot be that of a script, or is that of a study of Talus.
         FileExistsError: one of the files is there.
     """
-    if not name.isidentifier():
+    if not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"the name is '{name}', expected letters, digits and underscores, as for a variable in Python")
     if (SHIPPED / f"{name}.py").exists() or (SHIPPED / name).exists():
         raise ValueError(f"the name is '{name}', which is that of a study of Talus; expected another one")
