@@ -155,6 +155,8 @@ def _taken(folder: Path, keeps: bool, overwrite: bool) -> str | None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         return _locked(folder.resolve(), keeps, overwrite)
+    except FileExistsError:
+        raise OutputError(f"cannot write results to {folder}: it is a file, not a folder") from None
     except OSError as error:
         raise OutputError(f"cannot write results to {folder}: {error.strerror}") from None
 
