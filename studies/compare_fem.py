@@ -176,7 +176,8 @@ def field_pictures(case: SlopeCase, fem: bridge.QuasiStatic, unit_weight: float,
         f"{unit_weight / 1e3:g} kN/m$^3$, cells of {case.args.cell_size:g} m",
     )
     return {
-        name: partial(save_side_by_side, folder / f"{name}.png", scene, position, volume, panels, DISPLACEMENT, title)
+        name: partial(save_side_by_side, folder / f"{name}.png", scene, position, volume, panels, DISPLACEMENT, title,
+                      own=("difference",))  # fmt: skip
     }
 
 
@@ -189,8 +190,16 @@ def convergence_pictures(rows: list[dict], sizes: list[float], folder: Path) -> 
     """Differences over the mesh size, in logarithmic axes."""
     pictures = {}
     for key, label, name in (
-        ("displacement_difference_l2", "Difference in displacement, relative $L_2$ norm [-]", "convergence"),
-        ("crest_displacement_difference", "Difference in displacement at the crest, relative [-]", "convergence_crest"),
+        ()
+        if len(sizes) < 2
+        else (
+            ("displacement_difference_l2", "Difference in displacement, relative $L_2$ norm [-]", "convergence"),
+            (
+                "crest_displacement_difference",
+                "Difference in displacement at the crest, relative [-]",
+                "convergence_crest",
+            ),
+        )
     ):
         curves = {}
         for row in rows:

@@ -21,7 +21,7 @@ from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.seepage_plots import SATURATION, FlowPicture, dries, flow_picture, save_flow, save_flow_film
+from common.seepage_plots import SATURATION, FlowPicture, dries, few, flow_picture, save_flow, save_flow_film
 from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, in_days, read_water_site
@@ -45,7 +45,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_site_file(p, "dam", "soils and boundaries", ("P1", ("P1", "P2"), "linear or quadratic triangles"))
     add_number(p, "--days", 60.0, "days", "duration of transient flow, if boundary values change", above=0)
-    add_count(p, "--frames", 6, "number of pictures of the flow over time")
+    add_count(p, "--frames", 6, "times at which the flow is stored; up to four of them are drawn")
     add_switch(p, "--film", True, "draw a film of the flow over time")
     return p
 
@@ -116,7 +116,7 @@ def drawn(
     shown = [picture for picture in pictures if picture is not None]
     saturation: Pictures = {}
     if shown and dries(shown):
-        saturation = {"saturation.png": lambda: save_flow(folder / "saturation.png", shown, SATURATION)}
+        saturation = {"saturation.png": lambda: save_flow(folder / "saturation.png", few(shown), SATURATION)}
     if len(pictures) == 1:
         return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown), **saturation}
     history = files.history
@@ -125,11 +125,17 @@ def drawn(
     axes, limits = ("Time [days]", "Inflow [m$^2$/day]"), ((0, None), (None, None))
     return {
         "seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown[:1]),
-        "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", shown),
+        "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", few(shown)),
         **saturation,
         "inflow.png": lambda: save_curves(folder / "inflow.png", curves, axes, limits=limits),
         **({"film": lambda: save_flow_film(folder / "film", moving)} if len(moving) > 1 else {}),
     }
+
+
+def litres(inflow: float, inflows: dict[str, float]) -> float:
+    """An inflow [m2/day] in litres per metre and day; zero where it is round-off of the largest one."""
+    largest = max(abs(value) for value in inflows.values())
+    return 1000 * inflow if abs(inflow) > 1e-9 * largest else 0.0
 
 
 CAPTIONS = {
@@ -165,7 +171,9 @@ def main(arguments: list[str] | None = None) -> int:
         "last_time_days": flow.time / DAY, "stored_water_m2": flow.stored_water(),
         "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    lines = [f"steady inflow, {name}: {1000 * value:.4g} litres per metre and day" for name, value in steady.items()]
+    lines = [
+        f"steady inflow, {name}: {litres(value, steady):.4g} litres per metre and day" for name, value in steady.items()
+    ]
     page = Page(captions=CAPTIONS)
     return write_summary(
         folder, a, summary, comm, page, drawn(site, files, pictures, film, folder), said="\n".join(lines)

@@ -159,12 +159,15 @@ def follow(
     return result
 
 
-def body_pictures(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path, title: str) -> Pictures:
+def body_pictures(
+    a: Namespace, scene: Scene | None, result: BodyRun, folder: Path, title: str, **look: Any
+) -> Pictures:
     """Strain and displacement in the end, and a film of the strain, with the bodies; nothing where there is no scene.
 
     Args:
         a: options with pictures and film.
         title: stands above the first two.
+        look: further options of `save_particles` for these.
     """
     if scene is None or not a.pictures:
         return {}
@@ -172,7 +175,7 @@ def body_pictures(a: Namespace, scene: Scene | None, result: BodyRun, folder: Pa
     kinds = {"strain": ("shear_strain", SHEAR_STRAIN), "displacement": ("displacement", DISPLACEMENT)}
     pictures: dict[str, Callable[[], object]] = {
         name: partial(save_particles, folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
-                      title=title, bodies=last.get("bodies"))
+                      title=title, bodies=last.get("bodies"), **look)
         for name, (key, quantity) in kinds.items()
     }  # fmt: skip
     if a.film:

@@ -145,11 +145,13 @@ class CollapseRuns:
         wide = 1e3 * bend([curve for of_angle in curves.values() for curve in of_angle])
         limits = ((0, wide), (lowest, None))
         values = {self._flow(angle): [self._shown(run.value) for run in runs] for angle, runs in self.runs.items()}
-        return {
-            name: partial(save_curves, folder / f"{name}.png", drawn, labels, reference=reference, limits=limits,
-                          per_colour=len(curves)),
-            "convergence": partial(save_convergence, folder / "convergence.png", self.sizes, values, target.label, reference),
-        }  # fmt: skip
+        pictures = {name: partial(save_curves, folder / f"{name}.png", drawn, labels, reference=reference, limits=limits,
+                                  per_colour=len(curves))}  # fmt: skip
+        if len(self.sizes) > 1:
+            pictures["convergence"] = partial(
+                save_convergence, folder / "convergence.png", self.sizes, values, target.label, reference
+            )
+        return pictures
 
     def mechanism_pictures(self, folder: Path, line: np.ndarray | None, line_name: str, **options) -> Pictures:
         """The last increment on the finest mesh with the slip line of limit analysis over it. Collective.

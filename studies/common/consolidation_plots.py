@@ -78,7 +78,7 @@ def _excess_figure(pictures: Sequence[ExcessPicture], scale: ExcessScale) -> Fig
         _draw_excess(axes, picture, scale.enlarged, levels)
         axes.set(aspect="equal", xlim=(low[0], high[0]))
         axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
-    figure.suptitle(f"Displacements {scale.enlarged:g} times", fontsize=9)
+    figure.suptitle(f"Displacements magnified {scale.enlarged:g} times", fontsize=9)
     for axes in panels[-1]:
         axes.set_xlabel("$x$ [m]")
     for axes in panels[:, 0]:

@@ -33,7 +33,7 @@ def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity
 
     Args:
         time: (n) [s].
-        acceleration: as recorded (n) [m/s2].
+        acceleration: before the correction (n) [m/s2].
         velocity: after the correction (n) [m/s].
     """
     raw = _integral(time, acceleration)
@@ -45,8 +45,8 @@ def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity
     with paper_style():
         figure, axes = plt.subplots(3, 1, figsize=(WIDTH, 4.6), sharex=True, layout="constrained")
         for panel, (label, before, after) in zip(axes, rows):
-            panel.plot(time, before, color="#b0b0b0", linewidth=1.0, label="as recorded")
-            panel.plot(time, after, color=CURVES[0], linewidth=0.9, label="with baseline correction")
+            panel.plot(time, before, color="#b0b0b0", linewidth=1.0, label="before baseline correction")
+            panel.plot(time, after, color=CURVES[0], linewidth=0.9, label="after baseline correction")
             _panel(panel, label)
         axes[0].legend(ncols=2, loc="upper right", fontsize=8)
         axes[-1].set_xlabel("Time [s]")
@@ -80,7 +80,7 @@ def save_amplification(path: Path, exact: Curve, found: Mapping[str, Curve]) -> 
             axes.plot(frequency, ratio, color=CURVES[k], linewidth=2.2 if k == 0 else 1.0, label=name)
         axes.plot(*exact, "--", color="black", linewidth=0.9, label="linear layers, closed form")
         axes.set(xlabel="Frequency [Hz]", ylim=(0, None))
-        _panel(axes, "Surface over outcrop [-]")
+        _panel(axes, "Amplification (surface over outcrop) [-]")
         axes.legend(fontsize=8)
         save_figure(figure, path)
 
@@ -115,6 +115,6 @@ def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity
         margin = 0.02 * (high - low)[0]
         axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
                  ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
-        axes.set_title(f"$t$ = {frame['time']:.1f} s; cells that rest as triangles", loc="left", pad=4)
+        axes.set_title(f"$t$ = {frame['time']:.1f} s; resting cells drawn as triangles", loc="left", pad=4)
         draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
         save_figure(figure, path)

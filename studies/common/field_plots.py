@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator
+from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator
 
 import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
@@ -281,14 +282,17 @@ def save_side_by_side(
     panels: Mapping[str, np.ndarray],
     quantity: Quantity,
     title: str,
+    own: Sequence[str] = (),
 ) -> None:
-    """Draw several quantities of the same material points one below the other, in one colour scale from zero.
+    """Draw several quantities of the same material points side by side, in one colour scale from zero.
 
     Args:
         position: (n, 2) [m], where the points are drawn; volume: (n,) [m^3 per metre].
         panels: values (n,) in SI units by the name of the panel.
+        own: names of panels with a colour scale of their own.
     """
-    limits = colour_limits(quantity, panels.values())
+    common = colour_limits(quantity, [values for name, values in panels.items() if name not in own])
+    limits = {name: colour_limits(quantity, [values]) if name in own else common for name, values in panels.items()}
     lower, upper = scene.limits([])
     height = (WIDTH / len(panels) - 0.3) * (upper[1] - lower[1]) / (upper[0] - lower[0])
     with paper_style():
@@ -299,7 +303,7 @@ def save_side_by_side(
             axes.set_xlim(lower[0], upper[0])
             axes.set_ylim(lower[1], upper[1])
             axes.add_collection(LineCollection(scene.initial_outline, colors="black", linewidths=0.6, zorder=3))
-            collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0,
+            collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits[name]), linewidths=0,
                                rasterized=True)  # fmt: skip
             collection.set_array(quantity.scale * values)
             axes.set_title(
@@ -307,9 +311,18 @@ def save_side_by_side(
             )
             axes.set_xlabel(axis_labels(scene.half_section)[0], labelpad=1)
         grid[0].set_ylabel(axis_labels(scene.half_section)[1], labelpad=1)
-        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=list(grid), location="bottom",
-                              ticks=ROUND_TICKS, shrink=0.55, aspect=45, extend="max")  # fmt: skip
-        bar.set_label(f"{quantity.label}; {title}")
+        together = [axes for axes, name in zip(grid, panels) if name not in own]
+        bars = [(together, common, f"{quantity.label}; {title}")]
+        bars += [
+            ([axes], limits[name], f"{name} [{quantity.unit}]".capitalize())
+            for axes, name in zip(grid, panels)
+            if name in own
+        ]
+        for below, ends, label in bars:
+            ticks = copy(ROUND_TICKS) if len(below) > 1 else MaxNLocator(3)
+            bar = figure.colorbar(ScalarMappable(Normalize(*ends), quantity.colours), ax=below, location="bottom", ticks=ticks,
+                                  shrink=0.8, aspect=20 * len(below), extend="max")  # fmt: skip
+            bar.set_label(label)
         _save(figure, path)
 
 

@@ -21,6 +21,8 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from particle_player import Quantity, Scene, axis_labels, boundary_edges, colour_limits, disc_diameter  # noqa: F401
 from particle_player.scene import ROUND_TICKS
@@ -113,6 +115,9 @@ def save_particles(
     limits: tuple[float, float] | None = None,
     title: str = "",
     bodies: np.ndarray | None = None,
+    box: np.ndarray | None = None,
+    labels: tuple[str, str] | None = None,
+    legend: bool = False,
 ) -> None:
     """Draw particles coloured by a quantity.
 
@@ -124,15 +129,31 @@ def save_particles(
         limits: of the colour scale, from `colour_limits`; those of ``values`` if not given.
         title: stands above, for instance the time.
         bodies: segments of rigid surfaces (k, 2, 2), m.
+        box: lower and upper corner of what is shown, m; all soil if not given.
+        labels: of the axes, if these are not x and y or r and z.
+        legend: name the grey line.
     """
     limits = limits or colour_limits(quantity, [values])
     with paper_style():
         segments = np.empty((0, 2, 2)) if bodies is None else bodies
-        figure, axes, bar_axes = figure_with_bar(*scene.limits([position], [segments]), scene.half_section)
+        lower, upper = scene.limits([position], [segments]) if box is None else box
+        figure, axes, bar_axes = figure_with_bar(lower, upper, scene.half_section)
+        if labels is not None:
+            axes.set(xlabel=labels[0], ylabel=labels[1])
         draw_scene(axes, scene)
         bodies_drawn(axes, segments)
         collection = discs(axes, position, volume, cmap=quantity.colours, norm=Normalize(*limits), linewidths=0)
         collection.set_array(quantity.scale * values)
+        # Discs at the sides of the mesh reach beyond it.
+        low = np.maximum(lower, scene.points.min(axis=0))
+        high = np.minimum(upper, scene.points.max(axis=0))
+        collection.set_clip_path(Rectangle(low, *(high - low), transform=axes.transData))
+        if legend:
+            axes.legend(
+                handles=[Line2D([], [], color=GREY, linewidth=0.6, label="initial surface")],
+                loc="upper right",
+                fontsize=8,
+            )
         axes.set_title(title, loc="left", pad=4)
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
         _save(figure, path)

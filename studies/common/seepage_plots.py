@@ -12,6 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 import fenics_bridge as bridge
@@ -76,6 +78,15 @@ def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.column_stack([along, np.where(np.interp(along, x, y) < level, level, np.nan)])
 
 
+MOST_PANELS = 4
+
+
+def few(pictures: Sequence[FlowPicture]) -> list[FlowPicture]:
+    """The first and the last picture and some between them, `MOST_PANELS` at most."""
+    chosen = np.unique(np.linspace(0, len(pictures) - 1, MOST_PANELS).round().astype(int))
+    return [pictures[k] for k in chosen]
+
+
 def dries(pictures: Sequence[FlowPicture]) -> bool:
     """Whether soil is anywhere so dry that a picture of its saturation shows something."""
     return min(picture.saturation.min() for picture in pictures) < 0.99
@@ -109,6 +120,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[t
     aspect, levels = (high[1] - low[1]) / (high[0] - low[0]), np.linspace(*limits, 21)
     figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.8 * aspect + 0.35) + 0.4), sharex=True,
                                   squeeze=False, layout="constrained")  # fmt: skip
+    table = False
     for axes, picture in zip(panels[:, 0], pictures):
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)
         axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
@@ -119,12 +131,16 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[t
         pressure_head = picture.head.values[:, 0]
         if pressure_head.min() < 0 < pressure_head.max():
             axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
+            table = True
         for line in picture.levels:
             axes.plot(*line.T, color=TABLE, linewidth=1.8)
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
         axes.set_title(picture.name, loc="left", pad=3)
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
     panels[-1, 0].set_xlabel("$x$ [m]")
+    if table:
+        panels[0, 0].legend(handles=[Line2D([], [], color=TABLE, linewidth=1.8, label="water table")], loc="lower right",
+                            bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, frameon=False, fontsize=8)  # fmt: skip
     bar = figure.colorbar(
         ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
     )
@@ -146,5 +162,6 @@ def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, box: tuple
     if not speed.max() > 1e-6 * fastest:
         return
     still = speed.mask | (speed.filled(0) < 1e-4 * speed.max()) | (p.filled(-1) < 0)
-    axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color="white", linewidth=0.6, density=0.9,
-                    arrowsize=0.6)  # fmt: skip
+    drawn = axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color="white", linewidth=0.6,
+                            density=0.9, arrowsize=0.6)  # fmt: skip
+    drawn.lines.set_path_effects([withStroke(linewidth=1.5, foreground="#404040")])  # white alone is lost on yellow

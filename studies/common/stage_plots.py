@@ -43,6 +43,11 @@ class StagePicture:
         return Field(self.displacement.points, self.displacement.cells[self.there], self.displacement.values,
                      self.displacement.half_section)  # fmt: skip
 
+    def moved(self) -> np.ndarray:
+        """Displacement [m] of each cell that is there: it jumps where soil was placed later than that beside it."""
+        field = self.field()
+        return np.linalg.norm(field.values[field.cells].mean(axis=1), axis=1)
+
 
 def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
     """The site as it is now; None but on the first rank. Collective."""
@@ -65,29 +70,20 @@ def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
 def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) -> None:
     """Draw a panel for each stage, above one another, in one colour scale: displacement, or strain where `quantity` is SHEAR."""
     box = np.array([stages[0].displacement.points.min(axis=0), stages[0].displacement.points.max(axis=0)])
-    values = [
-        s.strain[s.there] if quantity is SHEAR else np.linalg.norm(s.field().values[s.field().cells], axis=2)
-        for s in stages
-    ]
-    limits = (0.0, max(float(np.quantile(v * quantity.scale, 0.995)) for v in values) or 1.0)
+    values = [quantity.scale * (s.strain[s.there] if quantity is SHEAR else s.moved()) for s in stages]
+    limits = (0.0, max(float(np.quantile(v, 0.995)) for v in values) or 1.0)
     aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
     along, up = axis_labels(stages[0].displacement.half_section)
     with paper_style():
         figure, panels = plt.subplots(len(stages), 1, figsize=(6.9, len(stages) * (5.4 * aspect + 0.35) + 0.45), sharex=True,
                                       squeeze=False, layout="constrained")  # fmt: skip
-        for axes, stage in zip(panels[:, 0], stages):
+        for axes, stage, shown in zip(panels[:, 0], stages, values):
             field = stage.field()
-            shown = (
-                {"shading": "gouraud"}
-                if quantity is not SHEAR
-                else {"facecolors": quantity.scale * stage.strain[stage.there]}
-            )
-            lengths = () if quantity is SHEAR else (quantity.scale * np.linalg.norm(field.values, axis=1),)
-            axes.tripcolor(*field.points.T, field.cells, *lengths, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
-                           rasterized=True, **shown)  # fmt: skip
+            axes.tripcolor(*field.points.T, field.cells, facecolors=shown, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
+                           rasterized=True)  # fmt: skip
             outline = field.points[boundary_edges(field.cells)]
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
-            axes.set_title(stage.name, loc="left", pad=3)
+            axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)
             axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel=up)
         panels[-1, 0].set_xlabel(along)
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
@@ -103,7 +99,7 @@ def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequenc
         for k, (name, values) in enumerate(curves.items()):
             axes.plot(range(1, len(names) + 1), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
         axes.set_xticks(range(1, len(names) + 1), names, rotation=25, ha="right")
-        axes.set_ylabel(label)
+        axes.set(xlabel="Stage", ylabel=label)
         axes.axhline(0, color="black", linewidth=0.5)
         axes.legend(fontsize=8)
 
@@ -122,7 +118,7 @@ def stage_pictures(
     rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
     curves = {name: [1e3 * row[key] for row in rows] for key, name in
               (("heave_m", "largest heave"), ("settlement_m", "largest settlement"),
-               ("sideways_m", "largest sideways"))}  # fmt: skip
+               ("sideways_m", "largest horizontal"))}  # fmt: skip
     names = [row["stage"] for row in rows]
     return {
         "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),

@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LightSource
+from matplotlib.patheffects import withStroke
 
 from fenics_bridge.terrain import Raster
 
@@ -34,7 +35,8 @@ def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
         ax.imshow(shade, cmap="gray", extent=extent, origin="lower", vmin=-0.3, vmax=1.2, interpolation="bilinear")
         lines = ax.contour(x, y, ground.values, levels=ROUND_TICKS.tick_values(ground.values.min(), ground.values.max()),
                            colors="#222222", linewidths=0.6)  # fmt: skip
-        ax.clabel(lines, fmt="%g m", fontsize=7)
+        for label_of_line in ax.clabel(lines, fmt="%g m", fontsize=7):
+            label_of_line.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         colours = ax.imshow(
             np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85
         )

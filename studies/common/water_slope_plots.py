@@ -11,7 +11,7 @@ import numpy as np
 from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, save_figure
 from .plots import CURVES, paper_style
-from .seepage_plots import PRESSURE, SATURATION, dries, save_flow, save_flow_film
+from .seepage_plots import MOST_PANELS, PRESSURE, SATURATION, dries, save_flow, save_flow_film
 from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
 
@@ -21,7 +21,6 @@ CAPTIONS = {
     "factor_of_safety": "Factor of safety over time",
     "mechanism": "Mechanism in which the slope fails at the time of the lowest factor, its strength divided by the factor",
 }
-MOST_PANELS = 4
 
 
 def slope_pictures(
@@ -58,7 +57,7 @@ def save_factors(path: Path, instants: Sequence[Instant], limits: Mapping[str, f
     factors = np.array([instant.safety.value for instant in instants])
     with paper_style():
         figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
-        axes.plot(days, factors, "o-", color=CURVES[0], markersize=3, label="in time")
+        axes.plot(days, factors, "o-", color=CURVES[0], markersize=3, label="transient flow")
         for k, (name, value) in enumerate(limits.items()):
             axes.axhline(value, color=CURVES[k + 1], linestyle=("--", "-.", ":")[k % 3], linewidth=1.1, label=name)
         axes.axhline(1.0, color="black", linewidth=0.7)

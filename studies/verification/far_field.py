@@ -66,7 +66,7 @@ def save_meshes(path, model, far, scale):
             shades = axes.tripcolor(x, y, -1e3 * values[:, 1], triangles=cells, shading="gouraud", vmin=0, vmax=1e3 * most,
                                     cmap="viridis", rasterized=True)  # fmt: skip
             axes.triplot(x, y, cells, color="white", linewidth=width)
-        axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"Displacements {scale:g} times as large")
+        axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"Displacements magnified {scale:g} times")
         figure.colorbar(shades, ax=axes, label="Settlement [mm]")
         save_figure(figure, path)
 
